@@ -1,0 +1,39 @@
+# Language, warnings, optimisation and sanitizers, for every target of the project.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+# The release build keeps assert() and CGAL's checks: they cost little and the tests run against what ships.
+# Eigen's index checks sit inside the hot loops; they stay on in Debug and under the sanitizers.
+set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DEIGEN_NO_DEBUG")
+
+find_program(SPHERECUT_CCACHE ccache)
+if(SPHERECUT_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${SPHERECUT_CCACHE}")
+endif()
+
+add_library(spherecut_options INTERFACE)
+target_compile_features(spherecut_options INTERFACE cxx_std_20)
+# Debian's libfcl and libopenvdb are built for baseline x86-64: Eigen types must keep the alignment they have there
+# even when a user compiles with -march=native.
+target_compile_definitions(spherecut_options INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
+
+add_library(spherecut_warnings INTERFACE)
+target_compile_options(spherecut_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+if(SPHERECUT_WERROR)
+  target_compile_options(spherecut_warnings INTERFACE -Werror)
+endif()
+
+if(SPHERECUT_SANITIZE_ADDRESS)
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+if(SPHERECUT_SANITIZE_THREAD)
+  add_compile_options(-fsanitize=thread -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=thread)
+endif()

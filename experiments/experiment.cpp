@@ -1,0 +1,52 @@
+#include "experiments/experiment.hpp"
+
+#include "topology/errors.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace spherecut::experiments {
+
+bool Check::pass() const {
+  if (!std::isfinite(value))
+    return false;
+  return relation == "<=" ? value <= bound : value >= bound;
+}
+
+const std::vector<Experiment>& all_experiments() {
+  static const std::vector<Experiment> experiments = {};
+  return experiments;
+}
+
+std::vector<Check> run_experiment(const std::string& name, const std::filesystem::path& out, bool quick,
+                                  const std::function<void(const std::string&)>& say) {
+  for (const Experiment& experiment : all_experiments()) {
+    if (experiment.name != name)
+      continue;
+    std::filesystem::create_directories(out);
+    const std::vector<Check> checks = experiment.run({out, quick, say});
+    nlohmann::ordered_json summary;
+    summary["experiment"] = name;
+    summary["quick"] = quick;
+    summary["checks"] = nlohmann::ordered_json::array();
+    for (const Check& check : checks)
+      summary["checks"].push_back({{"name", check.name},
+                                   {"value", check.value},
+                                   {"relation", check.relation},
+                                   {"bound", check.bound},
+                                   {"pass", check.pass()}});
+    std::ofstream file(out / "summary.json");
+    file << summary.dump(2) << '\n';
+    if (!file.flush())
+      throw InputError(fmt::format("{}: cannot be written", (out / "summary.json").string()));
+    return checks;
+  }
+  std::string known;
+  for (const Experiment& experiment : all_experiments())
+    known += (known.empty() ? "" : ", ") + experiment.name;
+  throw InputError(fmt::format("experiment '{}' does not exist; there are: {}", name, known));
+}
+
+} // namespace spherecut::experiments

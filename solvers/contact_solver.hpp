@@ -1,0 +1,62 @@
+// Unilateral contact of a rigid tool with the nodes of a candidate patch, on the condensed compliance of the body.
+#pragma once
+
+#include "solvers/discretisation.hpp"
+#include "topology/tool.hpp"
+
+#include <optional>
+
+namespace spherecut::solvers {
+
+/// Boussinesq coupling of a local half-space domain: the far boundary moves as it would under the tool's total force.
+struct HalfSpaceCoupling {
+  Vector3 origin = Vector3::Zero();   // point on the surface of the half-space where the force acts
+  Vector3 inward = -Vector3::UnitZ(); // unit normal into the half-space
+};
+
+/// The body seen from a patch of candidate contact nodes: u_patch = u0 + compliance * f.
+struct ContactPatch {
+  std::vector<int> nodes;       // m candidates
+  std::vector<Vector3> rest;    // their rest positions, m
+  std::vector<Vector3> normals; // outward surface normals
+  MatrixX compliance;           // 3m x 3m, m/N
+  VectorX base_displacement;    // 3m, m: displacement without tool
+  std::vector<Field> responses; // 3m fields for unit forces (with the far field of the coupling included)
+  Field base;                   // field without tool
+};
+
+/// Condenses the discretisation onto the candidates [De 2001, Eq. 5 and after, in compliance form].
+ContactPatch condense(const Discretisation& body, const std::vector<int>& candidates,
+                      const std::optional<HalfSpaceCoupling>& coupling = std::nullopt);
+
+enum class ContactCondition { frictionless, bonded };
+
+struct ContactOptions {
+  ContactCondition condition = ContactCondition::frictionless;
+  int maximum_iterations = 200;
+  double gap_tolerance = 1e-9; // m
+};
+
+/// Outcome of pressing the tool into the patch.
+struct ContactState {
+  std::vector<Vector3> nodal_forces;    // N on the body, one per candidate
+  std::vector<char> active;             // candidates in contact
+  Vector3 tool_force = Vector3::Zero(); // N, force of the body on the tool
+  double contact_radius = 0;            // m, radius of the circle of the active nodes' share of the surface
+  double largest_penetration = 0;       // m, left over at convergence
+  int iterations = 0;
+  bool converged = true;
+};
+
+/// Finds the active set and the forces: no penetration, no tension, forces along the tool's normals (frictionless).
+/// `previous` warm-starts the active set.
+ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
+                   const ContactOptions& options = {}, const ContactState* previous = nullptr);
+
+/// Nodes of the patch with given displacements (bonded cap): solves for their forces.
+ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements);
+
+/// Field of the body for given nodal forces on the patch.
+Field deform(const ContactPatch& patch, const ContactState& state);
+
+} // namespace spherecut::solvers

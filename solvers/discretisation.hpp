@@ -1,0 +1,116 @@
+// One interface for the three discretisations of linear elasticity by finite spheres. A discretisation is assembled and
+// factored once; loads, contact and haptics then work with its condensed responses.
+#pragma once
+
+#include "solvers/material.hpp"
+#include "solvers/nodes.hpp"
+
+#include <functional>
+#include <memory>
+#include <string_view>
+
+namespace spherecut::solvers {
+
+enum class Method {
+  published,   // the paper: point collocation of the differential equation [De 2001]
+  collocation, // collocation of the force balance of each node's cell
+  galerkin,    // method of finite spheres in weak form
+};
+std::string_view to_string(Method method);
+/// Throws InputError naming the value and the three allowed names.
+Method method_from_string(std::string_view name);
+
+/// Prescribed displacement of one node. Free components carry no constraint.
+struct Prescribed {
+  int node = -1;
+  std::array<bool, 3> components{true, true, true};
+  Vector3 value = Vector3::Zero(); // m
+};
+
+/// What loads the body besides the tool. Null functions mean zero.
+struct Loads {
+  std::function<Vector3(const Vector3& x)> body_force;                      // N/m3
+  std::function<Vector3(const Vector3& x, const Vector3& normal)> traction; // Pa on the surface
+};
+
+/// A boundary value problem on a node cloud. Surface that is neither prescribed nor loaded is free.
+struct Problem {
+  std::shared_ptr<const topology::Domain> domain;
+  NodeCloud nodes;
+  Material material;
+  std::vector<Prescribed> prescribed;
+  Loads loads;
+};
+
+struct DiscretisationOptions {
+  Method method = Method::galerkin;
+  double support_radius = 0; // rho, support radius / h; 0: the method's default for this Poisson ratio
+  int quadrature = 2;        // Gauss points per direction in a background cell (galerkin)
+  int tip_node = -1;         // the tool-tip node of `published`
+};
+
+/// Diagnostics of assembly and factorisation. Times are wall clock, s.
+struct AssemblyReport {
+  int nodes = 0;
+  int unknowns = 0;
+  long matrix_nonzeros = 0;
+  long factor_nonzeros = 0;
+  double condition_estimate = 0;     // 1-norm estimate (Hager-Higham)
+  double worst_moment_condition = 0; // largest condition number of a moment matrix
+  int grown_supports = 0;            // supports whose radius had to grow
+  double supports_seconds = 0, assembly_seconds = 0, factor_seconds = 0;
+};
+
+/// A solution: nodal coefficients alpha_j of u_h = sum_j h_j alpha_j [De 2001, Eq. 1] (3N, node-major) and, for the
+/// mixed form, nodal pressures (N, else empty).
+struct Field {
+  VectorX coefficients;
+  VectorX pressure; // Pa
+};
+
+/// Value of a field at a point.
+struct PointState {
+  Vector3 displacement = Vector3::Zero(); // m
+  Matrix3 gradient = Matrix3::Zero();     // du_i/dx_j
+  Matrix3 strain = Matrix3::Zero();
+  Matrix3 stress = Matrix3::Zero(); // Pa
+};
+
+class Discretisation {
+ public:
+  virtual ~Discretisation() = default;
+  [[nodiscard]] virtual Method method() const = 0;
+  [[nodiscard]] virtual const Problem& problem() const = 0;
+  [[nodiscard]] virtual const AssemblyReport& report() const = 0;
+
+  /// Solution under the loads and prescribed displacements, no tool. Throws NumericalError with residual and condition.
+  [[nodiscard]] virtual Field solve() const = 0;
+
+  /// Response to unit forces (N) on nodes: field k = 3 c + a is the solution under a unit force along axis a on node
+  /// candidates[c], with homogeneous loads and prescribed displacements.
+  [[nodiscard]] virtual std::vector<Field> force_responses(const std::vector<int>& candidates) const = 0;
+
+  /// Response to prescribed displacements `values` (one per entry of problem().prescribed), with zero loads.
+  [[nodiscard]] virtual Field prescribed_response(const std::vector<Vector3>& values) const = 0;
+
+  /// Displacement of every node, u_h(x_i), 3N.
+  [[nodiscard]] virtual VectorX nodal_displacements(const Field& field) const = 0;
+
+  /// Everything at a point of the body. Throws InputError when no support covers x.
+  [[nodiscard]] virtual PointState at(const Vector3& x, const Field& field) const = 0;
+
+  /// Force that the constraint of each prescribed entry exerts on the body, N. `with_loads` says whether the field was
+  /// solved under problem().loads.
+  [[nodiscard]] virtual std::vector<Vector3> constraint_forces(const Field& field, bool with_loads) const = 0;
+
+  /// Largest unbalanced force of any unconstrained row under the given nodal forces, relative to the largest applied
+  /// one.
+  [[nodiscard]] virtual double residual(const Field& field, const std::vector<int>& loaded_nodes,
+                                        const std::vector<Vector3>& nodal_forces, bool with_loads) const = 0;
+};
+
+/// Assembles and factors. Throws InputError for an unusable problem (nothing prescribed, bad material, too few nodes),
+/// NumericalError naming the node whose support never becomes sound or for a singular system.
+std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options);
+
+} // namespace spherecut::solvers

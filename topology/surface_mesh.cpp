@@ -1,0 +1,77 @@
+#include "topology/surface_mesh.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <unordered_map>
+
+namespace spherecut::topology {
+
+BoundingBox bounds(const SurfaceMesh& mesh) {
+  if (mesh.vertices.empty())
+    return {};
+  BoundingBox box{mesh.vertices.front(), mesh.vertices.front()};
+  for (const Vector3& v : mesh.vertices) {
+    box.lower = box.lower.cwiseMin(v);
+    box.upper = box.upper.cwiseMax(v);
+  }
+  return box;
+}
+
+double volume(const SurfaceMesh& mesh) {
+  // Relative to the box centre, so that a body far from the origin loses no digits.
+  const Vector3 origin = bounds(mesh).centre();
+  double six_volumes = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vector3 a = mesh.vertices[t[0]] - origin, b = mesh.vertices[t[1]] - origin, c = mesh.vertices[t[2]] - origin;
+    six_volumes += a.dot(b.cross(c));
+  }
+  return six_volumes / 6;
+}
+
+double area(const SurfaceMesh& mesh) {
+  double sum = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vector3& a = mesh.vertices[t[0]];
+    sum += 0.5 * (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a).norm();
+  }
+  return sum;
+}
+
+Vector3 triangle_normal(const SurfaceMesh& mesh, int triangle) {
+  const Triangle& t = mesh.triangles[triangle];
+  const Vector3& a = mesh.vertices[t[0]];
+  return (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a).normalized();
+}
+
+std::vector<Vector3> vertex_normals(const SurfaceMesh& mesh) {
+  std::vector<Vector3> normals(mesh.vertices.size(), Vector3::Zero());
+  for (const Triangle& t : mesh.triangles) {
+    const Vector3& a = mesh.vertices[t[0]];
+    const Vector3 area_vector = (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
+    for (int v : t)
+      normals[v] += area_vector;
+  }
+  for (Vector3& n : normals)
+    n.normalize();
+  return normals;
+}
+
+std::vector<std::array<int, 3>> triangle_neighbours(const SurfaceMesh& mesh) {
+  const auto key = [](int a, int b) {
+    return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(a)) << 32) | static_cast<std::uint32_t>(b);
+  };
+  std::unordered_map<std::uint64_t, int> triangle_of_half_edge;
+  triangle_of_half_edge.reserve(3 * mesh.triangles.size());
+  for (int t = 0; t < std::ssize(mesh.triangles); ++t)
+    for (int e = 0; e < 3; ++e)
+      triangle_of_half_edge.emplace(key(mesh.triangles[t][e], mesh.triangles[t][(e + 1) % 3]), t);
+  std::vector<std::array<int, 3>> neighbours(mesh.triangles.size());
+  for (int t = 0; t < std::ssize(mesh.triangles); ++t)
+    for (int e = 0; e < 3; ++e) {
+      const auto found = triangle_of_half_edge.find(key(mesh.triangles[t][(e + 1) % 3], mesh.triangles[t][e]));
+      neighbours[t][e] = found == triangle_of_half_edge.end() ? -1 : found->second;
+    }
+  return neighbours;
+}
+
+} // namespace spherecut::topology
