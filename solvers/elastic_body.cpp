@@ -1,0 +1,128 @@
+#include "solvers/elastic_body.hpp"
+
+#include "topology/errors.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+
+namespace {
+
+Problem checked(Problem problem) {
+  check_problem(problem);
+  return problem;
+}
+
+} // namespace
+
+void check_problem(const Problem& problem) {
+  problem.material.check();
+  const NodeCloud& nodes = problem.nodes;
+  if (nodes.size() < 4)
+    throw InputError(fmt::format("{} nodes: a linear basis in three dimensions needs at least 4", nodes.size()));
+  for (int i = 0; i < nodes.size(); ++i) {
+    if (!nodes.positions[i].allFinite())
+      throw InputError(fmt::format("node {}: its position is not finite", i));
+    if (!(nodes.spacings[i] > 0) || !std::isfinite(nodes.spacings[i]))
+      throw InputError(fmt::format("node {}: spacing {} m must be positive", i, nodes.spacings[i]));
+  }
+  std::vector<Vector3> held;
+  for (const Prescribed& entry : problem.prescribed) {
+    if (entry.node < 0 || entry.node >= nodes.size())
+      throw InputError(fmt::format("prescribed node {} does not exist; there are {}", entry.node, nodes.size()));
+    if (!entry.value.allFinite())
+      throw InputError(fmt::format("prescribed displacement of node {} is not finite", entry.node));
+    if (entry.components[0] || entry.components[1] || entry.components[2])
+      held.push_back(nodes.positions[entry.node]);
+  }
+  if (held.empty())
+    throw InputError("nothing is fixed: no node has a prescribed displacement, so the body can move freely (6 rigid "
+                     "motions); fix a part of its surface");
+}
+
+NodalSupports nodal_supports(const Spheres& spheres) {
+  NodalSupports supports;
+  const int count = spheres.size();
+  supports.start.assign(1, 0);
+  supports.start.reserve(count + 1);
+  supports.nodes.reserve(32 * count);
+  supports.value.reserve(32 * count);
+  supports.gradient.reserve(32 * count);
+  ShapeFunctions shape;
+  for (int i = 0; i < count; ++i) {
+    if (!evaluate(spheres, spheres.centres()[i], shape))
+      throw NumericalError(fmt::format("node {}: its support has {} nodes and moment condition {:.1e}; it is not sound",
+                                       i, shape.size(), shape.moment_condition));
+    supports.worst_moment_condition = std::max(supports.worst_moment_condition, shape.moment_condition);
+    for (int k = 0; k < shape.size(); ++k) {
+      supports.nodes.push_back(shape.nodes[k]);
+      supports.value.push_back(shape.value[k]);
+      supports.gradient.push_back(shape.gradient(k));
+    }
+    supports.start.push_back(static_cast<int>(supports.nodes.size()));
+  }
+  return supports;
+}
+
+Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient) {
+  return material.lame_lambda() * gradient.trace() * Matrix3::Identity() +
+         material.shear_modulus() * (gradient + gradient.transpose());
+}
+
+ElasticBody::ElasticBody(Problem problem, double rho)
+    : problem_(checked(std::move(problem))), spheres_(problem_.nodes.positions, problem_.nodes.spacings, rho) {
+  const Stopwatch watch;
+  supports_ = nodal_supports(spheres_);
+  report_.nodes = problem_.nodes.size();
+  report_.grown_supports = spheres_.grown();
+  report_.worst_moment_condition = supports_.worst_moment_condition;
+  report_.supports_seconds = watch.seconds();
+}
+
+VectorX ElasticBody::nodal_displacements(const Field& field) const {
+  VectorX displacements = VectorX::Zero(3 * problem_.nodes.size());
+  for (int i = 0; i < problem_.nodes.size(); ++i)
+    for (int k = supports_.start[i]; k < supports_.start[i + 1]; ++k)
+      displacements.segment<3>(3 * i) += supports_.value[k] * field.coefficients.segment<3>(3 * supports_.nodes[k]);
+  return displacements;
+}
+
+PointState ElasticBody::at(const Vector3& x, const Field& field) const {
+  thread_local ShapeFunctions shape;
+  if (!evaluate(spheres_, x, shape))
+    throw InputError(fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+  PointState state;
+  double pressure = 0;
+  for (int k = 0; k < shape.size(); ++k) {
+    const int j = shape.nodes[k];
+    const Vector3 coefficient = field.coefficients.segment<3>(3 * j);
+    state.displacement += shape.value[k] * coefficient;
+    state.gradient += coefficient * shape.gradient(k).transpose();
+    if (field.pressure.size() > 0)
+      pressure += shape.value[k] * field.pressure[j];
+  }
+  state.strain = 0.5 * (state.gradient + state.gradient.transpose());
+  if (field.pressure.size() > 0)
+    state.stress = 2 * problem_.material.shear_modulus() * state.strain - pressure * Matrix3::Identity();
+  else
+    state.stress = stress_from_gradient(problem_.material, state.gradient);
+  return state;
+}
+
+void require_finite(const Field& field, const AssemblyReport& report) {
+  if (!field.coefficients.allFinite() || !field.pressure.allFinite())
+    throw NumericalError(fmt::format("the solution is not finite ({} unknowns, condition estimate {:.1e}): the body is "
+                                     "not held or the system is singular",
+                                     report.unknowns, report.condition_estimate));
+}
+
+Stopwatch::Stopwatch() : start_(std::chrono::steady_clock::now().time_since_epoch().count()) {}
+
+double Stopwatch::seconds() const {
+  using Clock = std::chrono::steady_clock;
+  return std::chrono::duration<double>(Clock::duration(Clock::now().time_since_epoch().count() - start_)).count();
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,62 @@
+// What the weak form and the cell balance share: checks of the problem, nodal supports, evaluation of fields.
+#pragma once
+
+#include "solvers/discretisation.hpp"
+#include "solvers/shape_functions.hpp"
+
+#include <memory>
+
+namespace spherecut::solvers {
+
+/// Shape functions at every node in compressed rows: support of node i is entries start[i] .. start[i+1].
+struct NodalSupports {
+  std::vector<int> start;
+  std::vector<int> nodes;
+  std::vector<double> value;
+  std::vector<Vector3> gradient; // 1/m
+  double worst_moment_condition = 0;
+};
+
+/// Evaluates the shape functions at all nodes. Throws NumericalError naming the node whose support is not sound.
+NodalSupports nodal_supports(const Spheres& spheres);
+
+/// Throws InputError for bad material, fewer than 4 nodes, non-finite positions, a prescribed node out of range, or
+/// nothing prescribed (the body would float: 6 rigid motions).
+void check_problem(const Problem& problem);
+
+/// Stress of isotropic linear elasticity from the displacement gradient, Pa.
+Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient);
+
+/// Shared part of the two finite-sphere discretisations.
+class ElasticBody : public Discretisation {
+public:
+  [[nodiscard]] const Problem& problem() const override { return problem_; }
+  [[nodiscard]] const AssemblyReport& report() const override { return report_; }
+  [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
+  [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
+
+protected:
+  ElasticBody(Problem problem, double rho);
+  Problem problem_;
+  AssemblyReport report_;
+  Spheres spheres_;
+  NodalSupports supports_;
+};
+
+/// Throws NumericalError when the field holds a number that is not finite.
+void require_finite(const Field& field, const AssemblyReport& report);
+
+/// Wall clock since construction, s.
+class Stopwatch {
+public:
+  Stopwatch();
+  [[nodiscard]] double seconds() const;
+
+private:
+  long long start_;
+};
+
+std::unique_ptr<Discretisation> make_collocation(Problem problem, const DiscretisationOptions& options);
+std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options);
+
+} // namespace spherecut::solvers

@@ -1,0 +1,228 @@
+#include "solvers/factorisation.hpp"
+
+#include "topology/errors.hpp"
+
+#include <cholmod.h>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <umfpack.h>
+
+namespace spherecut::solvers {
+
+namespace {
+
+/// CHOLMOD's workspace, started and finished with the object that owns it.
+struct CholmodCommon {
+  cholmod_common common{};
+  CholmodCommon() {
+    cholmod_start(&common);
+    common.print = 0;
+    common.supernodal = CHOLMOD_SUPERNODAL;
+    common.error_handler = nullptr;
+  }
+  ~CholmodCommon() { cholmod_finish(&common); }
+  CholmodCommon(const CholmodCommon&) = delete;
+  CholmodCommon& operator=(const CholmodCommon&) = delete;
+};
+
+cholmod_sparse view(const SparseMatrix& matrix, int symmetry) {
+  cholmod_sparse sparse{};
+  sparse.nrow = static_cast<std::size_t>(matrix.rows());
+  sparse.ncol = static_cast<std::size_t>(matrix.cols());
+  sparse.nzmax = static_cast<std::size_t>(matrix.nonZeros());
+  sparse.p = const_cast<int*>(matrix.outerIndexPtr());
+  sparse.i = const_cast<int*>(matrix.innerIndexPtr());
+  sparse.x = const_cast<double*>(matrix.valuePtr());
+  sparse.stype = symmetry;
+  sparse.itype = CHOLMOD_INT;
+  sparse.xtype = CHOLMOD_REAL;
+  sparse.dtype = CHOLMOD_DOUBLE;
+  sparse.sorted = 1;
+  sparse.packed = 1;
+  return sparse;
+}
+
+class CholeskyFactorisation final : public Factorisation {
+public:
+  CholeskyFactorisation(const SparseMatrix& lower, const std::vector<int>& ordering) {
+    cholmod_sparse matrix = view(lower, -1);
+    cholmod_common& common = workspace_.common;
+    if (ordering.empty()) {
+      factor_ = cholmod_analyze(&matrix, &common);
+    } else {
+      common.nmethods = 1;
+      common.method[0].ordering = CHOLMOD_GIVEN;
+      common.postorder = 1;
+      factor_ = cholmod_analyze_p(&matrix, const_cast<int*>(ordering.data()), nullptr, 0, &common);
+    }
+    if (factor_ == nullptr)
+      throw NumericalError(fmt::format("Cholesky analysis failed (CHOLMOD status {})", common.status));
+    cholmod_factorize(&matrix, factor_, &common);
+    if (common.status == CHOLMOD_NOT_POSDEF || factor_->minor < factor_->n) {
+      const std::size_t column = factor_->minor;
+      cholmod_free_factor(&factor_, &common);
+      throw NumericalError(fmt::format("the stiffness matrix is not positive definite (column {} of {} in elimination "
+                                       "order): the body is not held, or a support is unsound",
+                                       column, lower.cols()));
+    }
+    if (common.status != CHOLMOD_OK) {
+      const int status = common.status;
+      cholmod_free_factor(&factor_, &common);
+      throw NumericalError(fmt::format("Cholesky factorisation failed (CHOLMOD status {})", status));
+    }
+    nonzeros_ = static_cast<long>(common.lnz);
+  }
+  ~CholeskyFactorisation() override { cholmod_free_factor(&factor_, &workspace_.common); }
+  CholeskyFactorisation(const CholeskyFactorisation&) = delete;
+  CholeskyFactorisation& operator=(const CholeskyFactorisation&) = delete;
+
+  MatrixX solve(const MatrixX& right_hand_sides) const override {
+    cholmod_dense dense{};
+    dense.nrow = static_cast<std::size_t>(right_hand_sides.rows());
+    dense.ncol = static_cast<std::size_t>(right_hand_sides.cols());
+    dense.nzmax = dense.nrow * dense.ncol;
+    dense.d = dense.nrow;
+    dense.x = const_cast<double*>(right_hand_sides.data());
+    dense.xtype = CHOLMOD_REAL;
+    dense.dtype = CHOLMOD_DOUBLE;
+    cholmod_dense* solution = cholmod_solve(CHOLMOD_A, factor_, &dense, &workspace_.common);
+    if (solution == nullptr)
+      throw NumericalError("Cholesky solve ran out of memory");
+    MatrixX result = Eigen::Map<const MatrixX>(static_cast<const double*>(solution->x), right_hand_sides.rows(),
+                                               right_hand_sides.cols());
+    cholmod_free_dense(&solution, &workspace_.common);
+    return result;
+  }
+  MatrixX solve_transposed(const MatrixX& right_hand_sides) const override { return solve(right_hand_sides); }
+  long nonzeros() const override { return nonzeros_; }
+
+private:
+  mutable CholmodCommon workspace_;
+  cholmod_factor* factor_ = nullptr;
+  long nonzeros_ = 0;
+};
+
+class LuFactorisation final : public Factorisation {
+public:
+  LuFactorisation(const SparseMatrix& matrix, const std::vector<int>& ordering) : matrix_(matrix) {
+    matrix_.makeCompressed();
+    umfpack_di_defaults(control_);
+    // The patterns here are nearly symmetric: ordering A + A^T and preferring the diagonal halves the time.
+    control_[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;
+    control_[UMFPACK_ORDERING] = ordering.empty() ? UMFPACK_ORDERING_METIS : UMFPACK_ORDERING_GIVEN;
+    double info[UMFPACK_INFO];
+    void* symbolic = nullptr;
+    const int n = static_cast<int>(matrix_.rows());
+    int status = ordering.empty()
+                     ? umfpack_di_symbolic(n, n, matrix_.outerIndexPtr(), matrix_.innerIndexPtr(), matrix_.valuePtr(),
+                                           &symbolic, control_, info)
+                     : umfpack_di_qsymbolic(n, n, matrix_.outerIndexPtr(), matrix_.innerIndexPtr(), matrix_.valuePtr(),
+                                            ordering.data(), &symbolic, control_, info);
+    if (status != UMFPACK_OK)
+      throw NumericalError(fmt::format("LU analysis failed (UMFPACK status {})", status));
+    status = umfpack_di_numeric(matrix_.outerIndexPtr(), matrix_.innerIndexPtr(), matrix_.valuePtr(), symbolic,
+                                &numeric_, control_, info);
+    umfpack_di_free_symbolic(&symbolic);
+    if (status != UMFPACK_OK) {
+      if (numeric_ != nullptr)
+        umfpack_di_free_numeric(&numeric_);
+      throw NumericalError(fmt::format("the collocation matrix is singular (UMFPACK status {}, reciprocal condition of "
+                                       "the pivots {:.1e}): the body is not held, or a support is unsound",
+                                       status, info[UMFPACK_RCOND]));
+    }
+    nonzeros_ = static_cast<long>(info[UMFPACK_LNZ] + info[UMFPACK_UNZ]);
+  }
+  ~LuFactorisation() override { umfpack_di_free_numeric(&numeric_); }
+  LuFactorisation(const LuFactorisation&) = delete;
+  LuFactorisation& operator=(const LuFactorisation&) = delete;
+
+  MatrixX solve(const MatrixX& right_hand_sides) const override { return solve_with(UMFPACK_A, right_hand_sides); }
+  MatrixX solve_transposed(const MatrixX& right_hand_sides) const override {
+    return solve_with(UMFPACK_At, right_hand_sides);
+  }
+  long nonzeros() const override { return nonzeros_; }
+
+private:
+  MatrixX solve_with(int system, const MatrixX& right_hand_sides) const {
+    MatrixX result(right_hand_sides.rows(), right_hand_sides.cols());
+    double info[UMFPACK_INFO];
+    for (Eigen::Index k = 0; k < right_hand_sides.cols(); ++k) {
+      const int status = umfpack_di_solve(system, matrix_.outerIndexPtr(), matrix_.innerIndexPtr(), matrix_.valuePtr(),
+                                          result.col(k).data(), right_hand_sides.col(k).data(), numeric_, control_, info);
+      if (status != UMFPACK_OK)
+        throw NumericalError(fmt::format("LU solve failed (UMFPACK status {})", status));
+    }
+    return result;
+  }
+  SparseMatrix matrix_;
+  double control_[UMFPACK_CONTROL];
+  void* numeric_ = nullptr;
+  long nonzeros_ = 0;
+};
+
+} // namespace
+
+std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours) {
+  const int n = static_cast<int>(start.size()) - 1;
+  SparseMatrix graph(n, n);
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(neighbours.size());
+  for (int row = 0; row < n; ++row)
+    for (int k = start[row]; k < start[row + 1]; ++k)
+      if (neighbours[k] <= row)
+        entries.emplace_back(row, neighbours[k], 1.0);
+  graph.setFromTriplets(entries.begin(), entries.end());
+  CholmodCommon workspace;
+  cholmod_sparse matrix = view(graph, -1);
+  cholmod_factor* factor = cholmod_analyze(&matrix, &workspace.common);
+  if (factor == nullptr)
+    throw NumericalError("ordering the node graph ran out of memory");
+  const int* permutation = static_cast<const int*>(factor->Perm);
+  std::vector<int> ordering(permutation, permutation + n);
+  cholmod_free_factor(&factor, &workspace.common);
+  return ordering;
+}
+
+std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower, const std::vector<int>& ordering) {
+  return std::make_unique<CholeskyFactorisation>(lower, ordering);
+}
+
+std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering) {
+  return std::make_unique<LuFactorisation>(matrix, ordering);
+}
+
+double one_norm(const SparseMatrix& matrix, bool lower_triangle_of_symmetric) {
+  VectorX sums = VectorX::Zero(matrix.cols());
+  for (int column = 0; column < matrix.outerSize(); ++column)
+    for (SparseMatrix::InnerIterator entry(matrix, column); entry; ++entry) {
+      sums[column] += std::abs(entry.value());
+      if (lower_triangle_of_symmetric && entry.row() != column)
+        sums[entry.row()] += std::abs(entry.value());
+    }
+  return sums.size() == 0 ? 0 : sums.maxCoeff();
+}
+
+double condition_estimate(const Factorisation& factorisation, double norm_of_matrix, int size) {
+  VectorX x = VectorX::Constant(size, 1.0 / size);
+  double estimate = 0;
+  Eigen::Index last = -1;
+  for (int iteration = 0; iteration < 5; ++iteration) {
+    const VectorX y = factorisation.solve(x);
+    const double norm = y.lpNorm<1>();
+    if (iteration > 0 && norm <= estimate)
+      break;
+    estimate = norm;
+    const VectorX signs = y.unaryExpr([](double v) { return v >= 0 ? 1.0 : -1.0; });
+    const VectorX z = factorisation.solve_transposed(signs);
+    Eigen::Index largest = 0;
+    const double peak = z.cwiseAbs().maxCoeff(&largest);
+    if (largest == last || (iteration > 0 && peak <= z.dot(x)))
+      break;
+    last = largest;
+    x = VectorX::Unit(size, largest);
+  }
+  return estimate * norm_of_matrix;
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,44 @@
+// Sparse direct factorisations kept behind plain Eigen types: CHOLMOD for symmetric positive definite systems, UMFPACK
+// for the others.
+#pragma once
+
+#include "topology/types.hpp"
+
+#include <Eigen/SparseCore>
+#include <memory>
+
+namespace spherecut::solvers {
+
+using SparseMatrix = Eigen::SparseMatrix<double>; // column-major, int indices
+
+/// A factored square matrix.
+class Factorisation {
+public:
+  virtual ~Factorisation() = default;
+  /// Solution of A X = B, one column per right-hand side.
+  [[nodiscard]] virtual MatrixX solve(const MatrixX& right_hand_sides) const = 0;
+  /// Solution of A^T X = B.
+  [[nodiscard]] virtual MatrixX solve_transposed(const MatrixX& right_hand_sides) const = 0;
+  [[nodiscard]] virtual long nonzeros() const = 0;
+};
+
+/// Fill-reducing ordering of a symmetric graph given in compressed rows (nested dissection or minimum degree, whichever
+/// CHOLMOD finds better). Returns the permutation: entry k is the vertex eliminated k-th.
+std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours);
+
+/// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle. `ordering` (may be empty: CHOLMOD
+/// chooses) is a permutation of the rows. Throws NumericalError naming the column where the matrix is not positive
+/// definite.
+std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower, const std::vector<int>& ordering = {});
+
+/// L U with partial pivoting and iterative refinement. Throws NumericalError when the matrix is singular.
+std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering = {});
+
+/// Largest column sum of absolute values.
+double one_norm(const SparseMatrix& matrix, bool lower_triangle_of_symmetric = false);
+
+/// Estimate of the 1-norm condition number ||A|| ||A^-1|| (Hager 1984, Higham 1988); a lower bound, usually within a factor
+/// of three.
+double condition_estimate(const Factorisation& factorisation, double norm_of_matrix, int size);
+
+} // namespace spherecut::solvers

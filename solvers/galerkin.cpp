@@ -1,0 +1,366 @@
+// Method of finite spheres in weak form (Galerkin), the symmetric discretisation.
+//
+// K_IJ = integral over the body of [lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1], g = grad h, by background cells.
+// Displacements are prescribed at nodes through u_h(x_i) = sum_j h_j(x_i) alpha_j, which is not alpha_i: a penalty
+// P = `penalty` E h_i per component adds P h h^T, and the force of the constraint on the body is P (g - u_h(x_i)).
+// The shape functions sum to one, so the rows of K add up to zero and all forces balance to rounding.
+#include "solvers/background_cells.hpp"
+#include "solvers/elastic_body.hpp"
+#include "solvers/factorisation.hpp"
+#include "solvers/stiffness_kernel.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+
+namespace {
+
+constexpr double penalty = 1e5;
+
+double default_support_radius(double poisson_ratio) {
+  // Larger supports carry more volume-preserving modes: they cure locking.
+  return poisson_ratio >= 0.45 ? 2.2 : 1.7;
+}
+
+/// Shape function gradients of one background cell over the union of its points' supports.
+struct CellShapes {
+  std::vector<int> nodes;        // ascending
+  int points = 0;
+  int stride = 0;
+  std::vector<double> gradients; // [point][axis][stride], times sqrt(weight)
+};
+
+class Galerkin final : public ElasticBody {
+public:
+  Galerkin(Problem problem, const DiscretisationOptions& options)
+      : ElasticBody(std::move(problem), options.support_radius > 0
+                                            ? options.support_radius
+                                            : default_support_radius(problem.material.poisson_ratio)) {
+    const Stopwatch assembly;
+    BackgroundOptions background;
+    background.gauss = options.quadrature;
+    cells_ = background_cells(*problem_.domain, problem_.nodes, background);
+    evaluate_cells();
+    const std::vector<int> order = build_pattern();
+    assemble();
+    assemble_loads();
+    report_.unknowns = 3 * problem_.nodes.size();
+    report_.matrix_nonzeros = stiffness_.nonZeros();
+    report_.assembly_seconds = assembly.seconds();
+    const Stopwatch factor;
+    factorisation_ = factor_symmetric(stiffness_, order);
+    report_.factor_nonzeros = factorisation_->nonzeros();
+    report_.factor_seconds = factor.seconds();
+    report_.condition_estimate =
+        spherecut::solvers::condition_estimate(*factorisation_, one_norm(stiffness_, true), report_.unknowns);
+  }
+
+  Method method() const override { return Method::galerkin; }
+
+  Field solve() const override {
+    VectorX right = loads_;
+    for (const Prescribed& entry : problem_.prescribed)
+      add_constraint_load(right, entry, entry.value);
+    return field_of(factorisation_->solve(right));
+  }
+
+  std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
+    MatrixX right = MatrixX::Zero(report_.unknowns, 3 * static_cast<Eigen::Index>(candidates.size()));
+    for (std::size_t c = 0; c < candidates.size(); ++c)
+      for (int axis = 0; axis < 3; ++axis)
+        add_point_force(candidates[c], Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
+    const MatrixX solution = factorisation_->solve(right);
+    std::vector<Field> responses;
+    responses.reserve(static_cast<std::size_t>(solution.cols()));
+    for (Eigen::Index k = 0; k < solution.cols(); ++k)
+      responses.push_back(field_of(solution.col(k)));
+    return responses;
+  }
+
+  Field prescribed_response(const std::vector<Vector3>& values) const override {
+    VectorX right = VectorX::Zero(report_.unknowns);
+    for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
+      add_constraint_load(right, problem_.prescribed[k], values[k]);
+    return field_of(factorisation_->solve(right));
+  }
+
+  std::vector<Vector3> constraint_forces(const Field& field, bool with_loads) const override;
+  double residual(const Field& field, const std::vector<int>& loaded_nodes, const std::vector<Vector3>& nodal_forces,
+                  bool with_loads) const override;
+
+private:
+  void evaluate_cells();
+  std::vector<int> build_pattern();
+  void assemble();
+  void assemble_loads();
+  [[nodiscard]] double constraint_stiffness(int node) const {
+    return penalty * problem_.material.young_modulus * problem_.nodes.spacings[node];
+  }
+  template <typename Column>
+  void add_point_force(int node, const Vector3& force, Column&& right) const {
+    for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
+      right.template segment<3>(3 * supports_.nodes[k]) += supports_.value[k] * force;
+  }
+  void add_constraint_load(VectorX& right, const Prescribed& entry, const Vector3& value) const {
+    Vector3 force = constraint_stiffness(entry.node) * value;
+    for (int c = 0; c < 3; ++c)
+      if (!entry.components[c])
+        force[c] = 0;
+    add_point_force(entry.node, force, right);
+  }
+  [[nodiscard]] Vector3 value_at_node(int node, const VectorX& coefficients) const {
+    Vector3 value = Vector3::Zero();
+    for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
+      value += supports_.value[k] * coefficients.segment<3>(3 * supports_.nodes[k]);
+    return value;
+  }
+  [[nodiscard]] Field field_of(const VectorX& coefficients) const {
+    Field field{coefficients, {}};
+    require_finite(field, report_);
+    return field;
+  }
+
+  BackgroundCells cells_;
+  std::vector<CellShapes> shapes_;
+  std::vector<int> cells_start_, cells_of_node_;                // compressed rows: (cell, place of the node in it) pairs
+  std::vector<int> constraints_start_, constraints_of_node_;    // prescribed entries whose support holds the node
+  std::vector<int> column_start_, column_rows_;                 // lower block pattern, rows >= column, ascending
+  SparseMatrix stiffness_;                                      // lower triangle (diagonal blocks full)
+  VectorX loads_;
+  std::unique_ptr<Factorisation> factorisation_;
+};
+
+void Galerkin::evaluate_cells() {
+  const int cell_count = static_cast<int>(cells_.start.size()) - 1;
+  shapes_.resize(cell_count);
+  std::vector<int> place(problem_.nodes.size(), -1);
+  std::array<ShapeFunctions, 27> at_point;
+  for (int c = 0; c < cell_count; ++c) {
+    CellShapes& cell = shapes_[c];
+    cell.points = cells_.start[c + 1] - cells_.start[c];
+    for (int q = 0; q < cell.points; ++q) {
+      const Vector3& x = cells_.points[cells_.start[c] + q].position;
+      if (!evaluate(spheres_, x, at_point[q]))
+        throw NumericalError(fmt::format("the quadrature point ({:.6g}, {:.6g}, {:.6g}) m has {} supporting nodes: the "
+                                         "nodes leave a hole there",
+                                         x.x(), x.y(), x.z(), at_point[q].size()));
+      for (int node : at_point[q].nodes)
+        if (place[node] < 0) {
+          place[node] = 0;
+          cell.nodes.push_back(node);
+        }
+    }
+    std::sort(cell.nodes.begin(), cell.nodes.end());
+    if (std::ssize(cell.nodes) > stiffness_kernel_rows)
+      throw NumericalError(fmt::format("a background cell is covered by {} nodes; at most {} are handled: the node "
+                                       "spacing changes too abruptly",
+                                       cell.nodes.size(), stiffness_kernel_rows));
+    cell.stride = (static_cast<int>(cell.nodes.size()) + 7) / 8 * 8;
+    cell.gradients.assign(static_cast<std::size_t>(3 * cell.points) * cell.stride, 0.0);
+    for (int k = 0; k < std::ssize(cell.nodes); ++k)
+      place[cell.nodes[k]] = k;
+    for (int q = 0; q < cell.points; ++q) {
+      const double root = std::sqrt(cells_.points[cells_.start[c] + q].weight);
+      double* x = cell.gradients.data() + static_cast<std::size_t>(3 * q) * cell.stride;
+      double* y = x + cell.stride;
+      double* z = y + cell.stride;
+      for (int k = 0; k < at_point[q].size(); ++k) {
+        const int p = place[at_point[q].nodes[k]];
+        x[p] = root * at_point[q].dx[k];
+        y[p] = root * at_point[q].dy[k];
+        z[p] = root * at_point[q].dz[k];
+      }
+    }
+    for (int node : cell.nodes)
+      place[node] = -1;
+  }
+}
+
+std::vector<int> Galerkin::build_pattern() {
+  const int count = problem_.nodes.size();
+  cells_start_.assign(count + 1, 0);
+  for (const CellShapes& cell : shapes_)
+    for (int node : cell.nodes)
+      ++cells_start_[node + 1];
+  constraints_start_.assign(count + 1, 0);
+  for (const Prescribed& entry : problem_.prescribed)
+    for (int k = supports_.start[entry.node]; k < supports_.start[entry.node + 1]; ++k)
+      ++constraints_start_[supports_.nodes[k] + 1];
+  for (int i = 0; i < count; ++i) {
+    cells_start_[i + 1] += cells_start_[i];
+    constraints_start_[i + 1] += constraints_start_[i];
+  }
+  cells_of_node_.resize(2 * static_cast<std::size_t>(cells_start_[count]));
+  constraints_of_node_.resize(constraints_start_[count]);
+  std::vector<int> next(cells_start_.begin(), cells_start_.end() - 1);
+  for (int c = 0; c < std::ssize(shapes_); ++c)
+    for (int k = 0; k < std::ssize(shapes_[c].nodes); ++k) {
+      const int slot = next[shapes_[c].nodes[k]]++;
+      cells_of_node_[2 * slot] = c;
+      cells_of_node_[2 * slot + 1] = k;
+    }
+  next.assign(constraints_start_.begin(), constraints_start_.end() - 1);
+  for (int p = 0; p < std::ssize(problem_.prescribed); ++p) {
+    const int node = problem_.prescribed[p].node;
+    for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
+      constraints_of_node_[next[supports_.nodes[k]]++] = p;
+  }
+
+  column_start_.assign(1, 0);
+  column_rows_.clear();
+  std::vector<int> full_start(1, 0), full;
+  std::vector<int> seen(count, -1);
+  for (int j = 0; j < count; ++j) {
+    const auto visit = [&](int i) {
+      if (seen[i] == j)
+        return;
+      seen[i] = j;
+      full.push_back(i);
+      if (i >= j)
+        column_rows_.push_back(i);
+    };
+    visit(j);
+    for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot)
+      for (int i : shapes_[cells_of_node_[2 * slot]].nodes)
+        visit(i);
+    for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot) {
+      const int node = problem_.prescribed[constraints_of_node_[slot]].node;
+      for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
+        visit(supports_.nodes[k]);
+    }
+    std::sort(column_rows_.begin() + column_start_.back(), column_rows_.end());
+    column_start_.push_back(static_cast<int>(column_rows_.size()));
+    full_start.push_back(static_cast<int>(full.size()));
+  }
+  // Ordering nodes instead of unknowns: a ninth of the graph.
+  const std::vector<int> node_order = fill_reducing_ordering(full_start, full);
+  std::vector<int> order;
+  order.reserve(3 * node_order.size());
+  for (int node : node_order)
+    for (int c = 0; c < 3; ++c)
+      order.push_back(3 * node + c);
+  return order;
+}
+
+void Galerkin::assemble() {
+  const int count = problem_.nodes.size();
+  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
+  const long blocks = static_cast<long>(column_rows_.size());
+  if (9 * blocks > std::numeric_limits<int>::max())
+    throw InputError(fmt::format("{} nodes give {} matrix entries, more than the factorisation can index", count, 9 * blocks));
+  stiffness_.resize(3 * count, 3 * count);
+  stiffness_.resizeNonZeros(9 * blocks);
+  int* outer = stiffness_.outerIndexPtr();
+  int* inner = stiffness_.innerIndexPtr();
+  double* values = stiffness_.valuePtr();
+  std::fill(values, values + 9 * blocks, 0.0);
+  std::vector<int> place(count, -1);
+  StiffnessColumn column;
+  outer[0] = 0;
+  for (int j = 0; j < count; ++j) {
+    const int begin = column_start_[j], rows = column_start_[j + 1] - begin;
+    const int offset = 9 * begin;
+    double* target[3];
+    for (int b = 0; b < 3; ++b) {
+      outer[3 * j + b + 1] = offset + 3 * rows * (b + 1);
+      target[b] = values + offset + static_cast<long>(3 * rows) * b;
+    }
+    for (int k = 0; k < rows; ++k) {
+      const int i = column_rows_[begin + k];
+      place[i] = k;
+      for (int b = 0; b < 3; ++b)
+        for (int a = 0; a < 3; ++a)
+          inner[offset + 3 * rows * b + 3 * k + a] = 3 * i + a;
+    }
+    for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot) {
+      const CellShapes& cell = shapes_[cells_of_node_[2 * slot]];
+      const int own = cells_of_node_[2 * slot + 1], size = static_cast<int>(cell.nodes.size());
+      stiffness_column(cell.gradients.data(), cell.points, cell.stride, own, size, own, lambda, mu, column);
+      for (int k = own; k < size; ++k) {
+        const int p = 3 * place[cell.nodes[k]];
+        for (int b = 0; b < 3; ++b)
+          for (int a = 0; a < 3; ++a)
+            target[b][p + a] += column.plane[3 * a + b][k];
+      }
+    }
+    for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot) {
+      const Prescribed& entry = problem_.prescribed[constraints_of_node_[slot]];
+      const int first = supports_.start[entry.node], last = supports_.start[entry.node + 1];
+      double own_value = 0;
+      for (int k = first; k < last; ++k)
+        if (supports_.nodes[k] == j)
+          own_value = supports_.value[k];
+      const double factor = constraint_stiffness(entry.node) * own_value;
+      for (int k = first; k < last; ++k) {
+        const int i = supports_.nodes[k];
+        if (i < j)
+          continue;
+        for (int c = 0; c < 3; ++c)
+          if (entry.components[c])
+            target[c][3 * place[i] + c] += factor * supports_.value[k];
+      }
+    }
+    for (int k = 0; k < rows; ++k)
+      place[column_rows_[begin + k]] = -1;
+  }
+}
+
+void Galerkin::assemble_loads() {
+  loads_ = VectorX::Zero(3 * problem_.nodes.size());
+  ShapeFunctions shape;
+  const auto add = [&](const Vector3& x, const Vector3& force) {
+    if (!evaluate(spheres_, x, shape))
+      throw NumericalError(fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+    for (int k = 0; k < shape.size(); ++k)
+      loads_.segment<3>(3 * shape.nodes[k]) += shape.value[k] * force;
+  };
+  if (problem_.loads.body_force)
+    for (const QuadraturePoint& point : cells_.points)
+      add(point.position, point.weight * problem_.loads.body_force(point.position));
+  if (problem_.loads.traction)
+    for (const SurfacePoint& point : surface_quadrature(*problem_.domain, problem_.nodes)) {
+      const Vector3 traction = problem_.loads.traction(point.position, point.normal);
+      if (!traction.isZero(0))
+        add(point.position, point.weight * traction);
+    }
+}
+
+std::vector<Vector3> Galerkin::constraint_forces(const Field& field, bool with_loads) const {
+  // `with_loads` also says whether the prescribed values acted; without loads they were homogeneous or given by a
+  // prescribed_response, and the force follows from the penalty's own balance in both cases.
+  std::vector<Vector3> forces;
+  forces.reserve(problem_.prescribed.size());
+  for (const Prescribed& entry : problem_.prescribed) {
+    const Vector3 value = with_loads ? entry.value : Vector3::Zero();
+    Vector3 force = constraint_stiffness(entry.node) * (value - value_at_node(entry.node, field.coefficients));
+    for (int c = 0; c < 3; ++c)
+      if (!entry.components[c])
+        force[c] = 0;
+    forces.push_back(force);
+  }
+  return forces;
+}
+
+double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nodes,
+                          const std::vector<Vector3>& nodal_forces, bool with_loads) const {
+  VectorX applied = with_loads ? loads_ : VectorX(VectorX::Zero(report_.unknowns));
+  if (with_loads)
+    for (const Prescribed& entry : problem_.prescribed)
+      add_constraint_load(applied, entry, entry.value);
+  for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
+    add_point_force(loaded_nodes[k], nodal_forces[k], applied);
+  const VectorX rows = stiffness_.selfadjointView<Eigen::Lower>() * field.coefficients;
+  const double largest = std::max(applied.lpNorm<Eigen::Infinity>(), rows.lpNorm<Eigen::Infinity>());
+  return largest > 0 ? (rows - applied).lpNorm<Eigen::Infinity>() / largest : 0;
+}
+
+} // namespace
+
+std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
+  return std::make_unique<Galerkin>(std::move(problem), options);
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,85 @@
+#include "topology/point_tree.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+namespace spherecut::topology {
+
+namespace {
+constexpr int leaf_size = 8;
+}
+
+PointTree::PointTree(const std::vector<Vector3>& points) : points_(points), index_(points.size()) {
+  std::iota(index_.begin(), index_.end(), 0);
+  build(0, static_cast<int>(index_.size()), 0);
+  for (std::size_t k = 0; k < index_.size(); ++k)
+    points_[k] = points[index_[k]];
+}
+
+void PointTree::build(int begin, int end, int axis) {
+  if (end - begin <= leaf_size)
+    return;
+  const int middle = (begin + end) / 2;
+  std::nth_element(index_.begin() + begin, index_.begin() + middle, index_.begin() + end, [&](int a, int b) {
+    return points_[a][axis] != points_[b][axis] ? points_[a][axis] < points_[b][axis] : a < b;
+  });
+  build(begin, middle, (axis + 1) % 3);
+  build(middle + 1, end, (axis + 1) % 3);
+}
+
+void PointTree::within(const Vector3& x, double radius, std::vector<Found>& found) const {
+  within(0, static_cast<int>(points_.size()), 0, x, radius * radius, found);
+}
+
+void PointTree::within(int begin, int end, int axis, const Vector3& x, double squared_radius,
+                       std::vector<Found>& found) const {
+  if (end - begin <= leaf_size) {
+    for (int k = begin; k < end; ++k) {
+      const double squared = (points_[k] - x).squaredNorm();
+      if (squared < squared_radius)
+        found.push_back({squared, index_[k]});
+    }
+    return;
+  }
+  const int middle = (begin + end) / 2;
+  const double squared = (points_[middle] - x).squaredNorm();
+  if (squared < squared_radius)
+    found.push_back({squared, index_[middle]});
+  const double offset = x[axis] - points_[middle][axis];
+  const int next = (axis + 1) % 3;
+  if (offset <= 0 || offset * offset < squared_radius)
+    within(begin, middle, next, x, squared_radius, found);
+  if (offset >= 0 || offset * offset < squared_radius)
+    within(middle + 1, end, next, x, squared_radius, found);
+}
+
+PointTree::Found PointTree::nearest(const Vector3& x) const {
+  Found best{std::numeric_limits<double>::infinity(), -1};
+  nearest(0, static_cast<int>(points_.size()), 0, x, best);
+  return best;
+}
+
+void PointTree::nearest(int begin, int end, int axis, const Vector3& x, Found& best) const {
+  const auto consider = [&](int k) { best = std::min(best, Found{(points_[k] - x).squaredNorm(), index_[k]}); };
+  if (end - begin <= leaf_size) {
+    for (int k = begin; k < end; ++k)
+      consider(k);
+    return;
+  }
+  const int middle = (begin + end) / 2;
+  consider(middle);
+  const double offset = x[axis] - points_[middle][axis];
+  const int next = (axis + 1) % 3;
+  const auto visit = [&](bool low) {
+    if (low)
+      nearest(begin, middle, next, x, best);
+    else
+      nearest(middle + 1, end, next, x, best);
+  };
+  visit(offset < 0);
+  if (offset * offset <= best.squared_distance)
+    visit(offset >= 0);
+}
+
+} // namespace spherecut::topology

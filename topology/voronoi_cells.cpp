@@ -1,0 +1,340 @@
+// Notation: x_i node, h_i its spacing (the cell is built in units of h_i about x_i, because voro++ has absolute
+// tolerances), phi = curved_distance. Faces are taken from the cell of the smaller index only, so that each polygon is
+// cut once and shared with opposite signs.
+#include "topology/voronoi_cells.hpp"
+
+#include "topology/errors.hpp"
+#include "topology/point_tree.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <voro++.hh>
+
+namespace spherecut::topology {
+
+namespace {
+
+constexpr double cell_reach = 6;    // half size of the initial box of a cell, in h
+constexpr double cap_height = 0.75; // how far outside the curved surface a cell is cut off, in h
+constexpr int first_plane_id = -100;
+constexpr int cap_id = -50;
+
+struct Polygon {
+  std::vector<Vector3> vertices; // relative to the node, units of h
+  std::vector<double> phi;       // curved distance at the vertices, units of h
+};
+
+struct Measure {
+  Vector3 area = Vector3::Zero();
+  Vector3 centroid = Vector3::Zero();
+};
+
+/// Area vector and centroid of a planar polygon.
+Measure measure(const std::vector<Vector3>& polygon) {
+  Measure result;
+  const Vector3& origin = polygon.front();
+  for (std::size_t k = 1; k + 1 < polygon.size(); ++k)
+    result.area += 0.5 * (polygon[k] - origin).cross(polygon[k + 1] - origin);
+  const double total = result.area.norm();
+  if (total <= 0)
+    return {};
+  const Vector3 normal = result.area / total;
+  // Signed weights: a polygon bent inwards by its arc vertices stays right.
+  for (std::size_t k = 1; k + 1 < polygon.size(); ++k) {
+    const double weight = 0.5 * (polygon[k] - origin).cross(polygon[k + 1] - origin).dot(normal);
+    result.centroid += weight / total * (origin + polygon[k] + polygon[k + 1]) / 3;
+  }
+  return result;
+}
+
+/// Clips polygons by phi < 0 and collects the points where they met the curved surface.
+class CurvedClipper {
+public:
+  CurvedClipper(const Domain& domain, const Vector3& node, double spacing)
+      : domain_(domain), node_(node), spacing_(spacing) {}
+
+  double phi(const Vector3& local) const { return domain_.curved_distance(node_ + spacing_ * local) / spacing_; }
+
+  /// Returns false when nothing of the polygon lies inside.
+  bool clip(Polygon& polygon) {
+    const std::size_t count = polygon.vertices.size();
+    const bool outside = std::all_of(polygon.phi.begin(), polygon.phi.end(), [](double v) { return v >= 0; });
+    if (outside)
+      return false;
+    if (std::all_of(polygon.phi.begin(), polygon.phi.end(), [](double v) { return v < 0; }))
+      return true;
+    std::vector<Vector3> kept;
+    Vector3 exit = Vector3::Zero();
+    bool have_exit = false;
+    std::size_t start = 0; // begin at an inside vertex so that every exit precedes its entry
+    while (polygon.phi[start] >= 0)
+      ++start;
+    const Vector3 normal = measure(polygon.vertices).area.normalized();
+    for (std::size_t step = 0; step < count; ++step) {
+      const std::size_t k = (start + step) % count, next = (k + 1) % count;
+      if (polygon.phi[k] < 0)
+        kept.push_back(polygon.vertices[k]);
+      if ((polygon.phi[k] < 0) == (polygon.phi[next] < 0))
+        continue;
+      const Vector3 crossing = root(polygon.vertices[k], polygon.phi[k], polygon.vertices[next], polygon.phi[next]);
+      if (polygon.phi[k] < 0) {
+        exit = crossing;
+        have_exit = true;
+        kept.push_back(crossing);
+      } else {
+        if (have_exit)
+          add_arc(exit, crossing, normal, kept);
+        kept.push_back(crossing);
+      }
+      surface_sum_ += crossing;
+      ++surface_count_;
+    }
+    polygon.vertices = std::move(kept);
+    return polygon.vertices.size() >= 3;
+  }
+
+  [[nodiscard]] bool met_surface() const { return surface_count_ > 0; }
+  [[nodiscard]] Vector3 surface_mean() const { return surface_sum_ / surface_count_; }
+
+private:
+  /// Crossing of the edge a b with phi = 0 by the Illinois form of false position.
+  Vector3 root(Vector3 a, double phi_a, Vector3 b, double phi_b) const {
+    Vector3 x = a;
+    for (int iteration = 0; iteration < 12; ++iteration) {
+      x = a + phi_a / (phi_a - phi_b) * (b - a);
+      const double value = phi(x);
+      if (std::abs(value) < 1e-10 || (b - a).squaredNorm() < 1e-20)
+        break;
+      if ((value < 0) == (phi_a < 0)) {
+        a = x;
+        phi_a = value;
+        phi_b *= 0.5;
+      } else {
+        b = x;
+        phi_b = value;
+        phi_a *= 0.5;
+      }
+    }
+    return x;
+  }
+
+  /// The surface bends between two crossings: one vertex on the arc, in the polygon's plane, makes the cut second order.
+  void add_arc(const Vector3& from, const Vector3& to, const Vector3& normal, std::vector<Vector3>& kept) const {
+    const Vector3 chord = to - from;
+    if (chord.squaredNorm() < 1e-12)
+      return;
+    const Vector3 outward = chord.cross(normal).normalized();
+    const Vector3 middle = 0.5 * (from + to);
+    Vector3 x = middle;
+    for (int iteration = 0; iteration < 4; ++iteration) {
+      const double value = phi(x);
+      const double slope = domain_.curved_gradient(node_ + spacing_ * x).dot(outward);
+      if (std::abs(slope) < 0.2)
+        return;
+      x -= value / slope * outward;
+      if (std::abs(value) < 1e-8)
+        break;
+    }
+    if ((x - middle).norm() < 0.5 * chord.norm())
+      kept.push_back(x);
+  }
+
+  const Domain& domain_;
+  Vector3 node_;
+  double spacing_;
+  Vector3 surface_sum_ = Vector3::Zero();
+  int surface_count_ = 0;
+};
+
+/// One cell under construction.
+struct CellBuilder {
+  const std::vector<Vector3>& nodes;
+  const std::vector<double>& spacings;
+  const Domain& domain;
+  const PointTree& tree;
+  bool curved;
+  std::vector<PointTree::Found> near;
+  std::vector<double> vertices;
+  std::vector<int> face_vertices, neighbours;
+  std::vector<double> vertex_phi;
+
+  void build(int i, CellComplex& cells, std::vector<Vector3>& closure);
+
+private:
+  bool cut(int i, voro::voronoicell_neighbor& cell);
+};
+
+bool CellBuilder::cut(int i, voro::voronoicell_neighbor& cell) {
+  const Vector3& x = nodes[i];
+  const double h = spacings[i];
+  cell.init(-cell_reach, cell_reach, -cell_reach, cell_reach, -cell_reach, cell_reach);
+  for (std::size_t p = 0; p < domain.planes().size(); ++p) {
+    const Plane& plane = domain.planes()[p];
+    const double distance = -plane.signed_distance(x) / h;
+    if (distance < cell_reach * 1.8 &&
+        !cell.nplane(plane.normal.x(), plane.normal.y(), plane.normal.z(), 2 * distance,
+                     first_plane_id - static_cast<int>(p)))
+      return false;
+  }
+  if (curved) {
+    const double distance = -domain.curved_distance(x) / h;
+    if (distance < 1.5) {
+      const Vector3 n = domain.curved_gradient(x);
+      cell.nplane(n.x(), n.y(), n.z(), 2 * (distance + cap_height), cap_id);
+    }
+  }
+  double covered = 0, reach = 2.2;
+  while (true) {
+    near.clear();
+    tree.within(x, reach * h, near);
+    std::sort(near.begin(), near.end());
+    int since_check = 0;
+    double needed = 2 * std::sqrt(0.25 * cell.max_radius_squared());
+    for (const PointTree::Found& other : near) {
+      const double distance = std::sqrt(other.squared_distance) / h;
+      if (other.index == i || distance < covered)
+        continue;
+      if (distance < 1e-7)
+        throw InputError(fmt::format("nodes {} and {} coincide at ({:.6g}, {:.6g}, {:.6g}) m", i, other.index, x.x(),
+                                     x.y(), x.z()));
+      if (distance > needed)
+        return true;
+      const Vector3 d = (nodes[other.index] - x) / h;
+      if (!cell.nplane(d.x(), d.y(), d.z(), distance * distance, other.index))
+        return false;
+      if (++since_check == 4) {
+        since_check = 0;
+        needed = 2 * std::sqrt(0.25 * cell.max_radius_squared());
+      }
+    }
+    needed = 2 * std::sqrt(0.25 * cell.max_radius_squared());
+    if (needed <= reach || near.size() == nodes.size())
+      return true;
+    covered = reach;
+    reach = std::min(needed * 1.01, reach * 1.6);
+  }
+}
+
+void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure) {
+  voro::voronoicell_neighbor cell;
+  if (!cut(i, cell))
+    return;
+  const Vector3& x = nodes[i];
+  const double h = spacings[i];
+  cell.vertices(vertices);
+  cell.face_vertices(face_vertices);
+  cell.neighbors(neighbours);
+  const int vertex_count = static_cast<int>(vertices.size() / 3);
+  const auto vertex = [&](int v) { return Vector3(vertices[3 * v], vertices[3 * v + 1], vertices[3 * v + 2]); };
+
+  CurvedClipper clipper(domain, x, h);
+  vertex_phi.assign(vertex_count, -1);
+  bool near_surface = false;
+  if (curved) {
+    // phi is 1-Lipschitz: a cell whose radius is less than its depth below the surface cannot meet it.
+    const double depth = -domain.curved_distance(x) / h;
+    near_surface = depth < std::sqrt(0.25 * cell.max_radius_squared()) * 1.0001;
+    if (near_surface)
+      for (int v = 0; v < vertex_count; ++v)
+        vertex_phi[v] = clipper.phi(vertex(v));
+  }
+
+  std::size_t position = 0;
+  Polygon polygon;
+  for (const int neighbour : neighbours) {
+    const int size = face_vertices[position++];
+    polygon.vertices.clear();
+    polygon.phi.clear();
+    Vector3 middle = Vector3::Zero();
+    for (int k = 0; k < size; ++k) {
+      const int v = face_vertices[position++];
+      polygon.vertices.push_back(vertex(v));
+      polygon.phi.push_back(vertex_phi[v]);
+      middle += polygon.vertices.back() / size;
+    }
+    const bool planar_boundary = neighbour <= first_plane_id;
+    if (neighbour < 0 && !planar_boundary)
+      continue; // the cap or the box: outside the body
+    if (near_surface && !clipper.clip(polygon))
+      continue;
+    Measure face = measure(polygon.vertices);
+    const double face_area = face.area.norm();
+    if (face_area < 1e-12)
+      continue;
+    // Outward from the node. A plane through the node itself is a part of the boundary: its own normal tells.
+    const Vector3 outward =
+        planar_boundary ? domain.planes()[first_plane_id - neighbour].normal : Vector3(nodes[neighbour] - x);
+    if (face.area.dot(outward) < 0)
+      face.area = -face.area;
+    const Vector3 area = face.area * h * h, centroid = x + h * face.centroid;
+    if (planar_boundary) {
+      cells.boundary.push_back({i, first_plane_id - neighbour, area, centroid});
+      closure[i] += area;
+    } else if (neighbour > i) {
+      cells.faces.push_back({i, neighbour, area, centroid});
+      closure[i] += area;
+      closure[neighbour] -= area;
+    }
+  }
+  if (clipper.met_surface()) {
+    // Area follows from closure, once every face is known; the place is the mean crossing projected on the surface.
+    Vector3 point = x + h * clipper.surface_mean();
+    for (int iteration = 0; iteration < 2; ++iteration)
+      point -= domain.curved_distance(point) * domain.curved_gradient(point);
+    cells.boundary.push_back({i, -1, Vector3::Zero(), point});
+  }
+}
+
+} // namespace
+
+CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain) {
+  const int count = static_cast<int>(nodes.size());
+  CellComplex cells;
+  cells.faces.reserve(8 * nodes.size());
+  const PointTree tree(nodes);
+  std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
+  const bool curved = count > 0 && std::isfinite(domain.curved_distance(nodes.front()));
+  CellBuilder builder{nodes, spacings, domain, tree, curved, {}, {}, {}, {}, {}};
+  for (int i = 0; i < count; ++i)
+    builder.build(i, cells, closure);
+  std::vector<char> on_curve(nodes.size(), 0);
+  for (BoundaryFace& face : cells.boundary)
+    if (face.plane < 0) {
+      face.area = -closure[face.node];
+      on_curve[face.node] = 1;
+    }
+  // The surface can leave a cell exactly through its edges, without a crossing: closure still tells.
+  for (int i = 0; curved && i < count; ++i)
+    if (!on_curve[i] && closure[i].norm() > 1e-9 * spacings[i] * spacings[i])
+      cells.boundary.push_back({i, -1, -closure[i], domain.closest_surface_point(nodes[i])});
+
+  // Volume and centroid by cones from the node over the faces.
+  cells.volumes.assign(nodes.size(), 0.0);
+  cells.centroids.assign(nodes.size(), Vector3::Zero());
+  const auto add_cone = [&](int i, const Vector3& area, const Vector3& centroid) {
+    const Vector3 arm = centroid - nodes[i];
+    const double cone = arm.dot(area) / 3;
+    cells.volumes[i] += cone;
+    cells.centroids[i] += cone * 0.75 * arm;
+  };
+  for (const CellFace& face : cells.faces) {
+    add_cone(face.first, face.area, face.centroid);
+    add_cone(face.second, -face.area, face.centroid);
+  }
+  for (const BoundaryFace& face : cells.boundary)
+    add_cone(face.node, face.area, face.centroid);
+  for (int i = 0; i < count; ++i) {
+    if (cells.volumes[i] > 0) {
+      cells.centroids[i] = nodes[i] + cells.centroids[i] / cells.volumes[i];
+    } else {
+      cells.centroids[i] = nodes[i];
+      ++cells.empty_cells;
+    }
+  }
+  return cells;
+}
+
+} // namespace spherecut::topology
