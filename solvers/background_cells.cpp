@@ -12,15 +12,15 @@ namespace spherecut::solvers {
 
 namespace {
 
-/// Part of a box on the inner side of a plane through it, by the distance of its centre: exact for a box cut parallel to
-/// a face, second order otherwise.
+/// Part of a box on the inner side of a plane through it, by the distance of its centre: exact for a box cut parallel
+/// to a face, second order otherwise.
 double inside_fraction(double distance, const Vector3& normal, const Vector3& half) {
   const double reach = normal.cwiseAbs().dot(half);
   return std::clamp(0.5 - 0.5 * distance / reach, 0.0, 1.0);
 }
 
 class Octree {
-public:
+ public:
   Octree(const topology::Domain& domain, const NodeCloud& nodes, const BackgroundOptions& options)
       : domain_(domain), nodes_(nodes), options_(options), tree_(nodes.positions) {}
 
@@ -30,7 +30,7 @@ public:
     return std::move(cells_);
   }
 
-private:
+ private:
   double spacing_near(const Vector3& x) const { return nodes_.spacings[tree_.nearest(x).index]; }
 
   void divide(const Vector3& lower, const Vector3& upper) {
@@ -101,8 +101,8 @@ private:
     constexpr int detail = 2; // samples per direction in an octant
     const Vector3 octant_half = half / parts, sample_half = octant_half / detail;
     for (int octant = 0; octant < parts * parts * parts; ++octant) {
-      const Vector3 middle = centre + octant_half.cwiseProduct(Vector3(octant & 1 ? 1 : -1, octant & 2 ? 1 : -1,
-                                                                       octant & 4 ? 1 : -1));
+      const Vector3 middle =
+          centre + octant_half.cwiseProduct(Vector3(octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1));
       double volume = 0;
       Vector3 moment = Vector3::Zero();
       for (int k = 0; k < 8; ++k) {

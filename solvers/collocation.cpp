@@ -7,16 +7,17 @@
 //
 //   t_ij = sigma((G_i X + G_j X) / 2) A + gamma mu w [X_j - X_i - (G_i X + G_j X) d / 2],   w = A.d / |d|^2.
 //
-// The first term is second order and exact for linear fields. Alone it does not see every oscillation from node to node;
-// the second vanishes for linear fields and gives the coercivity that is missing. Row i states that the fluxes and the
-// applied force balance, -sum_j t_ij = f_i, so all rows add up to the total force: every t_ij appears twice with opposite
-// signs. Since the areas of a cell's faces and of its boundary B_i close, sum_j A_ij = -B_i, the part of G_i in row i
-// collapses to the boundary of the cell.
+// The first term is second order and exact for linear fields. Alone it does not see every oscillation from node to
+// node; the second vanishes for linear fields and gives the coercivity that is missing. Row i states that the fluxes
+// and the applied force balance, -sum_j t_ij = f_i, so all rows add up to the total force: every t_ij appears twice
+// with opposite signs. Since the areas of a cell's faces and of its boundary B_i close, sum_j A_ij = -B_i, the part of
+// G_i in row i collapses to the boundary of the cell.
 //
 // Face fluxes are a small numerical integration (one point a face), which the paper's point collocation avoids; it buys
 // convergence and forces in newtons.
 //
-// Near incompressibility the volumetric stress becomes an unknown p = -lambda div u, one a node, with the continuity row
+// Near incompressibility the volumetric stress becomes an unknown p = -lambda div u, one a node, with the continuity
+// row
 //
 //   sum_j u_ij . A + u_b . B_i + V_i p_i / lambda - alpha sum_j |A| |d| (p_j - p_i) / mu = 0,
 //
@@ -34,15 +35,15 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double damping = 0.5;              // gamma
-constexpr double pressure_smoothing = 0.01;  // alpha
-constexpr double mixed_above = 0.40;         // Poisson ratio from which the pressure unknown is used
+constexpr double damping = 0.5;             // gamma
+constexpr double pressure_smoothing = 0.01; // alpha
+constexpr double mixed_above = 0.40;        // Poisson ratio from which the pressure unknown is used
 constexpr double default_support_radius = 1.8;
 
 using Block = Eigen::Matrix4d;
 
 class Collocation final : public ElasticBody {
-public:
+ public:
   Collocation(Problem problem, const DiscretisationOptions& options)
       : ElasticBody(std::move(problem), options.support_radius > 0 ? options.support_radius : default_support_radius),
         mixed_(problem_.material.poisson_ratio > mixed_above), stride_(mixed_ ? 4 : 3) {
@@ -63,28 +64,21 @@ public:
     factorisation_ = factor_general(system);
     report_.factor_nonzeros = factorisation_->nonzeros();
     report_.factor_seconds = factor.seconds();
-    report_.condition_estimate = spherecut::solvers::condition_estimate(*factorisation_, one_norm(system), report_.unknowns);
+    report_.condition_estimate =
+        spherecut::solvers::condition_estimate(*factorisation_, one_norm(system), report_.unknowns);
   }
 
   Method method() const override { return Method::collocation; }
-  Field solve() const override {
-    VectorX right = right_hand_side(loads_);
-    for (const Prescribed& entry : problem_.prescribed)
-      set_prescribed(right, entry, entry.value);
-    return field_of(factorisation_->solve(right).col(0));
-  }
+  Field solve() const override { return solve_for(loads_, 1, prescribed_values(problem_)); }
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
   Field prescribed_response(const std::vector<Vector3>& values) const override {
-    VectorX right = VectorX::Zero(report_.unknowns);
-    for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
-      set_prescribed(right, problem_.prescribed[k], values[k]);
-    return field_of(factorisation_->solve(right).col(0));
+    return solve_for({}, 0, prescribed_values(problem_, values));
   }
-  std::vector<Vector3> constraint_forces(const Field& field, bool with_loads) const override;
-  double residual(const Field& field, const std::vector<int>& loaded_nodes, const std::vector<Vector3>& nodal_forces,
-                  bool with_loads) const override;
+  std::vector<Vector3> constraint_forces(const Field& field) const override;
+  double residual(const Field& field, const std::vector<int>& loaded_nodes,
+                  const std::vector<Vector3>& nodal_forces) const override;
 
-private:
+ private:
   void assemble_loads();
   void assemble_balance();
   [[nodiscard]] SparseMatrix constrained_system() const;
@@ -99,14 +93,23 @@ private:
           right[stride_ * static_cast<Eigen::Index>(i) + c] = forces[i][c];
     return right;
   }
-  void set_prescribed(VectorX& right, const Prescribed& entry, const Vector3& value) const {
-    for (int c = 0; c < 3; ++c)
-      if (entry.components[c])
-        right[stride_ * entry.node + c] = constraint_scale(entry.node) * value[c];
+  [[nodiscard]] Field solve_for(const std::vector<Vector3>& forces, double load_factor,
+                                const VectorX& prescribed) const {
+    VectorX right = right_hand_side(forces);
+    for (std::size_t k = 0; k < problem_.prescribed.size(); ++k) {
+      const Prescribed& entry = problem_.prescribed[k];
+      for (int c = 0; c < 3; ++c)
+        if (entry.components[c])
+          right[stride_ * entry.node + c] =
+              constraint_scale(entry.node) * prescribed[3 * static_cast<Eigen::Index>(k) + c];
+    }
+    return field_of(factorisation_->solve(right).col(0), load_factor, prescribed);
   }
-  [[nodiscard]] Field field_of(const VectorX& unknowns) const {
+  [[nodiscard]] Field field_of(const VectorX& unknowns, double load_factor, const VectorX& prescribed) const {
     const int count = problem_.nodes.size();
     Field field;
+    field.load_factor = load_factor;
+    field.prescribed = prescribed;
     field.coefficients.resize(3 * count);
     if (mixed_)
       field.pressure.resize(count);
@@ -134,9 +137,9 @@ private:
   int stride_;
   topology::CellComplex cells_;
   std::vector<std::array<bool, 3>> constrained_;
-  std::vector<Vector3> loads_;    // N, body force and traction on each cell
+  std::vector<Vector3> loads_; // N, body force and traction on each cell
   std::vector<int> row_start_, columns_;
-  std::vector<Block> blocks_;     // rows 0-2 balance (N per m, N per Pa), row 3 continuity
+  std::vector<Block> blocks_; // rows 0-2 balance (N per m, N per Pa), row 3 continuity
   std::unique_ptr<Factorisation> factorisation_;
 };
 
@@ -194,7 +197,7 @@ void Collocation::assemble_balance() {
       target.topLeftCorner<3, 3>() += flux;
     };
     block(i);
-    Vector3 own_area = Vector3::Zero();  // sum of the face areas: minus the boundary of the cell
+    Vector3 own_area = Vector3::Zero();    // sum of the face areas: minus the boundary of the cell
     Vector3 own_stretch = Vector3::Zero(); // sum of w d over the faces
     double own_weight = 0;
     for (const Side& side : sides[i]) {
@@ -284,23 +287,22 @@ SparseMatrix Collocation::constrained_system() const {
 std::vector<Field> Collocation::force_responses(const std::vector<int>& candidates) const {
   std::vector<Field> responses;
   responses.reserve(3 * candidates.size());
+  const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
   for (int candidate : candidates)
     for (int axis = 0; axis < 3; ++axis) {
       VectorX right = VectorX::Zero(report_.unknowns);
       if (!constrained_[candidate][axis])
         right[stride_ * candidate + axis] = 1;
-      responses.push_back(field_of(factorisation_->solve(right).col(0)));
+      responses.push_back(field_of(factorisation_->solve(right).col(0), 0, no_displacement));
     }
   return responses;
 }
 
-std::vector<Vector3> Collocation::constraint_forces(const Field& field, bool with_loads) const {
+std::vector<Vector3> Collocation::constraint_forces(const Field& field) const {
   std::vector<Vector3> forces;
   forces.reserve(problem_.prescribed.size());
   for (const Prescribed& entry : problem_.prescribed) {
-    Vector3 force = balance(entry.node, field);
-    if (with_loads)
-      force -= loads_[entry.node];
+    Vector3 force = balance(entry.node, field) - field.load_factor * loads_[entry.node];
     for (int c = 0; c < 3; ++c)
       if (!entry.components[c])
         force[c] = 0;
@@ -310,8 +312,10 @@ std::vector<Vector3> Collocation::constraint_forces(const Field& field, bool wit
 }
 
 double Collocation::residual(const Field& field, const std::vector<int>& loaded_nodes,
-                             const std::vector<Vector3>& nodal_forces, bool with_loads) const {
-  std::vector<Vector3> applied = with_loads ? loads_ : std::vector<Vector3>(problem_.nodes.size(), Vector3::Zero());
+                             const std::vector<Vector3>& nodal_forces) const {
+  std::vector<Vector3> applied = loads_;
+  for (Vector3& force : applied)
+    force *= field.load_factor;
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
     applied[loaded_nodes[k]] += nodal_forces[k];
   double worst = 0, largest = 0;

@@ -62,10 +62,16 @@ struct AssemblyReport {
 };
 
 /// A solution: nodal coefficients alpha_j of u_h = sum_j h_j alpha_j [De 2001, Eq. 1] (3N, node-major) and, for the
-/// mixed form, nodal pressures (N, else empty).
+/// mixed form, nodal pressures (N, else empty). It remembers the loads and prescribed displacements it answers to, so
+/// that superposed fields keep their forces.
 struct Field {
   VectorX coefficients;
-  VectorX pressure; // Pa
+  VectorX pressure;       // Pa
+  double load_factor = 0; // multiple of problem().loads acting
+  VectorX prescribed;     // m, 3 per entry of problem().prescribed
+
+  /// field += factor * other.
+  void add(double factor, const Field& other);
 };
 
 /// Value of a field at a point.
@@ -99,14 +105,13 @@ class Discretisation {
   /// Everything at a point of the body. Throws InputError when no support covers x.
   [[nodiscard]] virtual PointState at(const Vector3& x, const Field& field) const = 0;
 
-  /// Force that the constraint of each prescribed entry exerts on the body, N. `with_loads` says whether the field was
-  /// solved under problem().loads.
-  [[nodiscard]] virtual std::vector<Vector3> constraint_forces(const Field& field, bool with_loads) const = 0;
+  /// Force that the constraint of each prescribed entry exerts on the body, N.
+  [[nodiscard]] virtual std::vector<Vector3> constraint_forces(const Field& field) const = 0;
 
-  /// Largest unbalanced force of any unconstrained row under the given nodal forces, relative to the largest applied
-  /// one.
-  [[nodiscard]] virtual double residual(const Field& field, const std::vector<int>& loaded_nodes,
-                                        const std::vector<Vector3>& nodal_forces, bool with_loads) const = 0;
+  /// Largest unbalanced force of any unconstrained row under the field's loads and the given nodal forces, relative to
+  /// the largest force in the system.
+  [[nodiscard]] virtual double residual(const Field& field, const std::vector<int>& loaded_nodes = {},
+                                        const std::vector<Vector3>& nodal_forces = {}) const = 0;
 };
 
 /// Assembles and factors. Throws InputError for an unusable problem (nothing prescribed, bad material, too few nodes),

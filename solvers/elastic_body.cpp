@@ -111,6 +111,31 @@ PointState ElasticBody::at(const Vector3& x, const Field& field) const {
   return state;
 }
 
+VectorX prescribed_values(const Problem& problem) {
+  std::vector<Vector3> values;
+  values.reserve(problem.prescribed.size());
+  for (const Prescribed& entry : problem.prescribed)
+    values.push_back(entry.value);
+  return prescribed_values(problem, values);
+}
+
+VectorX prescribed_values(const Problem& problem, const std::vector<Vector3>& values) {
+  if (values.size() != problem.prescribed.size())
+    throw InputError(fmt::format("{} displacements for {} prescribed nodes", values.size(), problem.prescribed.size()));
+  VectorX result(3 * static_cast<Eigen::Index>(values.size()));
+  for (std::size_t k = 0; k < values.size(); ++k)
+    result.segment<3>(3 * static_cast<Eigen::Index>(k)) = values[k];
+  return result;
+}
+
+Vector3 held_part(const Prescribed& entry, const Vector3& value) {
+  Vector3 held = value;
+  for (int c = 0; c < 3; ++c)
+    if (!entry.components[c])
+      held[c] = 0;
+  return held;
+}
+
 void require_finite(const Field& field, const AssemblyReport& report) {
   if (!field.coefficients.allFinite() || !field.pressure.allFinite())
     throw NumericalError(fmt::format("the solution is not finite ({} unknowns, condition estimate {:.1e}): the body is "

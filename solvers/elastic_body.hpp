@@ -29,13 +29,13 @@ Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient);
 
 /// Shared part of the two finite-sphere discretisations.
 class ElasticBody : public Discretisation {
-public:
+ public:
   [[nodiscard]] const Problem& problem() const override { return problem_; }
   [[nodiscard]] const AssemblyReport& report() const override { return report_; }
   [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
   [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
 
-protected:
+ protected:
   ElasticBody(Problem problem, double rho);
   Problem problem_;
   AssemblyReport report_;
@@ -43,16 +43,23 @@ protected:
   NodalSupports supports_;
 };
 
+/// Prescribed displacements as one vector, 3 per entry; `values` in place of the problem's own when given.
+VectorX prescribed_values(const Problem& problem);
+VectorX prescribed_values(const Problem& problem, const std::vector<Vector3>& values);
+
+/// The components of `value` that the entry constrains, zero in the others.
+Vector3 held_part(const Prescribed& entry, const Vector3& value);
+
 /// Throws NumericalError when the field holds a number that is not finite.
 void require_finite(const Field& field, const AssemblyReport& report);
 
 /// Wall clock since construction, s.
 class Stopwatch {
-public:
+ public:
   Stopwatch();
   [[nodiscard]] double seconds() const;
 
-private:
+ private:
   long long start_;
 };
 

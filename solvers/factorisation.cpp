@@ -44,7 +44,7 @@ cholmod_sparse view(const SparseMatrix& matrix, int symmetry) {
 }
 
 class CholeskyFactorisation final : public Factorisation {
-public:
+ public:
   CholeskyFactorisation(const SparseMatrix& lower, const std::vector<int>& ordering) {
     cholmod_sparse matrix = view(lower, -1);
     cholmod_common& common = workspace_.common;
@@ -97,14 +97,14 @@ public:
   MatrixX solve_transposed(const MatrixX& right_hand_sides) const override { return solve(right_hand_sides); }
   long nonzeros() const override { return nonzeros_; }
 
-private:
+ private:
   mutable CholmodCommon workspace_;
   cholmod_factor* factor_ = nullptr;
   long nonzeros_ = 0;
 };
 
 class LuFactorisation final : public Factorisation {
-public:
+ public:
   LuFactorisation(const SparseMatrix& matrix, const std::vector<int>& ordering) : matrix_(matrix) {
     matrix_.makeCompressed();
     umfpack_di_defaults(control_);
@@ -143,13 +143,14 @@ public:
   }
   long nonzeros() const override { return nonzeros_; }
 
-private:
+ private:
   MatrixX solve_with(int system, const MatrixX& right_hand_sides) const {
     MatrixX result(right_hand_sides.rows(), right_hand_sides.cols());
     double info[UMFPACK_INFO];
     for (Eigen::Index k = 0; k < right_hand_sides.cols(); ++k) {
-      const int status = umfpack_di_solve(system, matrix_.outerIndexPtr(), matrix_.innerIndexPtr(), matrix_.valuePtr(),
-                                          result.col(k).data(), right_hand_sides.col(k).data(), numeric_, control_, info);
+      const int status =
+          umfpack_di_solve(system, matrix_.outerIndexPtr(), matrix_.innerIndexPtr(), matrix_.valuePtr(),
+                           result.col(k).data(), right_hand_sides.col(k).data(), numeric_, control_, info);
       if (status != UMFPACK_OK)
         throw NumericalError(fmt::format("LU solve failed (UMFPACK status {})", status));
     }

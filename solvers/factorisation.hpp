@@ -13,7 +13,7 @@ using SparseMatrix = Eigen::SparseMatrix<double>; // column-major, int indices
 
 /// A factored square matrix.
 class Factorisation {
-public:
+ public:
   virtual ~Factorisation() = default;
   /// Solution of A X = B, one column per right-hand side.
   [[nodiscard]] virtual MatrixX solve(const MatrixX& right_hand_sides) const = 0;
@@ -26,9 +26,9 @@ public:
 /// CHOLMOD finds better). Returns the permutation: entry k is the vertex eliminated k-th.
 std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours);
 
-/// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle. `ordering` (may be empty: CHOLMOD
-/// chooses) is a permutation of the rows. Throws NumericalError naming the column where the matrix is not positive
-/// definite.
+/// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle. `ordering` (may be empty:
+/// CHOLMOD chooses) is a permutation of the rows. Throws NumericalError naming the column where the matrix is not
+/// positive definite.
 std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower, const std::vector<int>& ordering = {});
 
 /// L U with partial pivoting and iterative refinement. Throws NumericalError when the matrix is singular.
@@ -37,8 +37,8 @@ std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const 
 /// Largest column sum of absolute values.
 double one_norm(const SparseMatrix& matrix, bool lower_triangle_of_symmetric = false);
 
-/// Estimate of the 1-norm condition number ||A|| ||A^-1|| (Hager 1984, Higham 1988); a lower bound, usually within a factor
-/// of three.
+/// Estimate of the 1-norm condition number ||A|| ||A^-1|| (Hager 1984, Higham 1988); a lower bound, usually within a
+/// factor of three.
 double condition_estimate(const Factorisation& factorisation, double norm_of_matrix, int size);
 
 } // namespace spherecut::solvers

@@ -27,14 +27,14 @@ double default_support_radius(double poisson_ratio) {
 
 /// Shape function gradients of one background cell over the union of its points' supports.
 struct CellShapes {
-  std::vector<int> nodes;        // ascending
+  std::vector<int> nodes; // ascending
   int points = 0;
   int stride = 0;
   std::vector<double> gradients; // [point][axis][stride], times sqrt(weight)
 };
 
 class Galerkin final : public ElasticBody {
-public:
+ public:
   Galerkin(Problem problem, const DiscretisationOptions& options)
       : ElasticBody(std::move(problem), options.support_radius > 0
                                             ? options.support_radius
@@ -61,10 +61,8 @@ public:
   Method method() const override { return Method::galerkin; }
 
   Field solve() const override {
-    VectorX right = loads_;
-    for (const Prescribed& entry : problem_.prescribed)
-      add_constraint_load(right, entry, entry.value);
-    return field_of(factorisation_->solve(right));
+    const VectorX prescribed = prescribed_values(problem_);
+    return field_of(factorisation_->solve(loads_ + constraint_loads(prescribed)), 1, prescribed);
   }
 
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
@@ -73,25 +71,24 @@ public:
       for (int axis = 0; axis < 3; ++axis)
         add_point_force(candidates[c], Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
     const MatrixX solution = factorisation_->solve(right);
+    const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
     std::vector<Field> responses;
     responses.reserve(static_cast<std::size_t>(solution.cols()));
     for (Eigen::Index k = 0; k < solution.cols(); ++k)
-      responses.push_back(field_of(solution.col(k)));
+      responses.push_back(field_of(solution.col(k), 0, no_displacement));
     return responses;
   }
 
   Field prescribed_response(const std::vector<Vector3>& values) const override {
-    VectorX right = VectorX::Zero(report_.unknowns);
-    for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
-      add_constraint_load(right, problem_.prescribed[k], values[k]);
-    return field_of(factorisation_->solve(right));
+    const VectorX prescribed = prescribed_values(problem_, values);
+    return field_of(factorisation_->solve(constraint_loads(prescribed)), 0, prescribed);
   }
 
-  std::vector<Vector3> constraint_forces(const Field& field, bool with_loads) const override;
-  double residual(const Field& field, const std::vector<int>& loaded_nodes, const std::vector<Vector3>& nodal_forces,
-                  bool with_loads) const override;
+  std::vector<Vector3> constraint_forces(const Field& field) const override;
+  double residual(const Field& field, const std::vector<int>& loaded_nodes,
+                  const std::vector<Vector3>& nodal_forces) const override;
 
-private:
+ private:
   void evaluate_cells();
   std::vector<int> build_pattern();
   void assemble();
@@ -104,12 +101,14 @@ private:
     for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
       right.template segment<3>(3 * supports_.nodes[k]) += supports_.value[k] * force;
   }
-  void add_constraint_load(VectorX& right, const Prescribed& entry, const Vector3& value) const {
-    Vector3 force = constraint_stiffness(entry.node) * value;
-    for (int c = 0; c < 3; ++c)
-      if (!entry.components[c])
-        force[c] = 0;
-    add_point_force(entry.node, force, right);
+  [[nodiscard]] VectorX constraint_loads(const VectorX& prescribed) const {
+    VectorX right = VectorX::Zero(report_.unknowns);
+    for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
+      add_point_force(problem_.prescribed[k].node,
+                      constraint_stiffness(problem_.prescribed[k].node) *
+                          held_part(problem_.prescribed[k], prescribed.segment<3>(3 * static_cast<Eigen::Index>(k))),
+                      right);
+    return right;
   }
   [[nodiscard]] Vector3 value_at_node(int node, const VectorX& coefficients) const {
     Vector3 value = Vector3::Zero();
@@ -117,18 +116,18 @@ private:
       value += supports_.value[k] * coefficients.segment<3>(3 * supports_.nodes[k]);
     return value;
   }
-  [[nodiscard]] Field field_of(const VectorX& coefficients) const {
-    Field field{coefficients, {}};
+  [[nodiscard]] Field field_of(const VectorX& coefficients, double load_factor, const VectorX& prescribed) const {
+    Field field{coefficients, {}, load_factor, prescribed};
     require_finite(field, report_);
     return field;
   }
 
   BackgroundCells cells_;
   std::vector<CellShapes> shapes_;
-  std::vector<int> cells_start_, cells_of_node_;                // compressed rows: (cell, place of the node in it) pairs
-  std::vector<int> constraints_start_, constraints_of_node_;    // prescribed entries whose support holds the node
-  std::vector<int> column_start_, column_rows_;                 // lower block pattern, rows >= column, ascending
-  SparseMatrix stiffness_;                                      // lower triangle (diagonal blocks full)
+  std::vector<int> cells_start_, cells_of_node_;             // compressed rows: (cell, place of the node in it) pairs
+  std::vector<int> constraints_start_, constraints_of_node_; // prescribed entries whose support holds the node
+  std::vector<int> column_start_, column_rows_;              // lower block pattern, rows >= column, ascending
+  SparseMatrix stiffness_;                                   // lower triangle (diagonal blocks full)
   VectorX loads_;
   std::unique_ptr<Factorisation> factorisation_;
 };
@@ -250,7 +249,8 @@ void Galerkin::assemble() {
   const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
   const long blocks = static_cast<long>(column_rows_.size());
   if (9 * blocks > std::numeric_limits<int>::max())
-    throw InputError(fmt::format("{} nodes give {} matrix entries, more than the factorisation can index", count, 9 * blocks));
+    throw InputError(
+        fmt::format("{} nodes give {} matrix entries, more than the factorisation can index", count, 9 * blocks));
   stiffness_.resize(3 * count, 3 * count);
   stiffness_.resizeNonZeros(9 * blocks);
   int* outer = stiffness_.outerIndexPtr();
@@ -313,7 +313,8 @@ void Galerkin::assemble_loads() {
   ShapeFunctions shape;
   const auto add = [&](const Vector3& x, const Vector3& force) {
     if (!evaluate(spheres_, x, shape))
-      throw NumericalError(fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+      throw NumericalError(
+          fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
     for (int k = 0; k < shape.size(); ++k)
       loads_.segment<3>(3 * shape.nodes[k]) += shape.value[k] * force;
   };
@@ -328,33 +329,31 @@ void Galerkin::assemble_loads() {
     }
 }
 
-std::vector<Vector3> Galerkin::constraint_forces(const Field& field, bool with_loads) const {
-  // `with_loads` also says whether the prescribed values acted; without loads they were homogeneous or given by a
-  // prescribed_response, and the force follows from the penalty's own balance in both cases.
+std::vector<Vector3> Galerkin::constraint_forces(const Field& field) const {
   std::vector<Vector3> forces;
   forces.reserve(problem_.prescribed.size());
-  for (const Prescribed& entry : problem_.prescribed) {
-    const Vector3 value = with_loads ? entry.value : Vector3::Zero();
-    Vector3 force = constraint_stiffness(entry.node) * (value - value_at_node(entry.node, field.coefficients));
-    for (int c = 0; c < 3; ++c)
-      if (!entry.components[c])
-        force[c] = 0;
-    forces.push_back(force);
+  for (std::size_t k = 0; k < problem_.prescribed.size(); ++k) {
+    const Prescribed& entry = problem_.prescribed[k];
+    const Vector3 gap =
+        field.prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - value_at_node(entry.node, field.coefficients);
+    forces.emplace_back(constraint_stiffness(entry.node) * held_part(entry, gap));
   }
   return forces;
 }
 
 double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nodes,
-                          const std::vector<Vector3>& nodal_forces, bool with_loads) const {
-  VectorX applied = with_loads ? loads_ : VectorX(VectorX::Zero(report_.unknowns));
-  if (with_loads)
-    for (const Prescribed& entry : problem_.prescribed)
-      add_constraint_load(applied, entry, entry.value);
+                          const std::vector<Vector3>& nodal_forces) const {
+  VectorX applied = field.load_factor * loads_;
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
     add_point_force(loaded_nodes[k], nodal_forces[k], applied);
-  const VectorX rows = stiffness_.selfadjointView<Eigen::Lower>() * field.coefficients;
-  const double largest = std::max(applied.lpNorm<Eigen::Infinity>(), rows.lpNorm<Eigen::Infinity>());
-  return largest > 0 ? (rows - applied).lpNorm<Eigen::Infinity>() / largest : 0;
+  // The penalty terms stand on both sides; as forces they are of the size of the others.
+  const std::vector<Vector3> held = constraint_forces(field);
+  VectorX rows = stiffness_.selfadjointView<Eigen::Lower>() * field.coefficients - constraint_loads(field.prescribed);
+  const double unbalanced = (rows - applied).lpNorm<Eigen::Infinity>();
+  double largest = applied.lpNorm<Eigen::Infinity>();
+  for (const Vector3& force : held)
+    largest = std::max(largest, force.lpNorm<Eigen::Infinity>());
+  return largest > 0 ? unbalanced / largest : 0;
 }
 
 } // namespace

@@ -13,8 +13,9 @@ struct StiffnessColumn {
 
 /// For row nodes I = first .. count-1 and column node J of a cell,
 ///   block(I, J) = sum_q w_q [lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1].
-/// `gradients` holds for each point q three arrays of `stride` values (x, y, z derivative of every node's shape function),
-/// already multiplied by sqrt(w_q); entries up to the next multiple of 8 after `count` must exist and be finite.
+/// `gradients` holds for each point q three arrays of `stride` values (x, y, z derivative of every node's shape
+/// function), already multiplied by sqrt(w_q); entries up to the next multiple of 8 after `count` must exist and be
+/// finite.
 void stiffness_column(const double* gradients, int points, int stride, int first, int count, int column, double lambda,
                       double mu, StiffnessColumn& out);
 

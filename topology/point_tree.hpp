@@ -6,7 +6,7 @@
 namespace spherecut::topology {
 
 class PointTree {
-public:
+ public:
   explicit PointTree(const std::vector<Vector3>& points);
 
   struct Found {
@@ -23,7 +23,7 @@ public:
   /// Nearest point; index -1 when the tree is empty.
   [[nodiscard]] Found nearest(const Vector3& x) const;
 
-private:
+ private:
   void build(int begin, int end, int axis);
   void within(int begin, int end, int axis, const Vector3& x, double squared_radius, std::vector<Found>& found) const;
   void nearest(int begin, int end, int axis, const Vector3& x, Found& best) const;

@@ -52,7 +52,7 @@ Measure measure(const std::vector<Vector3>& polygon) {
 
 /// Clips polygons by phi < 0 and collects the points where they met the curved surface.
 class CurvedClipper {
-public:
+ public:
   CurvedClipper(const Domain& domain, const Vector3& node, double spacing)
       : domain_(domain), node_(node), spacing_(spacing) {}
 
@@ -99,7 +99,7 @@ public:
   [[nodiscard]] bool met_surface() const { return surface_count_ > 0; }
   [[nodiscard]] Vector3 surface_mean() const { return surface_sum_ / surface_count_; }
 
-private:
+ private:
   /// Crossing of the edge a b with phi = 0 by the Illinois form of false position.
   Vector3 root(Vector3 a, double phi_a, Vector3 b, double phi_b) const {
     Vector3 x = a;
@@ -121,7 +121,8 @@ private:
     return x;
   }
 
-  /// The surface bends between two crossings: one vertex on the arc, in the polygon's plane, makes the cut second order.
+  /// The surface bends between two crossings: one vertex on the arc, in the polygon's plane, makes the cut second
+  /// order.
   void add_arc(const Vector3& from, const Vector3& to, const Vector3& normal, std::vector<Vector3>& kept) const {
     const Vector3 chord = to - from;
     if (chord.squaredNorm() < 1e-12)
@@ -163,7 +164,7 @@ struct CellBuilder {
 
   void build(int i, CellComplex& cells, std::vector<Vector3>& closure);
 
-private:
+ private:
   bool cut(int i, voro::voronoicell_neighbor& cell);
 };
 
@@ -174,9 +175,8 @@ bool CellBuilder::cut(int i, voro::voronoicell_neighbor& cell) {
   for (std::size_t p = 0; p < domain.planes().size(); ++p) {
     const Plane& plane = domain.planes()[p];
     const double distance = -plane.signed_distance(x) / h;
-    if (distance < cell_reach * 1.8 &&
-        !cell.nplane(plane.normal.x(), plane.normal.y(), plane.normal.z(), 2 * distance,
-                     first_plane_id - static_cast<int>(p)))
+    if (distance < cell_reach * 1.8 && !cell.nplane(plane.normal.x(), plane.normal.y(), plane.normal.z(), 2 * distance,
+                                                    first_plane_id - static_cast<int>(p)))
       return false;
   }
   if (curved) {
@@ -198,8 +198,8 @@ bool CellBuilder::cut(int i, voro::voronoicell_neighbor& cell) {
       if (other.index == i || distance < covered)
         continue;
       if (distance < 1e-7)
-        throw InputError(fmt::format("nodes {} and {} coincide at ({:.6g}, {:.6g}, {:.6g}) m", i, other.index, x.x(),
-                                     x.y(), x.z()));
+        throw InputError(
+            fmt::format("nodes {} and {} coincide at ({:.6g}, {:.6g}, {:.6g}) m", i, other.index, x.x(), x.y(), x.z()));
       if (distance > needed)
         return true;
       const Vector3 d = (nodes[other.index] - x) / h;
@@ -290,7 +290,8 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
 
 } // namespace
 
-CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain) {
+CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings,
+                          const Domain& domain) {
   const int count = static_cast<int>(nodes.size());
   CellComplex cells;
   cells.faces.reserve(8 * nodes.size());

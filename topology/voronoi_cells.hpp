@@ -24,15 +24,16 @@ struct BoundaryFace {
 struct CellComplex {
   std::vector<CellFace> faces;
   std::vector<BoundaryFace> boundary;
-  std::vector<double> volumes;      // m3, per node
-  std::vector<Vector3> centroids;   // m, of each cell
-  int empty_cells = 0;              // nodes without volume (outside the body or doubled)
+  std::vector<double> volumes;    // m3, per node
+  std::vector<Vector3> centroids; // m, of each cell
+  int empty_cells = 0;            // nodes without volume (outside the body or doubled)
 };
 
 /// Cell of node i: the points of the body nearer to i than to any other node. Planar parts of the surface clip exactly
 /// (voro++ half-spaces); the curved part clips each face polygon by the zero set of Domain::curved_distance, with one
-/// extra vertex on each arc. The boundary of a cell on the curved part is what closes it: the area vectors of every cell
-/// sum to zero to rounding. `spacings` (m) set the search radius. Throws InputError when a node coincides with another.
+/// extra vertex on each arc. The boundary of a cell on the curved part is what closes it: the area vectors of every
+/// cell sum to zero to rounding. `spacings` (m) set the search radius. Throws InputError when a node coincides with
+/// another.
 CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain);
 
 } // namespace spherecut::topology

@@ -1,0 +1,49 @@
+#include "solvers/discretisation.hpp"
+
+#include "solvers/elastic_body.hpp"
+#include "topology/errors.hpp"
+
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+
+std::string_view to_string(Method method) {
+  switch (method) {
+  case Method::published:
+    return "published";
+  case Method::collocation:
+    return "collocation";
+  case Method::galerkin:
+    return "galerkin";
+  }
+  return "unknown";
+}
+
+Method method_from_string(std::string_view name) {
+  for (Method method : {Method::published, Method::collocation, Method::galerkin})
+    if (name == to_string(method))
+      return method;
+  throw InputError(fmt::format("method '{}' does not exist; there are: published, collocation, galerkin", name));
+}
+
+void Field::add(double factor, const Field& other) {
+  coefficients += factor * other.coefficients;
+  if (pressure.size() > 0)
+    pressure += factor * other.pressure;
+  load_factor += factor * other.load_factor;
+  prescribed += factor * other.prescribed;
+}
+
+std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options) {
+  switch (options.method) {
+  case Method::collocation:
+    return make_collocation(std::move(problem), options);
+  case Method::galerkin:
+    return make_galerkin(std::move(problem), options);
+  case Method::published:
+    break;
+  }
+  throw InputError("this method has no general discretisation");
+}
+
+} // namespace spherecut::solvers
