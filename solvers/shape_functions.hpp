@@ -2,6 +2,7 @@
 #pragma once
 
 #include "solvers/nodes.hpp"
+#include "solvers/sphere_grid.hpp"
 
 #include <span>
 
@@ -17,27 +18,28 @@ class Spheres {
  public:
   /// Radii rho * h. Where the support of a node (the nodes whose spheres hold it) has fewer than basis + 2 members or a
   /// moment matrix worse conditioned than `worst_condition`, the spheres around it grow by 1.25 until it is sound.
-  /// Throws NumericalError naming the node when six steps do not help.
+  /// Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than basis + 2
+  /// nodes, a centre is not finite, or a spacing, rho or worst_condition is not positive.
   Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis = Basis::linear,
           double worst_condition = 1e9);
 
-  [[nodiscard]] int size() const;
-  [[nodiscard]] const std::vector<Vector3>& centres() const;
-  [[nodiscard]] const std::vector<double>& radii() const; // m
-  [[nodiscard]] Basis basis() const;
-  [[nodiscard]] int grown() const; // spheres that had to grow
-  /// Ids of every sphere that may hold x, ascending; a superset of those that do.
-  [[nodiscard]] std::span<const int> candidates(const Vector3& x) const;
+  [[nodiscard]] int size() const { return static_cast<int>(centres_.size()); }
+  [[nodiscard]] const std::vector<Vector3>& centres() const { return centres_; }
+  [[nodiscard]] const std::vector<double>& radii() const { return radii_; } // m
+  [[nodiscard]] Basis basis() const { return basis_; }
+  [[nodiscard]] int grown() const { return grown_; } // spheres that had to grow
+  [[nodiscard]] double worst_condition() const { return worst_condition_; }
+  /// Ids of every sphere that may hold x, ascending; a superset of those that do, about 2 to 3 times as many.
+  [[nodiscard]] std::span<const int> candidates(const Vector3& x) const { return grid_.find(x).ids; }
+  [[nodiscard]] const SphereGrid& grid() const { return grid_; }
 
  private:
   std::vector<Vector3> centres_;
   std::vector<double> radii_;
   Basis basis_;
+  double worst_condition_;
   int grown_ = 0;
-  Vector3 origin_;
-  double cell_ = 1;
-  std::array<int, 3> cells_{1, 1, 1};
-  std::vector<int> start_, members_; // compressed rows: members_[start_[c] .. start_[c+1])
+  SphereGrid grid_;
 };
 
 /// Shape functions at one point; arrays have one entry per supporting node. Reuse the object: it keeps its memory.
@@ -51,9 +53,14 @@ struct ShapeFunctions {
   [[nodiscard]] Vector3 gradient(int k) const { return {dx[k], dy[k], dz[k]}; }
 };
 
-/// Values and exact first derivatives at x. False when the support of x is not sound (too few nodes or singular moment
-/// matrix), even after trying radii grown by 1.25 up to four times at this point.
+/// Values and exact first derivatives at x. False when the support of x is not sound (fewer nodes than basis functions,
+/// or a moment matrix worse conditioned than the spheres allow), even after trying radii grown by 1.25 up to four times
+/// at this point. The support is in ascending order of nodes.
 bool evaluate(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
+
+/// The same at many points; out[i] belongs to points[i]. False when any support is not sound; the first such point is
+/// then the first out[i] without nodes.
+bool evaluate(const Spheres& spheres, std::span<const Vector3> points, std::span<ShapeFunctions> out);
 
 /// Values, exact first and second derivatives at x.
 bool evaluate_second(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);

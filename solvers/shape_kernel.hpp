@@ -1,0 +1,45 @@
+// The hot loop of the shape functions: collect the support of a point and evaluate the linear basis there. Compiled
+// once for any x86-64 (or other) machine and again for AVX2 and AVX-512; the widest that the machine has is chosen
+// once.
+//
+// Key: d_j = x_j - x, q_j = 1 / R_j^2, s_j = |d_j| / R_j, W quartic spline, P_j = {1, d_j / l} with a local length l,
+// A = sum_j W_j P_j P_j^T, h_j shape function of node j.
+#pragma once
+
+#include "solvers/shape_functions.hpp"
+
+namespace spherecut::solvers::shape_kernel {
+
+/// The support of a point as structure of arrays with room for a multiple of SphereGrid::lanes. Entries from `count` up
+/// to that multiple hold d = (1, 0, 0), q = 1, where the weight and all its derivatives vanish.
+struct Support {
+  int count;
+  int* ids;
+  double *dx, *dy, *dz; // m
+  double* q;            // 1/m2
+};
+
+/// Where evaluate_linear writes; every array has room for the padded support.
+struct LinearOutput {
+  double *value, *dx, *dy, *dz;
+};
+
+struct Kernel {
+  const char* name;
+  int width; // doubles per register
+  /// Writes the members of the cell that hold the point, in the cell's order.
+  void (*collect)(const SphereGrid::Cell& cell, const double* point, Support& support);
+  /// Shape functions and gradients; returns the 1-norm condition of the scaled moment matrix (not finite, or huge, when
+  /// the matrix is singular: the outputs are then meaningless).
+  double (*evaluate_linear)(const Support& support, const LinearOutput& output);
+};
+
+/// Runs everywhere.
+const Kernel& portable();
+/// The widest kernel this machine can run.
+const Kernel& dispatched();
+
+/// Does what solvers::evaluate does for the linear basis, with a given kernel.
+bool evaluate_with(const Kernel& kernel, const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
+
+} // namespace spherecut::solvers::shape_kernel

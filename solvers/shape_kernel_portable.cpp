@@ -1,0 +1,54 @@
+// The shape kernel for registers of two doubles, which every x86-64 and AArch64 machine has.
+#include "solvers/shape_kernel.hpp"
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
+namespace spherecut::solvers::shape_kernel {
+namespace {
+
+constexpr int width = 2;
+using Pack __attribute__((vector_size(16))) = double;
+
+#ifdef __SSE2__
+inline Pack root(Pack v) {
+  return _mm_sqrt_pd(v);
+}
+#else
+inline Pack root(Pack v) {
+  return Pack{__builtin_sqrt(v[0]), __builtin_sqrt(v[1])};
+}
+#endif
+
+// Writes every candidate at the end of the list and moves the end on only past those that hold the point: no branch.
+void collect(const SphereGrid::Cell& cell, const double* point, Support& support) {
+  const int candidates = static_cast<int>(cell.ids.size());
+  int n = 0;
+  for (int k = 0; k < candidates; ++k) {
+    const double x = cell.x[k] - point[0], y = cell.y[k] - point[1], z = cell.z[k] - point[2];
+    const double q = cell.inverse_square_radius[k];
+    support.ids[n] = cell.ids[k];
+    support.dx[n] = x;
+    support.dy[n] = y;
+    support.dz[n] = z;
+    support.q[n] = q;
+    n += (x * x + y * y + z * z) * q < 1 ? 1 : 0;
+  }
+  support.count = n;
+  for (int k = n; k < n + SphereGrid::lanes; ++k) {
+    support.dx[k] = support.q[k] = 1;
+    support.dy[k] = support.dz[k] = 0;
+  }
+}
+
+#include "solvers/shape_kernel_lanes.inl"
+
+} // namespace
+
+const Kernel& portable() {
+  static constexpr Kernel kernel{"portable", width, collect, evaluate_linear};
+  return kernel;
+}
+
+} // namespace spherecut::solvers::shape_kernel

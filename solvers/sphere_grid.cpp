@@ -1,0 +1,167 @@
+#include "solvers/sphere_grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace spherecut::solvers {
+
+namespace {
+
+// A cell of half a radius holds about 2.5 times the spheres that hold one of its points (volume of the sphere swept by
+// the cell over that of the sphere); smaller cells cost more memory than they save time.
+constexpr double side_over_radius = 0.5;
+constexpr int few_members = 16; // a cell with no more is not split
+constexpr int deepest = 12;
+constexpr double slack = 1e-9; // of the cell's side: a point on a face may be sorted to either side of it
+
+bool touches(const Vector3& centre, double radius, const Vector3& lower, double side) {
+  const double tolerance = slack * side;
+  double squared = 0;
+  for (int a = 0; a < 3; ++a) {
+    const double outside = std::max({lower[a] - tolerance - centre[a], centre[a] - (lower[a] + side + tolerance), 0.0});
+    squared += outside * outside;
+  }
+  return squared < radius * radius;
+}
+
+} // namespace
+
+struct SphereGrid::Builder {
+  SphereGrid& grid;
+  const std::vector<Vector3>& centres;
+  const std::vector<double>& radii;
+
+  void fill(int node, const Vector3& lower, double side, int depth, const std::vector<int>& members) {
+    if (wants_split(side, depth, members)) {
+      const int first = static_cast<int>(grid.nodes_.size());
+      grid.nodes_[node].first_child = first;
+      grid.nodes_.resize(grid.nodes_.size() + 8);
+      std::vector<int> inside;
+      for (int octant = 0; octant < 8; ++octant) {
+        const Vector3 corner = lower + 0.5 * side * Vector3(octant & 1, (octant >> 1) & 1, (octant >> 2) & 1);
+        inside.clear();
+        for (int j : members)
+          if (touches(centres[j], radii[j], corner, 0.5 * side))
+            inside.push_back(j);
+        fill(first + octant, corner, 0.5 * side, depth + 1, inside);
+      }
+      return;
+    }
+    store(grid.nodes_[node], members);
+  }
+
+  [[nodiscard]] bool wants_split(double side, int depth, const std::vector<int>& members) const {
+    if (depth >= deepest || std::ssize(members) <= few_members)
+      return false;
+    double sum = 0;
+    for (int j : members)
+      sum += radii[j];
+    return side > 1.01 * side_over_radius * sum / static_cast<double>(members.size());
+  }
+
+  void store(Node& leaf, const std::vector<int>& members) const {
+    const int count = static_cast<int>(members.size());
+    const int blocks = (count + lanes - 1) / lanes;
+    leaf.count = count;
+    leaf.first_id = static_cast<int>(grid.ids_.size());
+    leaf.first_block = static_cast<int>(grid.blocks_.size());
+    grid.ids_.insert(grid.ids_.end(), members.begin(), members.end());
+    grid.blocks_.resize(grid.blocks_.size() + 4 * static_cast<std::size_t>(blocks));
+    Block* block = grid.blocks_.data() + leaf.first_block;
+    for (int k = 0; k < blocks * lanes; ++k) {
+      const int b = k / lanes, l = k % lanes;
+      const int j = members[std::min(k, count - 1)];
+      for (int a = 0; a < 3; ++a)
+        block[a * blocks + b].lane[l] = centres[j][a];
+      block[3 * blocks + b].lane[l] = k < count ? 1 / (radii[j] * radii[j]) : std::numeric_limits<double>::infinity();
+    }
+  }
+};
+
+SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<double>& radii) {
+  const int n = static_cast<int>(centres.size());
+  Vector3 lower = Vector3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
+  double largest = 0;
+  for (int j = 0; j < n; ++j) {
+    lower = lower.cwiseMin((centres[j].array() - radii[j]).matrix());
+    upper = upper.cwiseMax((centres[j].array() + radii[j]).matrix());
+    largest = std::max(largest, radii[j]);
+  }
+  const Vector3 extent = upper - lower;
+  // No more root cells than a few per sphere, however large the box; octants make up for it where there are spheres.
+  const double side = std::max(side_over_radius * largest, std::cbrt(extent.prod() / (4.0 * n + 512)));
+  origin_ = lower;
+  inverse_side_ = 1 / side;
+  for (int a = 0; a < 3; ++a)
+    roots_[a] = std::max(1, static_cast<int>(std::ceil(extent[a] / side)));
+
+  // Members of the root cells as compressed rows, counted first, then filled.
+  const int root_count = roots_[0] * roots_[1] * roots_[2];
+  std::vector<int> start(static_cast<std::size_t>(root_count) + 1, 0), members;
+  const auto for_each_root = [&](const auto& visit) {
+    for (int j = 0; j < n; ++j) {
+      std::array<int, 3> from{}, to{};
+      for (int a = 0; a < 3; ++a) {
+        const double low = (centres[j][a] - radii[j] - origin_[a]) * inverse_side_ - slack;
+        const double high = (centres[j][a] + radii[j] - origin_[a]) * inverse_side_ + slack;
+        from[a] = std::clamp(static_cast<int>(std::floor(low)), 0, roots_[a] - 1);
+        to[a] = std::clamp(static_cast<int>(std::floor(high)), 0, roots_[a] - 1);
+      }
+      for (int k = from[2]; k <= to[2]; ++k)
+        for (int i = from[1]; i <= to[1]; ++i)
+          for (int h = from[0]; h <= to[0]; ++h)
+            if (touches(centres[j], radii[j], origin_ + side * Vector3(h, i, k), side))
+              visit(j, (k * roots_[1] + i) * roots_[0] + h);
+    }
+  };
+  for_each_root([&](int, int root) { ++start[root + 1]; });
+  for (int r = 0; r < root_count; ++r)
+    start[r + 1] += start[r];
+  members.resize(start[root_count]);
+  std::vector<int> next(start.begin(), start.end() - 1);
+  for_each_root([&](int j, int root) { members[next[root]++] = j; });
+
+  nodes_.resize(root_count);
+  Builder builder{*this, centres, radii};
+  std::vector<int> inside;
+  for (int r = 0; r < root_count; ++r) {
+    inside.assign(members.begin() + start[r], members.begin() + start[r + 1]);
+    const int h = r % roots_[0], i = (r / roots_[0]) % roots_[1], k = r / (roots_[0] * roots_[1]);
+    builder.fill(r, origin_ + side * Vector3(h, i, k), side, 0, inside);
+  }
+}
+
+SphereGrid::Cell SphereGrid::find(const Vector3& x) const {
+  std::array<int, 3> root{};
+  std::array<double, 3> fraction{}; // position within the current cell, 0 to 1
+  for (int a = 0; a < 3; ++a) {
+    const double t = (x[a] - origin_[a]) * inverse_side_;
+    const double inside = t > 0 ? std::min(t, static_cast<double>(roots_[a])) : 0; // also 0 when t is not a number
+    root[a] = std::min(static_cast<int>(inside), roots_[a] - 1);
+    fraction[a] = inside - root[a];
+  }
+  int node = (root[2] * roots_[1] + root[1]) * roots_[0] + root[0];
+  while (nodes_[node].first_child >= 0) {
+    int octant = 0;
+    for (int a = 0; a < 3; ++a) {
+      const int upper = fraction[a] >= 0.5 ? 1 : 0;
+      octant |= upper << a;
+      fraction[a] = 2 * fraction[a] - upper;
+    }
+    node = nodes_[node].first_child + octant;
+  }
+  const Node& leaf = nodes_[node];
+  const int blocks = (leaf.count + lanes - 1) / lanes;
+  const Block* block = blocks_.data() + leaf.first_block;
+  if (blocks == 0)
+    return {{}, nullptr, nullptr, nullptr, nullptr, 0};
+  return {{ids_.data() + leaf.first_id, static_cast<std::size_t>(leaf.count)},
+          block[0].lane.data(),
+          block[blocks].lane.data(),
+          block[2 * blocks].lane.data(),
+          block[3 * blocks].lane.data(),
+          blocks * lanes};
+}
+
+} // namespace spherecut::solvers
