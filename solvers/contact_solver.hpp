@@ -18,6 +18,7 @@ struct HalfSpaceCoupling {
 struct ContactPatch {
   std::vector<int> nodes;       // m candidates
   std::vector<Vector3> rest;    // their rest positions, m
+  std::vector<double> spacings; // m
   std::vector<Vector3> normals; // outward surface normals
   MatrixX compliance;           // 3m x 3m, m/N
   VectorX base_displacement;    // 3m, m: displacement without tool
@@ -33,23 +34,30 @@ enum class ContactCondition { frictionless, bonded };
 
 struct ContactOptions {
   ContactCondition condition = ContactCondition::frictionless;
-  int maximum_iterations = 200;
+  int maximum_iterations = 60; // re-linearisations of the tool's surface per sub-step
   double gap_tolerance = 1e-9; // m
 };
 
 /// Outcome of pressing the tool into the patch.
 struct ContactState {
-  std::vector<Vector3> nodal_forces;    // N on the body, one per candidate
-  std::vector<char> active;             // candidates in contact
+  std::vector<Vector3> nodal_forces; // N on the body, one per candidate
+  std::vector<char> active;          // candidates in contact
+  VectorX displacement;              // 3m, m: of the candidates
+  std::vector<Vector3> bond;         // bonded: displacement at which each active node was caught, relative to the tool
+  topology::ToolPose pose;           // of the tool in this state
   Vector3 tool_force = Vector3::Zero(); // N, force of the body on the tool
-  double contact_radius = 0;            // m, radius of the circle of the active nodes' share of the surface
+  Vector3 centre = Vector3::Zero();     // m, rest position of the contact: mean weighted by normal force
+  double contact_radius = 0;            // m, outermost active node's distance from the centre plus half its spacing
   double largest_penetration = 0;       // m, left over at convergence
+  int active_nodes = 0;
   int iterations = 0;
   bool converged = true;
 };
 
-/// Finds the active set and the forces: no penetration, no tension, forces along the tool's normals (frictionless).
-/// `previous` warm-starts the active set.
+/// Finds the active set and the forces: no penetration, no tension. Frictionless: forces along the tool's normals.
+/// Bonded: a node that has been touched moves with the tool. The tool advances from `previous` (or, without one, from
+/// where it is clear of the patch along its axis) in sub-steps shorter than its tip radius, so that deep presses find
+/// the right side.
 ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
                    const ContactOptions& options = {}, const ContactState* previous = nullptr);
 
