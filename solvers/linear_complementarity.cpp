@@ -22,8 +22,13 @@ ComplementaritySolution solve_complementarity(const MatrixX& matrix, const Vecto
       if (solution.active[k])
         chosen.push_back(k);
     solution.forces.setZero();
-    if (!chosen.empty())
-      solution.forces(chosen) = matrix(chosen, chosen).partialPivLu().solve(VectorX(-gap(chosen)));
+    if (!chosen.empty()) {
+      const MatrixX pressed = matrix(chosen, chosen);
+      const VectorX depth = -gap(chosen);
+      const VectorX forces = pressed.partialPivLu().solve(depth);
+      for (std::size_t a = 0; a < chosen.size(); ++a)
+        solution.forces[chosen[a]] = forces[static_cast<Eigen::Index>(a)];
+    }
     const VectorX open = matrix * solution.forces + gap;
     // A force is negligible when the gap it closes is: scaled by the node's own compliance.
     const auto wrong = [&](Eigen::Index k) {
