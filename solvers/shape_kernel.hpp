@@ -36,6 +36,9 @@ struct Kernel {
 
 /// Runs everywhere.
 const Kernel& portable();
+/// For machines with AVX2 and FMA, or AVX-512 (F, DQ, VL); null when the program was built for another architecture.
+const Kernel* avx2();
+const Kernel* avx512();
 /// The widest kernel this machine can run.
 const Kernel& dispatched();
 

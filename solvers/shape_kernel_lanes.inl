@@ -7,7 +7,9 @@ inline Pack load(const double* p) {
   __builtin_memcpy(&v, p, sizeof v);
   return v;
 }
-inline void store(double* p, Pack v) { __builtin_memcpy(p, &v, sizeof v); }
+inline void store(double* p, Pack v) {
+  __builtin_memcpy(p, &v, sizeof v);
+}
 
 using Pair __attribute__((vector_size(16))) = double;
 
@@ -59,8 +61,12 @@ inline Symmetric4 inverse(const Symmetric4& a) {
            i1 + k21 * u21 + k31 * u31, u21 + k31 * u32, u31, i2 + k32 * u32, u32, i3}};
 }
 
-inline double magnitude(double v) { return __builtin_fabs(v); }
-inline double larger(double a, double b) { return a > b || a != a ? a : b; } // keeps a NaN in either place
+inline double magnitude(double v) {
+  return __builtin_fabs(v);
+}
+inline double larger(double a, double b) {
+  return a > b || a != a ? a : b;
+} // keeps a NaN in either place
 
 inline double norm1(const Symmetric4& a) {
   const double c01 = magnitude(a.m[1]), c02 = magnitude(a.m[2]), c03 = magnitude(a.m[3]), c12 = magnitude(a.m[5]),
@@ -149,9 +155,8 @@ inline double evaluate_linear(const Support& support, const LinearOutput& output
   add_lanes(third, 10, t);
   for (int k = 3; k < 9; ++k)
     t[k] *= scale;
-  const double right[3][4] = {{-t[0], scale - t[3], -t[4], -t[5]},
-                              {-t[1], -t[4], scale - t[6], -t[7]},
-                              {-t[2], -t[5], -t[7], scale - t[8]}};
+  const double right[3][4] = {
+      {-t[0], scale - t[3], -t[4], -t[5]}, {-t[1], -t[4], scale - t[6], -t[7]}, {-t[2], -t[5], -t[7], scale - t[8]}};
   double c[3][4];
   for (int k = 0; k < 3; ++k) {
     multiply(b, right[k], c[k]);

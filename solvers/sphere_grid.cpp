@@ -66,7 +66,8 @@ struct SphereGrid::Builder {
     leaf.count = count;
     leaf.first_id = static_cast<int>(grid.ids_.size());
     leaf.first_block = static_cast<int>(grid.blocks_.size());
-    grid.ids_.insert(grid.ids_.end(), members.begin(), members.end());
+    for (int k = 0; k < blocks * lanes; ++k)
+      grid.ids_.push_back(members[std::min(k, count - 1)]);
     grid.blocks_.resize(grid.blocks_.size() + 4 * static_cast<std::size_t>(blocks));
     Block* block = grid.blocks_.data() + leaf.first_block;
     for (int k = 0; k < blocks * lanes; ++k) {

@@ -13,8 +13,8 @@ class SphereGrid {
  public:
   static constexpr int lanes = 8; // members of a cell are padded to a multiple of this
 
-  /// The spheres that touch a cell. The four coordinate arrays hold `padded` entries; those beyond ids.size() belong to
-  /// no sphere and carry an infinite inverse_square_radius, so that no point passes the test s2 < 1.
+  /// The spheres that touch a cell. All arrays hold `padded` readable entries; those beyond ids.size() belong to no
+  /// sphere and carry an infinite inverse_square_radius, so that no point passes the test s2 < 1.
   struct Cell {
     std::span<const int> ids; // ascending
     const double *x, *y, *z;  // centres, m
