@@ -22,23 +22,23 @@ Weight weigh(double squared_distance, double q) {
   return {t * t * t * (1 + 3 * s), 12 * t * t * q, s > 1e-12 ? 24 * t * q * q / s : 0};
 }
 
-template <int M>
-Eigen::Matrix<double, M, 1> monomials(const Vector3& y) {
-  Eigen::Matrix<double, M, 1> p;
-  p.template head<4>() << 1, y;
-  if constexpr (M == 10)
-    p.template tail<6>() << y.x() * y.x(), y.y() * y.y(), y.z() * y.z(), y.x() * y.y(), y.x() * y.z(), y.y() * y.z();
+constexpr int size = basis_size(Basis::quadratic);
+using Vector = Eigen::Matrix<double, size, 1>;
+using Matrix = Eigen::Matrix<double, size, size>;
+
+Vector monomials(const Vector3& y) {
+  Vector p;
+  p << 1, y, y.x() * y.x(), y.y() * y.y(), y.z() * y.z(), y.x() * y.y(), y.x() * y.z(), y.y() * y.z();
   return p;
 }
+
+} // namespace
 
 // A(x) c(x) = P(x) with P in the frame fixed at x. Differentiating once and twice:
 //   A c_k  = P,k  - A,k c
 //   A c_kl = P,kl - A,k c_l - A,l c_k - A,kl c
 // and h_j = W (P_j . c) gives h_j,k and h_j,kl by the product rule.
-template <int M>
-void evaluate_basis(const shape_kernel::Support& support, bool second, ShapeFunctions& out) {
-  using Vector = Eigen::Matrix<double, M, 1>;
-  using Matrix = Eigen::Matrix<double, M, M>;
+void evaluate_quadratic(const shape_kernel::Support& support, bool second, ShapeFunctions& out) {
   const int n = support.count;
   const double scale = n > 0 ? std::sqrt(support.q[0]) : 1; // 1 / l
   const auto offset = [&](int j) { return Vector3(support.dx[j], support.dy[j], support.dz[j]); };
@@ -46,12 +46,12 @@ void evaluate_basis(const shape_kernel::Support& support, bool second, ShapeFunc
   Matrix a = Matrix::Zero();
   for (int j = 0; j < n; ++j) {
     const Vector3 d = offset(j);
-    const Vector p = monomials<M>(scale * d);
+    const Vector p = monomials(scale * d);
     a.noalias() += (weigh(d.squaredNorm(), support.q[j]).value * p) * p.transpose();
   }
   const Eigen::LLT<Matrix> factor(a);
   out.moment_condition = std::numeric_limits<double>::infinity();
-  if (n < M || factor.info() != Eigen::Success)
+  if (n < size || factor.info() != Eigen::Success)
     return;
   const Matrix b = factor.solve(Matrix::Identity());
   out.moment_condition = a.cwiseAbs().colwise().sum().maxCoeff() * b.cwiseAbs().colwise().sum().maxCoeff();
@@ -63,12 +63,11 @@ void evaluate_basis(const shape_kernel::Support& support, bool second, ShapeFunc
     right1[k] = scale * Vector::Unit(1 + k);
   for (int m = 0; m < 6; ++m) {
     right2[m].setZero();
-    if constexpr (M == 10)
-      right2[m][4 + m] = (m < 3 ? 2 : 1) * scale * scale;
+    right2[m][4 + m] = (m < 3 ? 2 : 1) * scale * scale;
   }
   for (int j = 0; j < n; ++j) {
     const Vector3 d = offset(j);
-    const Vector p = monomials<M>(scale * d);
+    const Vector p = monomials(scale * d);
     const Vector gp = (weigh(d.squaredNorm(), support.q[j]).g * p.dot(c)) * p;
     for (int k = 0; k < 3; ++k)
       right1[k] -= d[k] * gp;
@@ -80,7 +79,7 @@ void evaluate_basis(const shape_kernel::Support& support, bool second, ShapeFunc
   if (second) {
     for (int j = 0; j < n; ++j) {
       const Vector3 d = offset(j);
-      const Vector p = monomials<M>(scale * d);
+      const Vector p = monomials(scale * d);
       const Weight w = weigh(d.squaredNorm(), support.q[j]);
       const double pc = p.dot(c);
       const Vector3 pc1(p.dot(c1[0]), p.dot(c1[1]), p.dot(c1[2]));
@@ -94,14 +93,10 @@ void evaluate_basis(const shape_kernel::Support& support, bool second, ShapeFunc
       c2[m].noalias() = b * right2[m];
   }
 
-  for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
-    array->resize(n);
   const std::array<std::vector<double>*, 6> seconds{&out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz};
-  for (std::vector<double>* array : seconds)
-    array->resize(second ? n : 0);
   for (int j = 0; j < n; ++j) {
     const Vector3 d = offset(j);
-    const Vector p = monomials<M>(scale * d);
+    const Vector p = monomials(scale * d);
     const Weight w = weigh(d.squaredNorm(), support.q[j]);
     const double pc = p.dot(c);
     const Vector3 pc1(p.dot(c1[0]), p.dot(c1[1]), p.dot(c1[2]));
@@ -118,15 +113,6 @@ void evaluate_basis(const shape_kernel::Support& support, bool second, ShapeFunc
       (*seconds[m])[j] = w_kl * pc + w.g * (d[k] * pc1[l] + d[l] * pc1[k]) + w.value * p.dot(c2[m]);
     }
   }
-}
-
-} // namespace
-
-void evaluate_general(const shape_kernel::Support& support, Basis basis, bool second, ShapeFunctions& out) {
-  if (basis == Basis::linear)
-    evaluate_basis<4>(support, second, out);
-  else
-    evaluate_basis<10>(support, second, out);
 }
 
 } // namespace spherecut::solvers

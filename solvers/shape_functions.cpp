@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -50,11 +51,32 @@ class SupportMemory {
   std::vector<int> large_ids_;
 };
 
-void clear(ShapeFunctions& out) {
-  out.nodes.clear();
-  for (std::vector<double>* array :
-       {&out.value, &out.dx, &out.dy, &out.dz, &out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz})
-    array->clear();
+// Adds sphere j to a support when it holds the point; d = x_j - x.
+void append(Support& support, int j, const Vector3& d, double radius) {
+  if (!(d.squaredNorm() < radius * radius))
+    return;
+  const int n = support.count++;
+  support.ids[n] = j;
+  support.dx[n] = d.x();
+  support.dy[n] = d.y();
+  support.dz[n] = d.z();
+  support.q[n] = 1 / (radius * radius);
+}
+
+// Completes the last register of a support with entries that weigh nothing.
+void pad(Support& support) {
+  for (int k = support.count; k < support.count + SphereGrid::lanes; ++k) {
+    support.dx[k] = support.q[k] = 1;
+    support.dy[k] = support.dz[k] = 0;
+  }
+}
+
+// Arrays of n entries; none for the second derivatives unless wanted.
+void resize(ShapeFunctions& out, int n, bool second) {
+  for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
+    array->resize(n);
+  for (std::vector<double>* array : {&out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz})
+    array->resize(second ? n : 0);
 }
 
 // Shape functions on a given support, in place of what `out` held. False when the support is not sound.
@@ -63,19 +85,20 @@ bool evaluate_support(const Kernel& kernel, const Support& support, Basis basis,
   const int n = support.count;
   if (n < basis_size(basis))
     return false;
-  if (basis == Basis::linear && !second) {
-    const std::size_t padded =
-        static_cast<std::size_t>(n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
-    for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
-      array->resize(padded);
-    out.moment_condition =
-        kernel.evaluate_linear(support, {out.value.data(), out.dx.data(), out.dy.data(), out.dz.data()});
-    for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
-      array->resize(n);
-    for (std::vector<double>* array : {&out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz})
-      array->clear();
+  if (basis == Basis::linear) {
+    const int padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
+    resize(out, padded, second);
+    shape_kernel::LinearOutput output{out.value.data(), out.dx.data(), out.dy.data(), out.dz.data(), {}};
+    if (second) {
+      output.second = {out.dxx.data(), out.dyy.data(), out.dzz.data(), out.dxy.data(), out.dxz.data(), out.dyz.data()};
+      out.moment_condition = kernel.evaluate_linear_second(support, output);
+    } else {
+      out.moment_condition = kernel.evaluate_linear(support, output);
+    }
+    resize(out, n, second);
   } else {
-    evaluate_general(support, basis, second, out);
+    resize(out, n, second);
+    evaluate_quadratic(support, second, out);
   }
   if (!(out.moment_condition <= worst_condition))
     return false;
@@ -90,27 +113,15 @@ bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3&
   double factor = 1;
   for (int step = 0; step < growth_steps_at_point; ++step) {
     factor *= growth;
-    int n = 0;
-    for (int j = 0; j < spheres.size(); ++j) {
-      const Vector3 d = spheres.centres()[j] - x;
-      const double radius = factor * spheres.radii()[j];
-      if (d.squaredNorm() < radius * radius) {
-        support.ids[n] = j;
-        support.dx[n] = d.x();
-        support.dy[n] = d.y();
-        support.dz[n] = d.z();
-        support.q[n++] = 1 / (radius * radius);
-      }
-    }
-    support.count = n;
-    for (int k = n; k < n + SphereGrid::lanes; ++k) {
-      support.dx[k] = support.q[k] = 1;
-      support.dy[k] = support.dz[k] = 0;
-    }
+    support.count = 0;
+    for (int j = 0; j < spheres.size(); ++j)
+      append(support, j, spheres.centres()[j] - x, factor * spheres.radii()[j]);
+    pad(support);
     if (evaluate_support(kernel, support, spheres.basis(), second, spheres.worst_condition(), out))
       return true;
   }
-  clear(out);
+  out.nodes.clear();
+  resize(out, 0, false);
   return false;
 }
 
@@ -164,44 +175,65 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
 
   // A node whose support is not sound asks for one more step of growth of every sphere that would then hold it; the
   // steps are counted per sphere so that the outcome does not depend on the order of the nodes.
-  std::vector<int> wanted(n, 0), level(n, 0);
-  std::vector<int> suspects(n);
-  for (int i = 0; i < n; ++i)
-    suspects[i] = i;
   const Kernel& kernel = shape_kernel::dispatched();
   ShapeFunctions shape;
-  for (int step = 1;; ++step) {
+  const auto is_sound = [&](const Support& support) {
+    return support.count >= needed && evaluate_support(kernel, support, basis, false, worst_condition, shape);
+  };
+  const auto unsound_nodes = [&] {
     std::vector<int> unsound;
-    for (int i : suspects) {
+    for (int i = 0; i < n; ++i) {
       const SphereGrid::Cell cell = grid_.find(centres_[i]);
       SupportMemory memory(cell.padded);
       kernel.collect(cell, centres_[i].data(), memory.support);
-      if (memory.support.count < needed ||
-          !evaluate_support(kernel, memory.support, basis, false, worst_condition, shape))
+      if (!is_sound(memory.support))
         unsound.push_back(i);
     }
-    if (unsound.empty())
-      break;
-    if (step > growth_steps_at_node) {
-      const int i = unsound.front();
-      throw NumericalError(fmt::format(
-          "shape functions: the support of node {} at ({:.6g}, {:.6g}, {:.6g}) m is not sound after {} steps of growth "
-          "by {} from a radius of {:.6g} m ({} such nodes); the nodes around it are too few or lie in a plane",
-          i, centres_[i].x(), centres_[i].y(), centres_[i].z(), growth_steps_at_node, growth, base[i], unsound.size()));
+    return unsound;
+  };
+  std::vector<int> wanted(n, 0), level(n, 0), everyone(n);
+  std::iota(everyone.begin(), everyone.end(), 0);
+  std::vector<int> unsound = unsound_nodes();
+  int round = 0;
+  while (!unsound.empty()) {
+    // The nodes in question alone, until they are sound. For a few of them every sphere is looked at.
+    while (!unsound.empty()) {
+      const double furthest = std::pow(growth, ++round);
+      std::vector<double> widest(n);
+      for (int j = 0; j < n; ++j)
+        widest[j] = furthest * base[j];
+      const SphereGrid reach = unsound.size() > 100 ? SphereGrid(centres_, widest) : SphereGrid();
+      const auto near = [&](int i) -> std::span<const int> {
+        return unsound.size() > 100 ? reach.find(centres_[i]).ids : std::span<const int>(everyone);
+      };
+      for (int i : unsound) {
+        if (++wanted[i] > growth_steps_at_node)
+          throw NumericalError(fmt::format(
+              "shape functions: the support of node {} at ({:.6g}, {:.6g}, {:.6g}) m is not sound after {} steps of "
+              "growth by {} from a radius of {:.6g} m ({} such nodes); the nodes around it are too few or in a plane",
+              i, centres_[i].x(), centres_[i].y(), centres_[i].z(), growth_steps_at_node, growth, base[i],
+              unsound.size()));
+        const double factor = std::pow(growth, wanted[i]);
+        for (int j : near(i))
+          if ((centres_[j] - centres_[i]).norm() < factor * base[j])
+            level[j] = std::max(level[j], wanted[i]);
+      }
+      for (int j = 0; j < n; ++j)
+        radii_[j] = base[j] * std::pow(growth, level[j]);
+      std::vector<int> still;
+      for (int i : unsound) {
+        const std::span<const int> candidates = near(i);
+        SupportMemory memory(static_cast<int>(candidates.size()));
+        for (int j : candidates)
+          append(memory.support, j, centres_[j] - centres_[i], radii_[j]);
+        pad(memory.support);
+        if (!is_sound(memory.support))
+          still.push_back(i);
+      }
+      unsound = std::move(still);
     }
-    std::vector<double> widest(n);
-    for (int j = 0; j < n; ++j)
-      widest[j] = base[j] * std::pow(growth, step);
-    const SphereGrid reach(centres_, widest);
-    for (int i : unsound) {
-      const double factor = std::pow(growth, ++wanted[i]);
-      for (int j : reach.find(centres_[i]).ids)
-        if ((centres_[j] - centres_[i]).norm() < factor * base[j])
-          level[j] = std::max(level[j], wanted[i]);
-    }
-    for (int j = 0; j < n; ++j)
-      radii_[j] = base[j] * std::pow(growth, level[j]);
     grid_ = SphereGrid(centres_, radii_);
+    unsound = unsound_nodes();
   }
   grown_ = static_cast<int>(std::count_if(level.begin(), level.end(), [](int l) { return l > 0; }));
 }

@@ -19,9 +19,10 @@ struct Support {
   double* q;            // 1/m2
 };
 
-/// Where evaluate_linear writes; every array has room for the padded support.
+/// Where the kernel writes; every array has room for the padded support.
 struct LinearOutput {
   double *value, *dx, *dy, *dz;
+  std::array<double*, 6> second; // xx yy zz xy xz yz
 };
 
 struct Kernel {
@@ -30,8 +31,10 @@ struct Kernel {
   /// Writes the members of the cell that hold the point, in the cell's order.
   void (*collect)(const SphereGrid::Cell& cell, const double* point, Support& support);
   /// Shape functions and gradients; returns the 1-norm condition of the scaled moment matrix (not finite, or huge, when
-  /// the matrix is singular: the outputs are then meaningless).
+  /// the matrix is singular: the outputs are then meaningless). LinearOutput::second is not used.
   double (*evaluate_linear)(const Support& support, const LinearOutput& output);
+  /// The same with second derivatives.
+  double (*evaluate_linear_second)(const Support& support, const LinearOutput& output);
 };
 
 /// Runs everywhere.

@@ -54,7 +54,7 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
 #pragma GCC pop_options
 
 const Kernel* avx512() {
-  static constexpr Kernel kernel{"avx512", width, collect, evaluate_linear};
+  static constexpr Kernel kernel{"avx512", width, collect, evaluate<false>, evaluate<true>};
   return &kernel;
 }
 

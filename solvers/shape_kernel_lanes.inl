@@ -84,31 +84,42 @@ inline void multiply(const Symmetric4& a, const double* v, double* out) {
   out[3] = m[3] * v[0] + m[6] * v[1] + m[8] * v[2] + m[9] * v[3];
 }
 
-// Weight W = (1 - s)^3 (1 + 3 s) and g with grad W_j = g_j d_j, g = 12 (1 - s)^2 / R^2.
+// Weight W = (1 - s)^3 (1 + 3 s) with W,k = g d_k and W,kl = -g delta_kl + f d_k d_l:
+//   g = 12 (1 - s)^2 q,  f = 24 (1 - s) q^2 / s.
 struct Weight {
-  Pack w, g;
+  Pack w, g, f;
 };
-inline Weight weigh(Pack x, Pack y, Pack z, Pack q) {
+template <bool second>
+Weight weigh(Pack x, Pack y, Pack z, Pack q) {
   const Pack s = root((x * x + y * y + z * z) * q);
   const Pack t = 1 - s, t2 = t * t;
-  return {t2 * t * (1 + 3 * s), 12 * t2 * q};
+  // f d_k d_l is of the order of |d| as d goes to zero: the small number keeps 0 / 0 away and changes nothing else.
+  if constexpr (second)
+    return {t2 * t * (1 + 3 * s), 12 * t2 * q, 24 * t * q * q / (s + 1e-150)};
+  else
+    return {t2 * t * (1 + 3 * s), 12 * t2 * q, t};
 }
 
-// The local coordinates are d / l; all sums are taken in metres and scaled afterwards.
-//   A c = e_0 gives h_j = W_j (P_j . c).
-//   Differentiating A c = P(x) in the frame fixed at x:  A c_k = e_k / l - A_k c,  A_k c = sum_j (d_jk r_j) P_j  with
-//   r_j = g_j (P_j . c), and h_j,k = r_j d_jk + W_j (P_j . c_k).
-inline double evaluate_linear(const Support& support, const LinearOutput& output) {
+// The local coordinates are d / l; all sums are taken in metres and scaled afterwards. In the frame fixed at x:
+//   A c = P(x) = e_0                                      h_j    = W_j (P_j . c)
+//   A c_k = e_k / l - A,k c                               h_j,k  = r_j d_jk + W_j (P_j . c_k),  r_j = g_j (P_j . c)
+//   A c_kl = - A,kl c - A,k c_l - A,l c_k = - sum_j u_jkl P_j     h_j,kl = u_jkl + W_j (P_j . c_kl)
+//   with u_jkl = W_j,kl (P_j . c) + g_j (d_jk (P_j . c_l) + d_jl (P_j . c_k)).
+template <bool second>
+double evaluate(const Support& support, const LinearOutput& output) {
   const int n = (support.count + width - 1) / width * width;
   if (n == 0)
     return __builtin_inf();
+
   Pack moment[10] = {};
   for (int k = 0; k < n; k += width) {
     const Pack x = load(support.dx + k), y = load(support.dy + k), z = load(support.dz + k), q = load(support.q + k);
-    const Weight weight = weigh(x, y, z, q);
-    store(output.dx + k, weight.g); // the outputs hold W, g and r until the last loop
-    store(output.dy + k, weight.w);
+    const Weight weight = weigh<second>(x, y, z, q);
     const Pack w = weight.w;
+    store(output.dx + k, w); // until the results are known the outputs keep the weights
+    store(output.dy + k, weight.g);
+    if constexpr (second)
+      store(output.second[0] + k, weight.f);
     const Pack wx = w * x, wy = w * y, wz = w * z;
     moment[0] += w;
     moment[1] += wx;
@@ -125,19 +136,21 @@ inline double evaluate_linear(const Support& support, const LinearOutput& output
   const double scale2 = scale * scale;
   Symmetric4 a;
   add_lanes(moment, 10, a.m);
-  for (int k = 1; k < 4; ++k)
-    a.m[k] *= scale;
-  for (int k = 4; k < 10; ++k)
-    a.m[k] *= scale2;
+  for (int i = 1; i < 4; ++i)
+    a.m[i] *= scale;
+  for (int i = 4; i < 10; ++i)
+    a.m[i] *= scale2;
   const Symmetric4 b = inverse(a);
   const double condition = norm1(a) * norm1(b);
 
-  const double c0 = b.m[0], cx = scale * b.m[1], cy = scale * b.m[2], cz = scale * b.m[3];
-  Pack third[10] = {};
+  // From here on coefficient vectors are those of {1, d}, so that P_j . c needs no scaling.
+  const double c[4] = {b.m[0], scale * b.m[1], scale * b.m[2], scale * b.m[3]};
+  Pack third[10] = {}; // the last is not used
   for (int k = 0; k < n; k += width) {
     const Pack x = load(support.dx + k), y = load(support.dy + k), z = load(support.dz + k);
-    const Pack p = c0 + cx * x + cy * y + cz * z;
-    const Pack r = load(output.dx + k) * p;
+    const Pack p = c[0] + c[1] * x + c[2] * y + c[3] * z;
+    store(output.value + k, load(output.dx + k) * p);
+    const Pack r = load(output.dy + k) * p;
     const Pack rx = r * x, ry = r * y, rz = r * z;
     third[0] += rx;
     third[1] += ry;
@@ -148,27 +161,66 @@ inline double evaluate_linear(const Support& support, const LinearOutput& output
     third[6] += ry * y;
     third[7] += ry * z;
     third[8] += rz * z;
-    store(output.value + k, load(output.dy + k) * p);
-    store(output.dx + k, r);
   }
   double t[10];
   add_lanes(third, 10, t);
-  for (int k = 3; k < 9; ++k)
-    t[k] *= scale;
-  const double right[3][4] = {
-      {-t[0], scale - t[3], -t[4], -t[5]}, {-t[1], -t[4], scale - t[6], -t[7]}, {-t[2], -t[5], -t[7], scale - t[8]}};
-  double c[3][4];
-  for (int k = 0; k < 3; ++k) {
-    multiply(b, right[k], c[k]);
-    for (int i = 1; i < 4; ++i)
-      c[k][i] *= scale;
+  for (int i = 3; i < 9; ++i)
+    t[i] *= scale;
+  const double right[3][4] = {{-t[0], scale - t[3], -t[4], -t[5]},
+                              {-t[1], -t[4], scale - t[6], -t[7]},
+                              {-t[2], -t[5], -t[7], scale - t[8]}};
+  double c1[3][4];
+  for (int i = 0; i < 3; ++i) {
+    multiply(b, right[i], c1[i]);
+    for (int e = 1; e < 4; ++e)
+      c1[i][e] *= scale;
   }
+
+  double c2[6][4];
+  if constexpr (second) {
+    Pack fourth[6][4] = {};
+    for (int k = 0; k < n; k += width) {
+      const Pack d[3] = {load(support.dx + k), load(support.dy + k), load(support.dz + k)};
+      const Pack g = load(output.dy + k), f = load(output.second[0] + k);
+      const Pack p = c[0] + c[1] * d[0] + c[2] * d[1] + c[3] * d[2];
+      Pack gp[3];
+      for (int i = 0; i < 3; ++i)
+        gp[i] = g * (c1[i][0] + c1[i][1] * d[0] + c1[i][2] * d[1] + c1[i][3] * d[2]);
+      const Pack fp = f * p, r = g * p;
+      for (int m = 0; m < 6; ++m) {
+        constexpr int first[6] = {0, 1, 2, 0, 0, 1}, other[6] = {0, 1, 2, 1, 2, 2};
+        const int i = first[m], l = other[m];
+        Pack u = fp * d[i] * d[l] + d[i] * gp[l] + d[l] * gp[i];
+        if (i == l)
+          u -= r;
+        store(output.second[m] + k, u);
+        fourth[m][0] += u;
+        for (int e = 0; e < 3; ++e)
+          fourth[m][1 + e] += u * d[e];
+      }
+    }
+    for (int m = 0; m < 6; ++m) {
+      double sums[4];
+      add_lanes(fourth[m], 4, sums);
+      const double negative[4] = {-sums[0], -scale * sums[1], -scale * sums[2], -scale * sums[3]};
+      multiply(b, negative, c2[m]);
+      for (int e = 1; e < 4; ++e)
+        c2[m][e] *= scale;
+    }
+  }
+
   for (int k = 0; k < n; k += width) {
     const Pack x = load(support.dx + k), y = load(support.dy + k), z = load(support.dz + k);
-    const Pack r = load(output.dx + k), w = load(output.dy + k);
-    store(output.dx + k, r * x + w * (c[0][0] + c[0][1] * x + c[0][2] * y + c[0][3] * z));
-    store(output.dy + k, r * y + w * (c[1][0] + c[1][1] * x + c[1][2] * y + c[1][3] * z));
-    store(output.dz + k, r * z + w * (c[2][0] + c[2][1] * x + c[2][2] * y + c[2][3] * z));
+    const Pack w = load(output.dx + k);
+    const Pack r = load(output.dy + k) * (c[0] + c[1] * x + c[2] * y + c[3] * z);
+    store(output.dx + k, r * x + w * (c1[0][0] + c1[0][1] * x + c1[0][2] * y + c1[0][3] * z));
+    store(output.dy + k, r * y + w * (c1[1][0] + c1[1][1] * x + c1[1][2] * y + c1[1][3] * z));
+    store(output.dz + k, r * z + w * (c1[2][0] + c1[2][1] * x + c1[2][2] * y + c1[2][3] * z));
+    if constexpr (second)
+      for (int m = 0; m < 6; ++m) {
+        double* to = output.second[m] + k;
+        store(to, load(to) + w * (c2[m][0] + c2[m][1] * x + c2[m][2] * y + c2[m][3] * z));
+      }
   }
   return condition;
 }

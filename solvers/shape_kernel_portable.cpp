@@ -47,7 +47,7 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
 } // namespace
 
 const Kernel& portable() {
-  static constexpr Kernel kernel{"portable", width, collect, evaluate_linear};
+  static constexpr Kernel kernel{"portable", width, collect, evaluate<false>, evaluate<true>};
   return kernel;
 }
 

@@ -8,9 +8,9 @@ namespace spherecut::solvers {
 
 namespace {
 
-// A cell of half a radius holds about 2.5 times the spheres that hold one of its points (volume of the sphere swept by
+// A cell of 0.45 radii holds about 2.3 times the spheres that hold one of its points (volume of the sphere swept by
 // the cell over that of the sphere); smaller cells cost more memory than they save time.
-constexpr double side_over_radius = 0.5;
+constexpr double side_over_radius = 0.45;
 constexpr int few_members = 16; // a cell with no more is not split
 constexpr int deepest = 12;
 constexpr double slack = 1e-9; // of the cell's side: a point on a face may be sorted to either side of it
@@ -57,7 +57,7 @@ struct SphereGrid::Builder {
     double sum = 0;
     for (int j : members)
       sum += radii[j];
-    return side > 1.01 * side_over_radius * sum / static_cast<double>(members.size());
+    return side > 1.2 * side_over_radius * sum / static_cast<double>(members.size());
   }
 
   void store(Node& leaf, const std::vector<int>& members) const {
@@ -66,64 +66,91 @@ struct SphereGrid::Builder {
     leaf.count = count;
     leaf.first_id = static_cast<int>(grid.ids_.size());
     leaf.first_block = static_cast<int>(grid.blocks_.size());
-    for (int k = 0; k < blocks * lanes; ++k)
-      grid.ids_.push_back(members[std::min(k, count - 1)]);
+    grid.ids_.insert(grid.ids_.end(), members.begin(), members.end());
+    grid.ids_.resize(grid.ids_.size() + blocks * lanes - count, count > 0 ? members.back() : 0);
     grid.blocks_.resize(grid.blocks_.size() + 4 * static_cast<std::size_t>(blocks));
     Block* block = grid.blocks_.data() + leaf.first_block;
-    for (int k = 0; k < blocks * lanes; ++k) {
-      const int b = k / lanes, l = k % lanes;
-      const int j = members[std::min(k, count - 1)];
-      for (int a = 0; a < 3; ++a)
-        block[a * blocks + b].lane[l] = centres[j][a];
-      block[3 * blocks + b].lane[l] = k < count ? 1 / (radii[j] * radii[j]) : std::numeric_limits<double>::infinity();
-    }
+    const int* ids = grid.ids_.data() + leaf.first_id;
+    for (int b = 0; b < blocks; ++b)
+      for (int l = 0; l < lanes; ++l) {
+        const int k = b * lanes + l, j = ids[k];
+        for (int a = 0; a < 3; ++a)
+          block[a * blocks + b].lane[l] = centres[j][a];
+        block[3 * blocks + b].lane[l] = k < count ? 1 / (radii[j] * radii[j]) : std::numeric_limits<double>::infinity();
+      }
   }
 };
 
 SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<double>& radii) {
   const int n = static_cast<int>(centres.size());
   Vector3 lower = Vector3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-  double largest = 0;
   for (int j = 0; j < n; ++j) {
     lower = lower.cwiseMin((centres[j].array() - radii[j]).matrix());
     upper = upper.cwiseMax((centres[j].array() + radii[j]).matrix());
-    largest = std::max(largest, radii[j]);
   }
   const Vector3 extent = upper - lower;
-  // No more root cells than a few per sphere, however large the box; octants make up for it where there are spheres.
-  const double side = std::max(side_over_radius * largest, std::cbrt(extent.prod() / (4.0 * n + 512)));
+  // Root cells fit the spheres of median size, but are no more than a few per sphere, however large the box; octants
+  // make up for it where spheres are small.
+  std::vector<double> sorted = radii;
+  std::nth_element(sorted.begin(), sorted.begin() + n / 2, sorted.end());
+  const double side = std::max(side_over_radius * sorted[n / 2], std::cbrt(extent.prod() / (4.0 * n + 512)));
   origin_ = lower;
   inverse_side_ = 1 / side;
   for (int a = 0; a < 3; ++a)
     roots_[a] = std::max(1, static_cast<int>(std::ceil(extent[a] / side)));
 
-  // Members of the root cells as compressed rows, counted first, then filled.
-  const int root_count = roots_[0] * roots_[1] * roots_[2];
-  std::vector<int> start(static_cast<std::size_t>(root_count) + 1, 0), members;
-  const auto for_each_root = [&](const auto& visit) {
-    for (int j = 0; j < n; ++j) {
-      std::array<int, 3> from{}, to{};
-      for (int a = 0; a < 3; ++a) {
-        const double low = (centres[j][a] - radii[j] - origin_[a]) * inverse_side_ - slack;
-        const double high = (centres[j][a] + radii[j] - origin_[a]) * inverse_side_ + slack;
-        from[a] = std::clamp(static_cast<int>(std::floor(low)), 0, roots_[a] - 1);
-        to[a] = std::clamp(static_cast<int>(std::floor(high)), 0, roots_[a] - 1);
-      }
-      for (int k = from[2]; k <= to[2]; ++k)
-        for (int i = from[1]; i <= to[1]; ++i)
-          for (int h = from[0]; h <= to[0]; ++h)
-            if (touches(centres[j], radii[j], origin_ + side * Vector3(h, i, k), side))
-              visit(j, (k * roots_[1] + i) * roots_[0] + h);
-    }
+  // Members of the root cells as compressed rows. A sphere covers a run of cells in each row of cells that it meets;
+  // the runs are found first, then counted, then written.
+  struct Run {
+    int sphere, first, last;
   };
-  for_each_root([&](int, int root) { ++start[root + 1]; });
+  std::vector<Run> runs;
+  runs.reserve(static_cast<std::size_t>(n) * 40);
+  const auto cells_between = [&](int axis, double low, double high) {
+    const double from = (low - origin_[axis]) * inverse_side_ - slack;
+    const double to = (high - origin_[axis]) * inverse_side_ + slack;
+    return std::array<int, 2>{std::clamp(static_cast<int>(std::floor(from)), 0, roots_[axis] - 1),
+                              std::clamp(static_cast<int>(std::floor(to)), 0, roots_[axis] - 1)};
+  };
+  // Squared distance from a coordinate to the layer of cells `i` along an axis.
+  const auto layer_distance = [&](int axis, int i, double coordinate) {
+    const double low = origin_[axis] + i * side, tolerance = slack * side;
+    const double outside = std::max({low - tolerance - coordinate, coordinate - (low + side + tolerance), 0.0});
+    return outside * outside;
+  };
+  for (int j = 0; j < n; ++j) {
+    const Vector3& c = centres[j];
+    const double r = radii[j];
+    const auto [k0, k1] = cells_between(2, c.z() - r, c.z() + r);
+    const auto [i0, i1] = cells_between(1, c.y() - r, c.y() + r);
+    for (int k = k0; k <= k1; ++k)
+      for (int i = i0; i <= i1; ++i) {
+        const double squared = r * r - layer_distance(2, k, c.z()) - layer_distance(1, i, c.y());
+        if (squared <= 0)
+          continue;
+        const double half = std::sqrt(squared);
+        const auto [h0, h1] = cells_between(0, c.x() - half, c.x() + half);
+        const int row = (k * roots_[1] + i) * roots_[0];
+        runs.push_back({j, row + h0, row + h1});
+      }
+  }
+  const int root_count = roots_[0] * roots_[1] * roots_[2];
+  std::vector<int> start(static_cast<std::size_t>(root_count) + 1, 0);
+  for (const Run& run : runs)
+    for (int cell = run.first; cell <= run.last; ++cell)
+      ++start[cell + 1];
   for (int r = 0; r < root_count; ++r)
     start[r + 1] += start[r];
-  members.resize(start[root_count]);
-  std::vector<int> next(start.begin(), start.end() - 1);
-  for_each_root([&](int j, int root) { members[next[root]++] = j; });
+  std::vector<int> members(start[root_count]), next(start.begin(), start.end() - 1);
+  for (const Run& run : runs)
+    for (int cell = run.first; cell <= run.last; ++cell)
+      members[next[cell]++] = run.sphere;
 
   nodes_.resize(root_count);
+  // Enough for cells that are not split, with their padding.
+  const std::size_t entries = members.size() + static_cast<std::size_t>(root_count) * lanes;
+  ids_.reserve(entries);
+  blocks_.reserve(4 * entries / lanes);
   Builder builder{*this, centres, radii};
   std::vector<int> inside;
   for (int r = 0; r < root_count; ++r) {
