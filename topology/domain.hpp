@@ -17,7 +17,7 @@ class Domain {
   /// Signed distance to the surface, m, negative inside. Exact in sign; exact in value near the surface.
   [[nodiscard]] virtual double signed_distance(const Vector3& x) const = 0;
 
-  /// Signed distance to the curved part alone, m (minus infinity when there is none).
+  /// Signed distance to the curved part alone, m (minus infinity when there is none; its gradient is then zero).
   [[nodiscard]] virtual double curved_distance(const Vector3& x) const = 0;
 
   /// Unit outward gradient of curved_distance.
@@ -47,8 +47,11 @@ std::shared_ptr<const Domain> make_hemisphere_domain(double radius, double edge)
 /// Upright cylinder: axis z, base on z = 0.
 std::shared_ptr<const Domain> make_cylinder_domain(double radius, double height, double edge);
 
-/// An organ given by a checked closed surface. Distances come from the exact closest point on the triangles (CGAL AABB
-/// tree), inside from an OpenVDB level set of the given voxel size (0: derived as 1/128 of the largest extent).
+/// An organ given by a checked closed surface; it has no planes and its curved distance is its distance. Distances come
+/// from the exact nearest point of the triangles, signed by pseudonormals (surface_distance.hpp), except that deeper
+/// inside than two voxels signed_distance is read from an OpenVDB level set (level_set.hpp, which states its error) of
+/// the given voxel size, m (0: derived as 1/128 of the largest extent). Const calls are thread safe. Throws InputError
+/// when the surface is not closed or the voxel size does not fit it.
 std::shared_ptr<const Domain> make_organ_domain(SurfaceMesh surface, double voxel_size = 0);
 
 } // namespace spherecut::topology

@@ -1,9 +1,9 @@
 #include "topology/domain.hpp"
 
 #include "tests/support/mesh_checks.hpp"
+#include "tests/support/mesh_oracles.hpp"
 #include "topology/errors.hpp"
 
-#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -11,6 +11,9 @@
 
 using namespace spherecut;
 using namespace spherecut::topology;
+using spherecut::tests::brute_force_distance;
+using spherecut::tests::inside_by_winding;
+using spherecut::tests::random_point;
 
 namespace {
 
@@ -23,52 +26,6 @@ std::vector<Case> cases() {
   return {{"box", make_box_domain(Vector3(-0.03, 0.01, -0.02), Vector3(0.05, 0.06, 0.04), 0.004)},
           {"hemisphere", make_hemisphere_domain(0.05, 0.003)},
           {"cylinder", make_cylinder_domain(0.04, 0.06, 0.003)}};
-}
-
-/// Closest point of one triangle to x [Ericson, Real-Time Collision Detection, sec. 5.1.5].
-Vector3 closest_on_triangle(const Vector3& x, const Vector3& a, const Vector3& b, const Vector3& c) {
-  const Vector3 ab = b - a, ac = c - a, ax = x - a, bx = x - b, cx = x - c;
-  const double d1 = ab.dot(ax), d2 = ac.dot(ax), d3 = ab.dot(bx), d4 = ac.dot(bx), d5 = ab.dot(cx), d6 = ac.dot(cx);
-  if (d1 <= 0 && d2 <= 0)
-    return a;
-  if (d3 >= 0 && d4 <= d3)
-    return b;
-  if (d6 >= 0 && d5 <= d6)
-    return c;
-  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0)
-    return a + d1 / (d1 - d3) * ab;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0)
-    return a + d2 / (d2 - d6) * ac;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
-    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  return a + (vb * ab + vc * ac) / (va + vb + vc);
-}
-
-double brute_force_distance(const SurfaceMesh& mesh, const Vector3& x) {
-  double best = std::numeric_limits<double>::infinity();
-  for (const Triangle& t : mesh.triangles)
-    best = std::min(
-        best,
-        (x - closest_on_triangle(x, mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]])).squaredNorm());
-  return std::sqrt(best);
-}
-
-/// Inside test by winding number (sum of solid angles, van Oosterom and Strackee 1983).
-bool inside_by_winding(const SurfaceMesh& mesh, const Vector3& x) {
-  double angle = 0;
-  for (const Triangle& t : mesh.triangles) {
-    const Vector3 a = mesh.vertices[t[0]] - x, b = mesh.vertices[t[1]] - x, c = mesh.vertices[t[2]] - x;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    angle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return angle > 6;
-}
-
-Vector3 random_point(const BoundingBox& box, std::mt19937& random) {
-  std::uniform_real_distribution<double> unit(-0.3, 1.3);
-  const Vector3 u(unit(random), unit(random), unit(random));
-  return box.lower + u.cwiseProduct(box.extent());
 }
 
 } // namespace

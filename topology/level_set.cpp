@@ -1,0 +1,156 @@
+#include "topology/level_set.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <fmt/format.h>
+#include <limits>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/MeshToVolume.h>
+#include <tbb/task_arena.h>
+
+namespace spherecut::topology {
+
+namespace {
+
+constexpr float band_voxels = 4;           // outside
+constexpr double default_resolution = 128; // voxels along the largest extent
+constexpr double least_voxels_across = 4;
+constexpr double bytes_per_voxel = sizeof(float) + sizeof(std::int32_t);
+constexpr double fill_of_leaves = 0.5; // share of allocated leaf voxels that the body and its band use, at least
+
+/// The surface in index space, as OpenVDB's mesh conversion reads it.
+class IndexSpaceMesh {
+ public:
+  IndexSpaceMesh(const SurfaceMesh& surface, double voxel_size) : surface_(surface), scale_(1 / voxel_size) {}
+  [[nodiscard]] std::size_t polygonCount() const { return surface_.triangles.size(); }
+  [[nodiscard]] std::size_t pointCount() const { return surface_.vertices.size(); }
+  [[nodiscard]] static std::size_t vertexCount(std::size_t) { return 3; }
+  void getIndexSpacePoint(std::size_t polygon, std::size_t corner, openvdb::Vec3d& position) const {
+    const Vector3 p = scale_ * surface_.vertices[surface_.triangles[polygon][corner]];
+    position = {p.x(), p.y(), p.z()};
+  }
+
+ private:
+  const SurfaceMesh& surface_;
+  double scale_;
+};
+
+double checked_voxel_size(const SurfaceMesh& surface, double voxel_size, std::size_t memory_limit) {
+  if (surface.triangles.empty())
+    throw InputError("level set: the surface has no triangles");
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v)
+    if (!surface.vertices[v].allFinite())
+      throw InputError(fmt::format("level set: vertex {} is not finite", v));
+  const Vector3 extent = bounds(surface).extent();
+  if (voxel_size == 0)
+    voxel_size = std::min(extent.maxCoeff() / default_resolution, extent.minCoeff() / least_voxels_across);
+  const double limit = extent.minCoeff() / least_voxels_across;
+  if (!(std::isfinite(voxel_size) && voxel_size > 0 && voxel_size <= limit))
+    throw InputError(fmt::format("voxel size = {} m: must be positive and at most {:.4g} m, a quarter of the smallest "
+                                 "extent of the surface",
+                                 voxel_size, limit));
+  const double voxels =
+      std::abs(volume(surface)) / std::pow(voxel_size, 3) + band_voxels * area(surface) / std::pow(voxel_size, 2);
+  const double bytes = voxels * bytes_per_voxel / fill_of_leaves;
+  if (bytes > static_cast<double>(memory_limit))
+    throw InputError(fmt::format("voxel size = {} m would need about {:.2g} GB for the level set: at most {:.2g} GB",
+                                 voxel_size, bytes / 1e9, static_cast<double>(memory_limit) / 1e9));
+  return voxel_size;
+}
+
+} // namespace
+
+struct LevelSet::Impl {
+  using Accessor = openvdb::tree::ValueAccessor<const openvdb::FloatTree, false>;
+
+  [[nodiscard]] openvdb::Vec3d index_space(const Vector3& x) const {
+    return {x.x() / voxel_size, x.y() / voxel_size, x.z() / voxel_size};
+  }
+
+  /// Trilinear value at index coordinates p.
+  static double sample(const Accessor& values, const openvdb::Vec3d& p) {
+    const openvdb::Coord c = openvdb::Coord::floor(p);
+    const double u = p.x() - c.x(), v = p.y() - c.y(), w = p.z() - c.z();
+    const auto at = [&](int i, int j, int k) { return static_cast<double>(values.getValue(c.offsetBy(i, j, k))); };
+    const auto along_z = [&](int i, int j) { return (1 - w) * at(i, j, 0) + w * at(i, j, 1); };
+    const auto along_y = [&](int i) { return (1 - v) * along_z(i, 0) + v * along_z(i, 1); };
+    return (1 - u) * along_y(0) + u * along_y(1);
+  }
+
+  /// Index coordinates beyond what a voxel coordinate can hold lie far outside.
+  [[nodiscard]] static bool representable(const openvdb::Vec3d& p) {
+    constexpr double limit = 1e9;
+    return std::abs(p.x()) < limit && std::abs(p.y()) < limit && std::abs(p.z()) < limit;
+  }
+
+  double voxel_size = 0;
+  openvdb::FloatGrid::Ptr distances;
+  openvdb::Int32Grid::Ptr triangles;
+};
+
+LevelSet::LevelSet(const SurfaceMesh& surface, double voxel_size, std::size_t memory_limit)
+    : impl_(std::make_unique<Impl>()) {
+  openvdb::initialize();
+  impl_->voxel_size = checked_voxel_size(surface, voxel_size, memory_limit);
+  const auto transform = openvdb::math::Transform::createLinearTransform(impl_->voxel_size);
+  impl_->triangles = openvdb::Int32Grid::create(-1);
+  // One thread: which of two equally near triangles a voxel keeps must not depend on the schedule.
+  tbb::task_arena one_thread(1);
+  one_thread.execute([&] {
+    impl_->distances = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
+        IndexSpaceMesh(surface, impl_->voxel_size), *transform, band_voxels, std::numeric_limits<float>::max(),
+        openvdb::tools::DISABLE_RENORMALIZATION, impl_->triangles.get());
+  });
+}
+
+LevelSet::~LevelSet() = default;
+LevelSet::LevelSet(LevelSet&&) noexcept = default;
+LevelSet& LevelSet::operator=(LevelSet&&) noexcept = default;
+
+double LevelSet::distance(const Vector3& x) const {
+  const openvdb::Vec3d p = impl_->index_space(x);
+  if (!Impl::representable(p))
+    return outside_band();
+  return Impl::sample(Impl::Accessor(impl_->distances->tree()), p);
+}
+
+Vector3 LevelSet::gradient(const Vector3& x) const {
+  const openvdb::Vec3d p = impl_->index_space(x);
+  if (!Impl::representable(p))
+    return Vector3::Zero();
+  const Impl::Accessor values(impl_->distances->tree());
+  Vector3 result;
+  for (int d = 0; d < 3; ++d) {
+    openvdb::Vec3d step(0.0);
+    step[d] = 0.5;
+    result[d] = (Impl::sample(values, p + step) - Impl::sample(values, p - step)) / impl_->voxel_size;
+  }
+  return result;
+}
+
+bool LevelSet::inside(const Vector3& x) const {
+  return distance(x) < 0;
+}
+
+int LevelSet::near_triangle(const Vector3& x) const {
+  const openvdb::Vec3d p = impl_->index_space(x);
+  return Impl::representable(p) ? impl_->triangles->tree().getValue(openvdb::Coord::round(p)) : -1;
+}
+
+double LevelSet::voxel_size() const {
+  return impl_->voxel_size;
+}
+double LevelSet::outside_band() const {
+  return band_voxels * impl_->voxel_size;
+}
+std::size_t LevelSet::memory_bytes() const {
+  return impl_->distances->memUsage() + impl_->triangles->memUsage();
+}
+std::size_t LevelSet::active_voxels() const {
+  return impl_->distances->activeVoxelCount();
+}
+
+} // namespace spherecut::topology

@@ -1,0 +1,50 @@
+// An organ as an implicit solid: exact nearest points near its surface, level-set values where only depth matters.
+#include "topology/domain.hpp"
+#include "topology/level_set.hpp"
+#include "topology/surface_distance.hpp"
+
+#include <utility>
+
+namespace spherecut::topology {
+
+namespace {
+
+/// Deeper than this many voxels the level set's trilinear value answers signed_distance.
+constexpr double exact_voxels = 2;
+
+class OrganDomain final : public Domain {
+ public:
+  OrganDomain(SurfaceMesh surface, double voxel_size)
+      : surface_(std::move(surface)), exact_(surface_), level_set_(surface_, voxel_size),
+        bounds_(topology::bounds(surface_)) {}
+
+  [[nodiscard]] double signed_distance(const Vector3& x) const override {
+    const double sampled = level_set_.distance(x);
+    const double deep = exact_voxels * level_set_.voxel_size();
+    return sampled < -deep ? sampled : nearest(x).distance;
+  }
+  [[nodiscard]] double curved_distance(const Vector3& x) const override { return signed_distance(x); }
+  [[nodiscard]] Vector3 curved_gradient(const Vector3& x) const override { return nearest(x).normal; }
+  [[nodiscard]] Vector3 normal(const Vector3& x) const override { return nearest(x).normal; }
+  [[nodiscard]] Vector3 closest_surface_point(const Vector3& x) const override { return nearest(x).point; }
+  [[nodiscard]] const std::vector<Plane>& planes() const override { return planes_; }
+  [[nodiscard]] const SurfaceMesh& surface() const override { return surface_; }
+  [[nodiscard]] BoundingBox bounds() const override { return bounds_; }
+
+ private:
+  [[nodiscard]] NearestPoint nearest(const Vector3& x) const { return exact_.nearest(x, level_set_.near_triangle(x)); }
+
+  SurfaceMesh surface_;
+  SurfaceDistance exact_;
+  LevelSet level_set_;
+  BoundingBox bounds_;
+  std::vector<Plane> planes_;
+};
+
+} // namespace
+
+std::shared_ptr<const Domain> make_organ_domain(SurfaceMesh surface, double voxel_size) {
+  return std::make_shared<OrganDomain>(std::move(surface), voxel_size);
+}
+
+} // namespace spherecut::topology
