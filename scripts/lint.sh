@@ -1,0 +1,74 @@
+#!/usr/bin/env bash
+# Formatting, clang-tidy and shell syntax over all tracked sources. Usage: scripts/lint.sh BUILD_FOLDER
+# clang-tidy leaves out units that include CGAL, OpenVDB or FCL: their headers take minutes and a gigabyte each.
+# What a unit said is kept under a hash of all it depends on, so that a repeat checks only what changed.
+set -euo pipefail
+cd "$(dirname "$(readlink -f "$0")")/.."
+build=${1:?usage: scripts/lint.sh BUILD_FOLDER}
+[ -f "$build/compile_commands.json" ] || {
+  printf 'lint: %s/compile_commands.json is missing; run ./dev build first\n' "$build" >&2
+  exit 2
+}
+
+mapfile -t sources < <(git ls-files --cached --others --exclude-standard '*.cpp' '*.hpp' '*.inl')
+mapfile -t shells < <(git ls-files --cached --others --exclude-standard dev .ci/run '*.sh')
+status=0
+
+for shell in "${shells[@]}"; do
+  bash -n "$shell" || status=1
+done
+clang-format-14 --dry-run -Werror "${sources[@]}" || status=1
+printf 'lint: %d sources formatted, %d shell scripts parsed\n' "${#sources[@]}" "${#shells[@]}"
+
+# unit <tab> files it includes, itself first, following the project's own quoted includes.
+dependencies() {
+  awk '
+    FNR == 1 { files[++count] = FILENAME }
+    /^#include "/ { split($0, part, "\""); includes[FILENAME] = includes[FILENAME] " " part[2] }
+    function visit(file,   names, n, i) {
+      if (file in seen) return
+      seen[file] = 1; closure = closure " " file
+      n = split(includes[file], names, " ")
+      for (i = 1; i <= n; i++) visit(names[i])
+    }
+    END {
+      for (f = 1; f <= count; f++) {
+        if (files[f] !~ /\.cpp$/) continue
+        split("", seen); closure = ""; visit(files[f]); print files[f] "\t" substr(closure, 2)
+      }
+    }' "${sources[@]}"
+}
+
+cache=$build/lint
+mkdir -p "$cache"
+tool=$(clang-tidy-14 --version | tr '\n' ' ')
+heavy='#include [<"](CGAL|openvdb|fcl)/'
+pending=()
+checked=0
+while IFS=$'\t' read -r unit closure; do
+  # shellcheck disable=SC2086
+  if grep -qE "$heavy" $closure 2>/dev/null || ! grep -qF "/$unit\"" "$build/compile_commands.json"; then
+    continue
+  fi
+  checked=$((checked + 1))
+  # shellcheck disable=SC2086
+  key=$({ printf '%s\n' "$tool"; cat .clang-tidy cmake/*.cmake $closure 2>/dev/null; } | sha256sum | cut -c 1-32)
+  [ -e "$cache/$key" ] || pending+=("$key $unit")
+done < <(dependencies)
+printf 'lint: clang-tidy on %d units, %d of them changed\n' "$checked" "${#pending[@]}"
+
+check_unit() { # CACHE BUILD KEY UNIT
+  local said
+  if said=$(clang-tidy-14 --quiet -p "$2" "$4" 2>/dev/null); then
+    : >"$1/$3"
+  else
+    printf '%s\n' "$said"
+    return 1
+  fi
+}
+export -f check_unit
+if [ ${#pending[@]} -gt 0 ]; then
+  printf '%s\n' "${pending[@]}" | xargs -P "$(nproc)" -L 1 bash -c 'check_unit "$@"' lint "$cache" "$build" || status=1
+fi
+if [ "$status" = 0 ]; then printf 'lint: clean\n'; else printf 'lint: see above\n' >&2; fi
+exit "$status"

@@ -1,0 +1,1 @@
+#include <CGAL/Surface_mesh.h>
