@@ -1,6 +1,7 @@
 #include "solvers/discretisation.hpp"
 
 #include "solvers/elastic_body.hpp"
+#include "solvers/published.hpp"
 #include "topology/errors.hpp"
 
 #include <fmt/format.h>
@@ -41,9 +42,9 @@ std::unique_ptr<Discretisation> discretise(Problem problem, const Discretisation
   case Method::galerkin:
     return make_galerkin(std::move(problem), options);
   case Method::published:
-    break;
+    return make_published(std::move(problem), options);
   }
-  throw InputError("this method has no general discretisation");
+  throw InputError(fmt::format("method {} does not exist", static_cast<int>(options.method)));
 }
 
 } // namespace spherecut::solvers
