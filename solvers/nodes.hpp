@@ -27,12 +27,12 @@ struct NodeCloud {
 /// Spacing that grows linearly with the distance from a fine zone, h(x) = clamp(fine + slope (distance - plateau)).
 /// The distance is to the nearest of `centres` less `radius`.
 struct SpacingField {
-  double fine = 0.01;           // m
-  double coarse = 0.01;         // m
-  double slope = 0.3;           // m per m
-  double radius = 0;            // m, radius of the fine zone about each centre
-  double plateau = 1.5;         // in units of fine: extra width of constant spacing around the zone
-  std::vector<Vector3> centres; // empty: `coarse` everywhere
+  double fine = 0.01;             // m
+  double coarse = 0.01;           // m
+  double slope = 0.3;             // m per m
+  double radius = 0;              // m, radius of the fine zone about each centre
+  double plateau = 1.5;           // in units of fine: extra width of constant spacing around the zone
+  std::vector<Vector3> centres{}; // empty: `coarse` everywhere
   [[nodiscard]] double operator()(const Vector3& x) const;
 };
 
@@ -46,17 +46,22 @@ struct SprinkleOptions {
   SpacingField spacing;
   std::vector<SeedNode> seeds;    // placed first, in this order, never moved
   std::uint64_t random_seed = 1;  // same seed, same bits
-  double sharp_edge_degrees = 40; // dihedral angle above which a mesh edge carries edge nodes
+  double sharp_edge_degrees = 40; // angle between the normals across a mesh edge above which it carries edge nodes
   double wall_clearance = 0.45;   // in units of h: interior nodes stay this far from the surface
   int maximum_nodes = 200000;     // refused above, InputError
+  double minimum_density = 0.8;   // a zone below is under-filled, NumericalError
 };
 
-/// What was checked about a sprinkled cloud, per zone of distance from the fine zone.
+/// What was checked about a sprinkled cloud, per zone of distance from the fine zone. Every node counts with the share
+/// of its surroundings that lies in the body: 1 inside, 1/2 on a smooth surface, about 1/4 on a square edge and 1/8 in
+/// its corner, so that a cubic lattice has density 1 whatever its size.
 struct SprinkleZone {
   double spacing_from = 0, spacing_to = 0; // m, the band of h that this zone covers
   int nodes = 0;
-  double nearest_min = 0, nearest_median = 0; // nearest-neighbour distance / h
-  double density = 0;                         // nodes / integral over the zone of dV / h^3 (about 1 to 1.2 when full)
+  // Distance of a node (seeds left out) to its nearest neighbour, in units of the mean spacing of the two.
+  double nearest_min = 0, nearest_median = 0;
+  double expected = 0; // integral over the zone of dV / h^3
+  double density = 0;  // sum of the nodes' shares / expected (about 1 to 1.2 when full)
 };
 struct SprinkleReport {
   std::vector<SprinkleZone> zones;
@@ -66,11 +71,36 @@ struct SprinkleReport {
 struct Sprinkling {
   NodeCloud nodes;
   SprinkleReport report;
+  std::vector<int> kept_from; // resprinkle alone: index of each node in the previous cloud, -1 for a new one
 };
 
 /// Fills the domain: seeds, then sharp edges, surface, interior, by an advancing front with candidates at distance h(x)
-/// [Slak and Kosec 2019]. Checks nearest-neighbour distance and density per zone and throws NumericalError when a zone
-/// is under-filled; InputError on non-positive spacings, fewer than 4 nodes, or more than maximum_nodes.
+/// [Slak and Kosec 2019]; then every place that is left farther than h from all nodes gets one. Checks
+/// nearest-neighbour distance and density per zone and throws NumericalError when a zone is under-filled; InputError on
+/// spacings or slopes out of range, seeds outside the body or on one another, fewer than 4 nodes, or more than
+/// maximum_nodes.
 Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& options);
+
+/// The same after the fine zone has moved (the tool slides): the new seeds first, then every node of `previous` that
+/// still fits, in its order and with identical position, then new nodes in the gaps. A node fits when the spacing it
+/// was placed with is at most 25 % below and 10 % above the new one, and its distance to every node kept before it is
+/// at least 0.7 of their mean spacing. A seed that coincides with a previous node counts as kept. With unchanged
+/// options the result is the previous cloud, bit for bit. Throws as sprinkle does.
+Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& previous);
+
+/// Nearest-neighbour distance and density of a cloud per zone of h; options.seeds are its first nodes.
+SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& nodes);
+
+/// Throws NumericalError naming the zone when a density is below minimum_density.
+void require_filled(const SprinkleReport& report, double minimum_density);
+
+/// Number of nodes to expect of sprinkle: integrals of dV/h^3, dA/2h^2 and, along sharp edges, ds/4h, scaled to what
+/// the filling was measured to give. Within about 10 % above 100 nodes.
+double expected_count(const topology::Domain& domain, const SpacingField& spacing, double sharp_edge_degrees = 40);
+
+/// `shape` with fine and coarse scaled by one factor such that a sprinkling has about `target` nodes (options.spacing
+/// is not used, the seeds are). Throws InputError when target is below 4 or no factor gives it.
+SpacingField spacing_for_count(const topology::Domain& domain, const SpacingField& shape, int target,
+                               const SprinkleOptions& options = {});
 
 } // namespace spherecut::solvers

@@ -1,0 +1,32 @@
+// Sample points that cover a body and its surface at a fraction of the node spacing: they measure how many nodes a
+// spacing asks for and find the places a filling has missed.
+#pragma once
+
+#include "solvers/nodes.hpp"
+
+namespace spherecut::solvers {
+
+/// A cube of an octree; the samples of all cells together integrate over the body.
+struct VolumeSample {
+  Vector3 point;   // centre, m
+  double spacing;  // h there, m
+  double expected; // inside volume of the cell / h^3
+  bool near_wall;  // the surface may pass through the cell
+};
+
+struct SurfaceSample {
+  Vector3 point;   // centroid of a piece of a triangle of Domain::surface(), m
+  double spacing;  // m
+  double expected; // area of the piece / h^2
+};
+
+/// Cells no larger than `fraction` h, those outside the body left out. Relies on |signed_distance| being no larger than
+/// the true distance. Throws InputError when the body needs more than maximum_nodes.
+std::vector<VolumeSample> sample_volume(const topology::Domain& domain, const SpacingField& spacing, double fraction,
+                                        int maximum_nodes);
+
+/// Pieces no longer than `fraction` h. Throws InputError when the surface needs more than maximum_nodes.
+std::vector<SurfaceSample> sample_surface(const topology::Domain& domain, const SpacingField& spacing, double fraction,
+                                          int maximum_nodes);
+
+} // namespace spherecut::solvers
