@@ -1,5 +1,6 @@
 # Checks of the include lines under -DROOT=folder, run as cmake -P: floors topology <- solvers <- src <- experiments
 # never include upward, and the headers of the first two need the standard library and Eigen alone.
+cmake_minimum_required(VERSION 3.25)
 set(floors topology solvers src experiments)
 set(offences "")
 set(below "")
