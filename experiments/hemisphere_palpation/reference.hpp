@@ -40,4 +40,7 @@ double largest_difference(const HemisphereReference& a, const HemisphereReferenc
 /// 0 <= nu <= 0.45.
 HemisphereReference axisymmetric_hemisphere(double poisson_ratio, double tolerance = 1e-3);
 
+/// The stored table of GetFEM's 27-node bricks for this Poisson ratio (0.3 or 0.45). Throws InputError for others.
+HemisphereReference load_hemisphere_reference(double poisson_ratio);
+
 } // namespace spherecut::experiments

@@ -171,3 +171,18 @@ TEST_CASE("The axisymmetric hemisphere converges to under half a percent in forc
   CHECK_THROWS_AS(reference.displacement(-0.1), InputError);
   CHECK_THROWS_AS(axisymmetric_hemisphere(0.48), InputError);
 }
+
+TEST_CASE("GetFEM's bricks and the axisymmetric elements agree on the hemisphere within half a percent") {
+  for (double nu : {0.3, 0.45}) {
+    const HemisphereReference bricks = load_hemisphere_reference(nu), revolved = axisymmetric_hemisphere(nu);
+    CHECK(bricks.poisson_ratio == nu);
+    CHECK(bricks.force_change < 5e-3);
+    CHECK(bricks.surface_change < 5e-3);
+    CHECK(std::abs(bricks.force / revolved.force - 1) < 5e-3);
+    CHECK(largest_difference(bricks, revolved) < 5e-3);
+    CHECK(largest_difference(revolved, bricks) < 5e-3);
+    CHECK(bricks.angle.size() % 2 == 1);
+    CHECK(bricks.displacement(0.2) == Vector2(0, -1));
+  }
+  CHECK_THROWS_WITH(load_hemisphere_reference(0.2), Catch::Contains("0.3, 0.45"));
+}
