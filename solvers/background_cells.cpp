@@ -12,6 +12,10 @@ namespace spherecut::solvers {
 
 namespace {
 
+/// Halving a cell that is a little too large would cost eight times the points: where the spacing is graded, cells
+/// range from slack / 2 to slack times the size asked for.
+constexpr double slack = 1.35;
+
 /// Part of a box on the inner side of a plane through it, by the distance of its centre: exact for a box cut parallel
 /// to a face, second order otherwise.
 double inside_fraction(double distance, const Vector3& normal, const Vector3& half) {
@@ -25,8 +29,21 @@ class Octree {
       : domain_(domain), nodes_(nodes), options_(options), tree_(nodes.positions) {}
 
   BackgroundCells build() {
+    // Roots as large as the coarsest spacing allows, fitted to the bounding box: a uniform cloud needs no division.
     const BoundingBox box = domain_.bounds();
-    divide(box.lower, box.upper);
+    const double coarsest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
+    std::array<int, 3> roots{};
+    Vector3 size;
+    for (int c = 0; c < 3; ++c) {
+      roots[c] = std::max(1, static_cast<int>(std::ceil(box.extent()[c] / (options_.cell_size * coarsest) - 1e-6)));
+      size[c] = box.extent()[c] / roots[c];
+    }
+    for (int a = 0; a < roots[0]; ++a)
+      for (int b = 0; b < roots[1]; ++b)
+        for (int c = 0; c < roots[2]; ++c) {
+          const Vector3 corner = box.lower + size.cwiseProduct(Vector3(a, b, c));
+          divide(corner, corner + size);
+        }
     return std::move(cells_);
   }
 
@@ -41,7 +58,7 @@ class Octree {
       return;
     const double longest = 2 * half.maxCoeff();
     // A coarse node may be nearest to the centre while fine ones sit in a corner: large cells always divide.
-    if (longest > options_.cell_size * spacing_near(centre) * 1.0001 || holds_finer_node(centre, half, longest)) {
+    if (longest > slack * options_.cell_size * spacing_near(centre) || holds_finer_node(centre, half, longest)) {
       std::array<int, 3> parts{};
       for (int c = 0; c < 3; ++c)
         parts[c] = half[c] > 0.3 * longest ? 2 : 1;
@@ -68,7 +85,7 @@ class Octree {
     tree_.within(centre, half.norm(), found_);
     return std::any_of(found_.begin(), found_.end(), [&](const topology::PointTree::Found& node) {
       return ((nodes_.positions[node.index] - centre).cwiseAbs().array() <= half.array()).all() &&
-             longest > 1.3 * options_.cell_size * nodes_.spacings[node.index];
+             longest > 1.3 * slack * options_.cell_size * nodes_.spacings[node.index];
     });
   }
 
@@ -165,7 +182,8 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
       const Vector3 area = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]);
       const double size = area.norm();
       if (size > 0)
-        points.push_back({centre, area / size, size});
+        for (const Vector3& corner : t)
+          points.push_back({0.5 * (centre + corner), area / size, size / 3});
     }
   }
   return points;

@@ -26,7 +26,7 @@ struct BackgroundOptions {
 BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
                                  const BackgroundOptions& options = {});
 
-/// Points of a quadrature rule over the surface, exact for linear functions on each triangle of the tessellation,
+/// Points of a quadrature rule over the surface, exact for quadratic functions on each triangle of the tessellation,
 /// refined to edges of at most half the local spacing. `weight` is an area, m2.
 struct SurfacePoint {
   Vector3 position;

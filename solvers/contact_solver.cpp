@@ -192,7 +192,7 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
   ContactPatch patch;
   patch.nodes = candidates;
   for (int node : candidates) {
-    patch.rest.push_back(problem.nodes.positions[node]);
+    patch.rest.push_back(body.contact_point(node));
     patch.normals.push_back(problem.nodes.normals[node]);
     patch.spacings.push_back(problem.nodes.spacings[node]);
   }
@@ -203,19 +203,18 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
     // nodal forces, so every unit response carries the field of its own far boundary.
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<Vector3> values;
-      for (const Prescribed& entry : problem.prescribed)
-        values.push_back(half_space_displacement(problem.material, Vector3::Unit(axis), coupling->origin,
-                                                 coupling->inward, problem.nodes.positions[entry.node]));
+      for (const Vector3& point : body.constraint_points())
+        values.push_back(
+            half_space_displacement(problem.material, Vector3::Unit(axis), coupling->origin, coupling->inward, point));
       const Field far = body.prescribed_response(values);
       for (std::size_t c = 0; c < candidates.size(); ++c)
         patch.responses[3 * c + axis].add(1, far);
     }
   }
   const auto restrict_to_patch = [&](const Field& field) {
-    const VectorX all = body.nodal_displacements(field);
     VectorX own(3 * size_of(patch));
     for (int c = 0; c < size_of(patch); ++c)
-      own.segment<3>(3 * c) = all.segment<3>(3 * candidates[c]);
+      own.segment<3>(3 * c) = body.contact_displacement(candidates[c], field);
     return own;
   };
   patch.base_displacement = restrict_to_patch(patch.base);

@@ -40,12 +40,18 @@ struct Problem {
   Material material;
   std::vector<Prescribed> prescribed;
   Loads loads;
+  /// The part of the surface that `prescribed` holds, told point by point. With it the weak form holds the mean over
+  /// each node's share of that part; without it, the nodes themselves.
+  std::function<bool(const Vector3& x, const Vector3& normal)> prescribed_region;
+  /// Prescribed displacement anywhere on that part, m. Null: Prescribed::value, constant over a node's share.
+  std::function<Vector3(const Vector3& x)> prescribed_field;
 };
 
 struct DiscretisationOptions {
   Method method = Method::galerkin;
   double support_radius = 0; // rho, support radius / h; 0: the method's default for this Poisson ratio
   int quadrature = 2;        // Gauss points per direction in a background cell (galerkin)
+  double cell_size = 0.75;   // edge of a background cell in units of h (galerkin)
   int tip_node = -1;         // the tool-tip node of `published`
 };
 
@@ -98,6 +104,14 @@ class Discretisation {
 
   /// Response to prescribed displacements `values` (one per entry of problem().prescribed), with zero loads.
   [[nodiscard]] virtual Field prescribed_response(const std::vector<Vector3>& values) const = 0;
+
+  /// Where the displacement of each prescribed entry acts: its node, or the centroid of its share of the surface.
+  [[nodiscard]] virtual std::vector<Vector3> constraint_points() const = 0;
+
+  /// Where a unit force on a surface node acts, and the displacement conjugate to it: the node's own in `published` and
+  /// `collocation`, the mean over its share of the surface in `galerkin`.
+  [[nodiscard]] virtual Vector3 contact_point(int node) const = 0;
+  [[nodiscard]] virtual Vector3 contact_displacement(int node, const Field& field) const = 0;
 
   /// Displacement of every node, u_h(x_i), 3N.
   [[nodiscard]] virtual VectorX nodal_displacements(const Field& field) const = 0;

@@ -89,6 +89,21 @@ VectorX ElasticBody::nodal_displacements(const Field& field) const {
   return displacements;
 }
 
+std::vector<Vector3> ElasticBody::constraint_points() const {
+  std::vector<Vector3> points;
+  points.reserve(problem_.prescribed.size());
+  for (const Prescribed& entry : problem_.prescribed)
+    points.push_back(problem_.nodes.positions[entry.node]);
+  return points;
+}
+
+Vector3 ElasticBody::contact_displacement(int node, const Field& field) const {
+  Vector3 displacement = Vector3::Zero();
+  for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
+    displacement += supports_.value[k] * field.coefficients.segment<3>(3 * supports_.nodes[k]);
+  return displacement;
+}
+
 PointState ElasticBody::at(const Vector3& x, const Field& field) const {
   thread_local ShapeFunctions shape;
   if (!evaluate(spheres_, x, shape))
@@ -115,7 +130,8 @@ VectorX prescribed_values(const Problem& problem) {
   std::vector<Vector3> values;
   values.reserve(problem.prescribed.size());
   for (const Prescribed& entry : problem.prescribed)
-    values.push_back(entry.value);
+    values.push_back(problem.prescribed_field ? problem.prescribed_field(problem.nodes.positions[entry.node])
+                                              : entry.value);
   return prescribed_values(problem, values);
 }
 

@@ -34,6 +34,9 @@ class ElasticBody : public Discretisation {
   [[nodiscard]] const AssemblyReport& report() const override { return report_; }
   [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
   [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
+  [[nodiscard]] std::vector<Vector3> constraint_points() const override;
+  [[nodiscard]] Vector3 contact_point(int node) const override { return problem_.nodes.positions[node]; }
+  [[nodiscard]] Vector3 contact_displacement(int node, const Field& field) const override;
 
  protected:
   ElasticBody(Problem problem, double rho);

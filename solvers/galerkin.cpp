@@ -1,13 +1,16 @@
 // Method of finite spheres in weak form (Galerkin), the symmetric discretisation.
 //
 // K_IJ = integral over the body of [lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1], g = grad h, by background cells.
-// Displacements are prescribed at nodes through u_h(x_i) = sum_j h_j(x_i) alpha_j, which is not alpha_i: a penalty
-// P = `penalty` E h_i per component adds P h h^T, and the force of the constraint on the body is P (g - u_h(x_i)).
-// The shape functions sum to one, so the rows of K add up to zero and all forces balance to rounding.
+// Displacements are prescribed as means over each held node's share of the surface, m_i(u) = g_i: multipliers constant
+// over each share, so that a constant traction is met exactly (point constraints fail the patch test by their own
+// quadrature of the traction). A penalty P = `penalty` E h_i per component adds P m m^T, and the force of the
+// constraint on the body is P (g - m(u)). Forces of the tool act on the same shares. The shape functions sum to one, so
+// the rows of K add up to zero and all forces balance to rounding.
 #include "solvers/background_cells.hpp"
 #include "solvers/elastic_body.hpp"
 #include "solvers/factorisation.hpp"
 #include "solvers/stiffness_kernel.hpp"
+#include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -42,8 +45,10 @@ class Galerkin final : public ElasticBody {
     const Stopwatch assembly;
     BackgroundOptions background;
     background.gauss = options.quadrature;
+    background.cell_size = options.cell_size;
     cells_ = background_cells(*problem_.domain, problem_.nodes, background);
     evaluate_cells();
+    hold_surface();
     const std::vector<int> order = build_pattern();
     assemble();
     assemble_loads();
@@ -61,7 +66,10 @@ class Galerkin final : public ElasticBody {
   Method method() const override { return Method::galerkin; }
 
   Field solve() const override {
-    const VectorX prescribed = prescribed_values(problem_);
+    VectorX prescribed = prescribed_values(problem_);
+    if (problem_.prescribed_field)
+      for (std::size_t k = 0; k < held_.size(); ++k)
+        prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) = problem_.prescribed_field(held_[k].centroid);
     return field_of(factorisation_->solve(loads_ + constraint_loads(prescribed)), 1, prescribed);
   }
 
@@ -69,7 +77,7 @@ class Galerkin final : public ElasticBody {
     MatrixX right = MatrixX::Zero(report_.unknowns, 3 * static_cast<Eigen::Index>(candidates.size()));
     for (std::size_t c = 0; c < candidates.size(); ++c)
       for (int axis = 0; axis < 3; ++axis)
-        add_point_force(candidates[c], Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
+        add_force(contact_mean(candidates[c]), Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
     const MatrixX solution = factorisation_->solve(right);
     const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
     std::vector<Field> responses;
@@ -84,12 +92,23 @@ class Galerkin final : public ElasticBody {
     return field_of(factorisation_->solve(constraint_loads(prescribed)), 0, prescribed);
   }
 
+  std::vector<Vector3> constraint_points() const override {
+    std::vector<Vector3> points;
+    for (const DisplacementMean& mean : held_)
+      points.push_back(mean.centroid);
+    return points;
+  }
+  Vector3 contact_point(int node) const override { return contact_mean(node).centroid; }
+  Vector3 contact_displacement(int node, const Field& field) const override {
+    return contact_mean(node).of(field.coefficients);
+  }
   std::vector<Vector3> constraint_forces(const Field& field) const override;
   double residual(const Field& field, const std::vector<int>& loaded_nodes,
                   const std::vector<Vector3>& nodal_forces) const override;
 
  private:
   void evaluate_cells();
+  void hold_surface();
   std::vector<int> build_pattern();
   void assemble();
   void assemble_loads();
@@ -97,24 +116,22 @@ class Galerkin final : public ElasticBody {
     return penalty * problem_.material.young_modulus * problem_.nodes.spacings[node];
   }
   template <typename Column>
-  void add_point_force(int node, const Vector3& force, Column&& right) const {
-    for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
-      right.template segment<3>(3 * supports_.nodes[k]) += supports_.value[k] * force;
+  static void add_force(const DisplacementMean& mean, const Vector3& force, Column&& right) {
+    for (std::size_t k = 0; k < mean.nodes.size(); ++k)
+      right.template segment<3>(3 * mean.nodes[k]) += mean.weights[k] * force;
+  }
+  [[nodiscard]] DisplacementMean contact_mean(int node) const {
+    return patches_ ? patches_->mean(node, spheres_, problem_.prescribed_region)
+                    : value_at(spheres_, problem_.nodes.positions[node]);
   }
   [[nodiscard]] VectorX constraint_loads(const VectorX& prescribed) const {
     VectorX right = VectorX::Zero(report_.unknowns);
     for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
-      add_point_force(problem_.prescribed[k].node,
-                      constraint_stiffness(problem_.prescribed[k].node) *
-                          held_part(problem_.prescribed[k], prescribed.segment<3>(3 * static_cast<Eigen::Index>(k))),
-                      right);
+      add_force(held_[k],
+                constraint_stiffness(problem_.prescribed[k].node) *
+                    held_part(problem_.prescribed[k], prescribed.segment<3>(3 * static_cast<Eigen::Index>(k))),
+                right);
     return right;
-  }
-  [[nodiscard]] Vector3 value_at_node(int node, const VectorX& coefficients) const {
-    Vector3 value = Vector3::Zero();
-    for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
-      value += supports_.value[k] * coefficients.segment<3>(3 * supports_.nodes[k]);
-    return value;
   }
   [[nodiscard]] Field field_of(const VectorX& coefficients, double load_factor, const VectorX& prescribed) const {
     Field field{coefficients, {}, load_factor, prescribed};
@@ -123,6 +140,8 @@ class Galerkin final : public ElasticBody {
   }
 
   BackgroundCells cells_;
+  std::unique_ptr<SurfacePatches> patches_;
+  std::vector<DisplacementMean> held_; // one per prescribed entry
   std::vector<CellShapes> shapes_;
   std::vector<int> cells_start_, cells_of_node_;             // compressed rows: (cell, place of the node in it) pairs
   std::vector<int> constraints_start_, constraints_of_node_; // prescribed entries whose support holds the node
@@ -178,6 +197,20 @@ void Galerkin::evaluate_cells() {
   }
 }
 
+void Galerkin::hold_surface() {
+  patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes);
+  std::vector<int> nodes;
+  nodes.reserve(problem_.prescribed.size());
+  for (const Prescribed& entry : problem_.prescribed)
+    nodes.push_back(entry.node);
+  if (problem_.prescribed_region) {
+    held_ = patches_->means(nodes, spheres_, problem_.prescribed_region);
+    return;
+  }
+  for (int node : nodes)
+    held_.push_back(value_at(spheres_, problem_.nodes.positions[node]));
+}
+
 std::vector<int> Galerkin::build_pattern() {
   const int count = problem_.nodes.size();
   cells_start_.assign(count + 1, 0);
@@ -185,9 +218,9 @@ std::vector<int> Galerkin::build_pattern() {
     for (int node : cell.nodes)
       ++cells_start_[node + 1];
   constraints_start_.assign(count + 1, 0);
-  for (const Prescribed& entry : problem_.prescribed)
-    for (int k = supports_.start[entry.node]; k < supports_.start[entry.node + 1]; ++k)
-      ++constraints_start_[supports_.nodes[k] + 1];
+  for (const DisplacementMean& mean : held_)
+    for (int node : mean.nodes)
+      ++constraints_start_[node + 1];
   for (int i = 0; i < count; ++i) {
     cells_start_[i + 1] += cells_start_[i];
     constraints_start_[i + 1] += constraints_start_[i];
@@ -202,11 +235,9 @@ std::vector<int> Galerkin::build_pattern() {
       cells_of_node_[2 * slot + 1] = k;
     }
   next.assign(constraints_start_.begin(), constraints_start_.end() - 1);
-  for (int p = 0; p < std::ssize(problem_.prescribed); ++p) {
-    const int node = problem_.prescribed[p].node;
-    for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
-      constraints_of_node_[next[supports_.nodes[k]]++] = p;
-  }
+  for (int p = 0; p < std::ssize(held_); ++p)
+    for (int node : held_[p].nodes)
+      constraints_of_node_[next[node]++] = p;
 
   column_start_.assign(1, 0);
   column_rows_.clear();
@@ -225,11 +256,9 @@ std::vector<int> Galerkin::build_pattern() {
     for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot)
       for (int i : shapes_[cells_of_node_[2 * slot]].nodes)
         visit(i);
-    for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot) {
-      const int node = problem_.prescribed[constraints_of_node_[slot]].node;
-      for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
-        visit(supports_.nodes[k]);
-    }
+    for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot)
+      for (int i : held_[constraints_of_node_[slot]].nodes)
+        visit(i);
     std::sort(column_rows_.begin() + column_start_.back(), column_rows_.end());
     column_start_.push_back(static_cast<int>(column_rows_.size()));
     full_start.push_back(static_cast<int>(full.size()));
@@ -288,20 +317,13 @@ void Galerkin::assemble() {
     }
     for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot) {
       const Prescribed& entry = problem_.prescribed[constraints_of_node_[slot]];
-      const int first = supports_.start[entry.node], last = supports_.start[entry.node + 1];
-      double own_value = 0;
-      for (int k = first; k < last; ++k)
-        if (supports_.nodes[k] == j)
-          own_value = supports_.value[k];
-      const double factor = constraint_stiffness(entry.node) * own_value;
-      for (int k = first; k < last; ++k) {
-        const int i = supports_.nodes[k];
-        if (i < j)
-          continue;
+      const DisplacementMean& mean = held_[constraints_of_node_[slot]];
+      const std::size_t own = std::lower_bound(mean.nodes.begin(), mean.nodes.end(), j) - mean.nodes.begin();
+      const double factor = constraint_stiffness(entry.node) * mean.weights[own];
+      for (std::size_t k = own; k < mean.nodes.size(); ++k)
         for (int c = 0; c < 3; ++c)
           if (entry.components[c])
-            target[c][3 * place[i] + c] += factor * supports_.value[k];
-      }
+            target[c][3 * place[mean.nodes[k]] + c] += factor * mean.weights[k];
     }
     for (int k = 0; k < rows; ++k)
       place[column_rows_[begin + k]] = -1;
@@ -334,8 +356,7 @@ std::vector<Vector3> Galerkin::constraint_forces(const Field& field) const {
   forces.reserve(problem_.prescribed.size());
   for (std::size_t k = 0; k < problem_.prescribed.size(); ++k) {
     const Prescribed& entry = problem_.prescribed[k];
-    const Vector3 gap =
-        field.prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - value_at_node(entry.node, field.coefficients);
+    const Vector3 gap = field.prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - held_[k].of(field.coefficients);
     forces.emplace_back(constraint_stiffness(entry.node) * held_part(entry, gap));
   }
   return forces;
@@ -345,7 +366,7 @@ double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nod
                           const std::vector<Vector3>& nodal_forces) const {
   VectorX applied = field.load_factor * loads_;
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
-    add_point_force(loaded_nodes[k], nodal_forces[k], applied);
+    add_force(contact_mean(loaded_nodes[k]), nodal_forces[k], applied);
   // The penalty terms stand on both sides; as forces they are of the size of the others.
   const std::vector<Vector3> held = constraint_forces(field);
   VectorX rows = stiffness_.selfadjointView<Eigen::Lower>() * field.coefficients - constraint_loads(field.prescribed);

@@ -50,6 +50,13 @@ Measure measure(const std::vector<Vector3>& polygon) {
   return result;
 }
 
+void append_corners(const std::vector<Vector3>& polygon, const Vector3& node, double spacing,
+                    std::vector<Vector3>& corners, std::vector<int>& start) {
+  for (const Vector3& vertex : polygon)
+    corners.push_back(node + spacing * vertex);
+  start.push_back(static_cast<int>(corners.size()));
+}
+
 /// Clips polygons by phi < 0 and collects the points where they met the curved surface.
 class CurvedClipper {
  public:
@@ -272,9 +279,11 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
     const Vector3 area = face.area * h * h, centroid = x + h * face.centroid;
     if (planar_boundary) {
       cells.boundary.push_back({i, first_plane_id - neighbour, area, centroid});
+      append_corners(polygon.vertices, x, h, cells.boundary_corners, cells.boundary_start);
       closure[i] += area;
     } else if (neighbour > i) {
       cells.faces.push_back({i, neighbour, area, centroid});
+      append_corners(polygon.vertices, x, h, cells.face_corners, cells.face_start);
       closure[i] += area;
       closure[neighbour] -= area;
     }
@@ -285,6 +294,7 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
     for (int iteration = 0; iteration < 2; ++iteration)
       point -= domain.curved_distance(point) * domain.curved_gradient(point);
     cells.boundary.push_back({i, -1, Vector3::Zero(), point});
+    cells.boundary_start.push_back(static_cast<int>(cells.boundary_corners.size()));
   }
 }
 
@@ -309,8 +319,10 @@ CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<d
     }
   // The surface can leave a cell exactly through its edges, without a crossing: closure still tells.
   for (int i = 0; curved && i < count; ++i)
-    if (!on_curve[i] && closure[i].norm() > 1e-9 * spacings[i] * spacings[i])
+    if (!on_curve[i] && closure[i].norm() > 1e-9 * spacings[i] * spacings[i]) {
       cells.boundary.push_back({i, -1, -closure[i], domain.closest_surface_point(nodes[i])});
+      cells.boundary_start.push_back(static_cast<int>(cells.boundary_corners.size()));
+    }
 
   // Volume and centroid by cones from the node over the faces.
   cells.volumes.assign(nodes.size(), 0.0);

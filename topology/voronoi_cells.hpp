@@ -24,6 +24,10 @@ struct BoundaryFace {
 struct CellComplex {
   std::vector<CellFace> faces;
   std::vector<BoundaryFace> boundary;
+  /// Corners of the polygons, m: face f owns face_corners[face_start[f] .. face_start[f+1]), a planar boundary face b
+  /// boundary_corners[boundary_start[b] ..); curved boundary faces own none.
+  std::vector<int> face_start{0}, boundary_start{0};
+  std::vector<Vector3> face_corners, boundary_corners;
   std::vector<double> volumes;    // m3, per node
   std::vector<Vector3> centroids; // m, of each cell
   int empty_cells = 0;            // nodes without volume (outside the body or doubled)

@@ -1,0 +1,44 @@
+// Shares of the surface: which part of the skin belongs to which node, and the mean displacement over it.
+#pragma once
+
+#include "solvers/background_cells.hpp"
+#include "solvers/discretisation.hpp"
+#include "solvers/shape_functions.hpp"
+
+namespace spherecut::solvers {
+
+/// A linear functional of the displacement with unit total weight: sum_k weight[k] alpha_{node[k]}.
+struct DisplacementMean {
+  std::vector<int> nodes; // ascending
+  std::vector<double> weights;
+  Vector3 centroid = Vector3::Zero(); // m, of the share
+  double area = 0;                    // m2, 0 when the mean is the value at a point
+  [[nodiscard]] Vector3 of(const VectorX& coefficients) const;
+};
+
+/// Value at one point. Throws NumericalError when no sound support covers it.
+DisplacementMean value_at(const Spheres& spheres, const Vector3& x);
+
+/// The surface, point by point, with the surface node that each point belongs to (the nearest one).
+class SurfacePatches {
+ public:
+  SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes);
+
+  /// Mean over the share of `node` of the surface outside `held` (null: all of it); the node itself when it has no
+  /// share.
+  [[nodiscard]] DisplacementMean mean(int node, const Spheres& spheres,
+                                      const std::function<bool(const Vector3&, const Vector3&)>& held = nullptr) const;
+
+  /// Means over the parts of `held` that belong to each of `nodes`; a point of `held` nearest to none of them goes to
+  /// the nearest of them, so that the whole of `held` is shared out.
+  [[nodiscard]] std::vector<DisplacementMean>
+  means(const std::vector<int>& nodes, const Spheres& spheres,
+        const std::function<bool(const Vector3&, const Vector3&)>& held) const;
+
+ private:
+  const NodeCloud& nodes_;
+  std::vector<SurfacePoint> points_;
+  std::vector<std::vector<int>> points_of_node_;
+};
+
+} // namespace spherecut::solvers
