@@ -63,11 +63,38 @@ std::vector<double> band_limits(const std::vector<VolumeSample>& samples) {
   return limits;
 }
 
+double count(const topology::Domain& domain, const SharpFeatures& features, const SpacingField& spacing) {
+  constexpr int limit = 20'000'000;
+  double volume = 0, area = 0, edges = 0; // in units of h^3, h^2, h
+  for (const VolumeSample& sample : sample_volume(domain, spacing, count_fraction, limit))
+    volume += sample.expected;
+  for (const SurfaceSample& sample : sample_surface(domain, spacing, count_fraction, limit))
+    area += sample.expected;
+  const topology::SurfaceMesh& mesh = domain.surface();
+  for (const SharpCurve& curve : features.curves) {
+    for (int s = 0; s + 1 < std::ssize(curve.vertices); ++s) {
+      const Vector3 &a = mesh.vertices[curve.vertices[s]], &b = mesh.vertices[curve.vertices[s + 1]];
+      edges += (b - a).norm() / spacing(0.5 * (a + b));
+    }
+    edges -= curve.closed ? 0 : 1;
+  }
+  // A node on a face, an edge, a corner fills 1/2, 1/4, 1/8 of a cell. With every face and edge filled to its own
+  // density that leaves half a node per h^2 of surface, a quarter per h of edge, half per corner beyond the volume
+  // (exact for a cubic lattice).
+  return volume_density * volume + 0.5 * surface_density * area + 0.25 * std::max(edges, 0.0) +
+         0.5 * static_cast<double>(features.corners.size());
+}
+
 } // namespace
 
 SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& nodes) {
+  return inspect_filling(domain, options, nodes,
+                         sample_volume(domain, options.spacing, report_fraction, options.maximum_nodes));
+}
+
+SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& nodes,
+                               const std::vector<VolumeSample>& samples) {
   const SpacingField& spacing = options.spacing;
-  const std::vector<VolumeSample> samples = sample_volume(domain, spacing, report_fraction, options.maximum_nodes);
   if (samples.empty())
     throw InputError("sprinkle: the body has no volume");
   const std::vector<double> limits = band_limits(samples);
@@ -134,26 +161,7 @@ void require_filled(const SprinkleReport& report, double minimum_density) {
 }
 
 double expected_count(const topology::Domain& domain, const SpacingField& spacing, double sharp_edge_degrees) {
-  constexpr int limit = 20'000'000;
-  double volume = 0, area = 0, edges = 0; // in units of h^3, h^2, h
-  for (const VolumeSample& sample : sample_volume(domain, spacing, count_fraction, limit))
-    volume += sample.expected;
-  for (const SurfaceSample& sample : sample_surface(domain, spacing, count_fraction, limit))
-    area += sample.expected;
-  const topology::SurfaceMesh& mesh = domain.surface();
-  const SharpFeatures features = find_sharp_features(mesh, sharp_edge_degrees);
-  for (const SharpCurve& curve : features.curves) {
-    for (int s = 0; s + 1 < std::ssize(curve.vertices); ++s) {
-      const Vector3 &a = mesh.vertices[curve.vertices[s]], &b = mesh.vertices[curve.vertices[s + 1]];
-      edges += (b - a).norm() / spacing(0.5 * (a + b));
-    }
-    edges -= curve.closed ? 0 : 1;
-  }
-  // A node on a face, an edge, a corner fills 1/2, 1/4, 1/8 of a cell. With every face and edge filled to its own
-  // density that leaves half a node per h^2 of surface, a quarter per h of edge, half per corner beyond the volume
-  // (exact for a cubic lattice).
-  return volume_density * volume + 0.5 * surface_density * area + 0.25 * std::max(edges, 0.0) +
-         0.5 * static_cast<double>(features.corners.size());
+  return count(domain, find_sharp_features(domain.surface(), sharp_edge_degrees), spacing);
 }
 
 SpacingField spacing_for_count(const topology::Domain& domain, const SpacingField& shape, int target,
@@ -167,35 +175,46 @@ SpacingField spacing_for_count(const topology::Domain& domain, const SpacingFiel
                                  "fine <= coarse",
                                  shape.fine, shape.coarse, volume));
   SpacingField scaled = shape;
+  const SharpFeatures features = find_sharp_features(domain.surface(), options.sharp_edge_degrees);
   const auto count_at = [&](double log_scale) {
     scaled.fine = std::exp(log_scale) * shape.fine;
     scaled.coarse = std::exp(log_scale) * shape.coarse;
-    return expected_count(domain, scaled, options.sharp_edge_degrees) + static_cast<double>(options.seeds.size());
+    return count(domain, features, scaled) + static_cast<double>(options.seeds.size());
   };
   // Newton's method in logarithms with the secant slope; the count falls no faster than scale^-3, so that starting from
   // too few nodes never overshoots by much.
-  const auto solve = [&](double log_scale, double wanted) {
-    double count = count_at(log_scale), slope = -3;
-    for (int step = 0; step < 30 && std::abs(count / wanted - 1) > 2e-3; ++step) {
-      const double change = std::clamp(std::log(wanted / count) / slope, -0.7, 0.7);
+  const auto solve = [&](double log_scale, double wanted, double tolerance) {
+    double reached = count_at(log_scale), slope = -3;
+    for (int step = 0; step < 30 && std::abs(reached / wanted - 1) > tolerance; ++step) {
+      const double change = std::clamp(std::log(wanted / reached) / slope, -0.7, 0.7);
       const double next = count_at(log_scale + change);
       if (std::abs(change) > 1e-9)
-        slope = std::clamp(std::log(next / count) / change, -3.0, -0.3);
+        slope = std::clamp(std::log(next / reached) / change, -3.0, -0.3);
       log_scale += change;
-      count = next;
+      reached = next;
     }
-    if (!(std::abs(count / wanted - 1) < 0.05))
+    if (!(std::abs(reached / wanted - 1) < 0.05))
       throw InputError(
-          fmt::format("spacing_for_count: no spacing gives {} nodes; the nearest count is {:.0f}", target, count));
+          fmt::format("spacing_for_count: no spacing gives {} nodes; the nearest count is {:.0f}", target, reached));
     return log_scale;
   };
-  double log_scale = solve(std::log(std::cbrt(volume / target) / shape.fine), target);
-  SprinkleOptions trial = options; // one filling shows by how much the estimate is off for this body
-  trial.spacing = scaled;
+  // Trial fillings show by how much the estimate is off for this body; the best is taken.
+  SprinkleOptions trial = options;
   trial.minimum_density = 0;
-  const double made = sprinkle(domain, trial).nodes.size();
-  solve(log_scale, target * target / made);
-  return scaled;
+  SpacingField best = shape;
+  double smallest_miss = std::numeric_limits<double>::infinity(), wanted = target;
+  double log_scale = std::log(std::cbrt(volume / target) / shape.fine);
+  for (int attempt = 0; attempt < 3 && smallest_miss > 0.01 * target; ++attempt) {
+    log_scale = solve(log_scale, wanted, 0.003);
+    trial.spacing = scaled;
+    const double made = sprinkle(domain, trial).nodes.size();
+    if (std::abs(made - target) < smallest_miss) {
+      smallest_miss = std::abs(made - target);
+      best = scaled;
+    }
+    wanted *= target / made;
+  }
+  return best;
 }
 
 } // namespace spherecut::solvers

@@ -47,7 +47,7 @@ class VolumeSampler {
     const double cells = size / h;
     expected_ += filled * cells * cells * cells;
     refuse_above(expected_, maximum_nodes_, spacing_);
-    samples_.push_back({centre, h, filled * cells * cells * cells, !inside});
+    samples_.push_back({centre, h, filled * cells * cells * cells});
   }
 
   std::vector<VolumeSample> take() { return std::move(samples_); }

@@ -11,7 +11,6 @@ struct VolumeSample {
   Vector3 point;   // centre, m
   double spacing;  // h there, m
   double expected; // inside volume of the cell / h^3
-  bool near_wall;  // the surface may pass through the cell
 };
 
 struct SurfaceSample {
@@ -28,5 +27,9 @@ std::vector<VolumeSample> sample_volume(const topology::Domain& domain, const Sp
 /// Pieces no longer than `fraction` h. Throws InputError when the surface needs more than maximum_nodes.
 std::vector<SurfaceSample> sample_surface(const topology::Domain& domain, const SpacingField& spacing, double fraction,
                                           int maximum_nodes);
+
+/// inspect_filling with the volume samples given (cells of half a spacing).
+SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& nodes,
+                               const std::vector<VolumeSample>& samples);
 
 } // namespace spherecut::solvers

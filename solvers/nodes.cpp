@@ -26,11 +26,12 @@ namespace {
 // and left out: it raised the mean nearest distance by 2 % and widened its spread.
 constexpr double front_step = 0.93;
 constexpr double front_crowding = 0.87; // below: a candidate is refused
-constexpr double sweep_crowding = 0.92; // above: a place that the front has missed
-constexpr double kept_crowding = 0.7;   // between nodes that are given: corners, edges, previous nodes
+constexpr double sweep_crowding = 0.88; // above: a place that the front has missed
+constexpr double kept_crowding = 0.7;   // between corners and edge nodes, and between previous nodes
 constexpr double sweep_fraction = 0.5;
 constexpr int surface_candidates = 14;
 constexpr int interior_candidates = 20;
+constexpr double grown_crowding = 0.8; // between previous nodes where h has grown
 // resprinkle: the range of placed / wanted spacing in which a node is kept.
 constexpr double kept_finest = 0.75, kept_coarsest = 1.1;
 
@@ -74,21 +75,20 @@ class Filler {
       : domain_(domain), options_(options), spacing_(options.spacing),
         grid_(options.spacing.centres.empty() ? options.spacing.coarse : options.spacing.fine, options.spacing.slope),
         random_(options.random_seed), directions_(spiral_directions(interior_candidates)),
-        features_(find_sharp_features(domain.surface(), options.sharp_edge_degrees)) {}
+        features_(find_sharp_features(domain.surface(), options.sharp_edge_degrees)) {
+    volume_samples_ = sample_volume(domain, spacing_, sweep_fraction, options.maximum_nodes);
+  }
 
   void place_seeds();
   void keep(const NodeCloud& previous);
   void place_edges();
-  /// Fronts start from nodes first.. on.
-  void fill_surface(int first);
-  void fill_interior(int first);
+  /// Fronts start from all nodes present, after keep() from those alone around which something has changed.
+  void fill_surface();
+  void fill_interior();
 
   [[nodiscard]] int size() const { return nodes_.size(); }
-  NodeCloud take_nodes() { return std::move(nodes_); }
-  std::vector<int> take_kept() {
-    kept_from_.resize(nodes_.size(), -1);
-    return std::move(kept_from_);
-  }
+  /// The nodes, where they were kept from, and the report; throws when they are too few or a zone is under-filled.
+  Sprinkling finish();
 
  private:
   void add(const Vector3& x, double h, NodeKind kind, const Vector3& normal);
@@ -100,8 +100,9 @@ class Filler {
   void place_along(const SharpCurve& curve);
   /// The exact sharp curve near point x of a mesh edge.
   [[nodiscard]] Vector3 onto_edge(const Vector3& x, const SharpCurve& curve, int segment) const;
-  void surface_front(int node);
-  void interior_front(int node);
+  [[nodiscard]] std::vector<int> front_starts() const;
+  void surface_front(std::vector<int> front);
+  void interior_front(std::vector<int> front);
 
   const topology::Domain& domain_;
   const SprinkleOptions& options_;
@@ -109,6 +110,8 @@ class Filler {
   NodeGrid grid_;
   NodeCloud nodes_;
   std::vector<int> kept_from_;
+  std::vector<bool> settled_; // kept nodes around which nothing has changed
+  std::vector<VolumeSample> volume_samples_;
   std::mt19937_64 random_;
   std::vector<Vector3> directions_;
   SharpFeatures features_;
@@ -198,14 +201,38 @@ void Filler::keep(const NodeCloud& previous) {
         is_seed[j] = true;
         break;
       }
+  for (int s = 0; s < size(); ++s)
+    settled_.push_back(kept_from_[s] >= 0 && previous.spacings[kept_from_[s]] == nodes_.spacings[s]);
+  std::vector<int> removed;
   for (int j = 0; j < previous.size(); ++j) {
+    if (is_seed[j])
+      continue;
     const Vector3& x = previous.positions[j];
     const double h = spacing_(x), ratio = previous.spacings[j] / h;
-    if (is_seed[j] || ratio < kept_finest || ratio > kept_coarsest || grid_.crowded(x, h, kept_crowding))
+    const bool grown = ratio < 1;
+    if (ratio < kept_finest || ratio > kept_coarsest || grid_.crowded(x, h, grown ? grown_crowding : kept_crowding) ||
+        (grown && previous.kinds[j] == NodeKind::interior &&
+         domain_.signed_distance(x) > -options_.wall_clearance * h)) {
+      removed.push_back(j);
       continue;
+    }
     add(x, h, previous.kinds[j], previous.normals[j]);
     kept_from_.push_back(j);
+    settled_.push_back(ratio == 1);
   }
+  for (int j : removed) {
+    const Vector3& x = previous.positions[j];
+    const double h = spacing_(x);
+    grid_.for_each_within(x, h, 2 * h, [&](int i, double) { settled_[i] = false; });
+  }
+}
+
+std::vector<int> Filler::front_starts() const {
+  std::vector<int> starts;
+  for (int i = 0; i < size(); ++i)
+    if (i >= std::ssize(settled_) || !settled_[i])
+      starts.push_back(i);
+  return starts;
 }
 
 Vector3 Filler::onto_edge(const Vector3& x, const SharpCurve& curve, int segment) const {
@@ -286,8 +313,9 @@ void Filler::place_edges() {
 
 // ---- fronts
 
-void Filler::surface_front(int first) {
-  for (int i = first; i < size(); ++i) {
+void Filler::surface_front(std::vector<int> front) {
+  for (std::size_t next = 0; next < front.size(); ++next) {
+    const int i = front[next];
     if (nodes_.kinds[i] == NodeKind::interior)
       continue;
     const Vector3 centre = nodes_.positions[i], n = nodes_.normals[i];
@@ -312,12 +340,13 @@ void Filler::surface_front(int first) {
       if (distance > 1.1 * std::max(h, nodes_.spacings[i]) || grid_.crowded(x, h, front_crowding))
         continue;
       add(x, h, NodeKind::surface, domain_.normal(x));
+      front.push_back(size() - 1);
     }
   }
 }
 
-void Filler::fill_surface(int first) {
-  surface_front(first);
+void Filler::fill_surface() {
+  surface_front(front_starts());
   for (const SurfaceSample& sample : sample_surface(domain_, spacing_, sweep_fraction, options_.maximum_nodes)) {
     if (grid_.crowded(sample.point, sample.spacing, sweep_crowding))
       continue;
@@ -326,12 +355,13 @@ void Filler::fill_surface(int first) {
     if (grid_.crowded(x, h, sweep_crowding))
       continue;
     add(x, h, NodeKind::surface, domain_.normal(x));
-    surface_front(size() - 1);
+    surface_front({size() - 1});
   }
 }
 
-void Filler::interior_front(int first) {
-  for (int i = first; i < size(); ++i) {
+void Filler::interior_front(std::vector<int> front) {
+  for (std::size_t next = 0; next < front.size(); ++next) {
+    const int i = front[next];
     const Vector3 centre = nodes_.positions[i], n = nodes_.normals[i];
     const Matrix3 rotation = random_rotation();
     for (const Vector3& fixed : directions_) {
@@ -351,28 +381,33 @@ void Filler::interior_front(int first) {
       if (grid_.crowded(x, h, front_crowding) || domain_.signed_distance(x) > -options_.wall_clearance * h)
         continue;
       add(x, h, NodeKind::interior, Vector3::Zero());
+      front.push_back(size() - 1);
     }
   }
 }
 
-void Filler::fill_interior(int first) {
-  interior_front(first);
-  for (const VolumeSample& sample : sample_volume(domain_, spacing_, sweep_fraction, options_.maximum_nodes)) {
-    const auto& [x, h, expected, near_wall] = sample;
+void Filler::fill_interior() {
+  interior_front(front_starts());
+  for (const auto& [x, h, expected] : volume_samples_) {
     if (grid_.crowded(x, h, sweep_crowding) || domain_.signed_distance(x) > -options_.wall_clearance * h)
       continue;
     add(x, h, NodeKind::interior, Vector3::Zero());
-    interior_front(size() - 1);
+    interior_front({size() - 1});
   }
 }
 
-Sprinkling finish(const topology::Domain& domain, const SprinkleOptions& options, Sprinkling result) {
-  if (result.nodes.size() < 4)
+Sprinkling Filler::finish() {
+  if (size() < 4)
     throw InputError(fmt::format("sprinkle: only {} nodes fit into the body at spacings of {} to {} m; at least 4 are "
                                  "needed",
-                                 result.nodes.size(), options.spacing.fine, options.spacing.coarse));
-  result.report = inspect_filling(domain, options, result.nodes);
-  require_filled(result.report, options.minimum_density);
+                                 size(), spacing_.fine, spacing_.coarse));
+  Sprinkling result;
+  result.report = inspect_filling(domain_, options_, nodes_, volume_samples_);
+  require_filled(result.report, options_.minimum_density);
+  if (!kept_from_.empty())
+    kept_from_.resize(nodes_.size(), -1);
+  result.nodes = std::move(nodes_);
+  result.kept_from = std::move(kept_from_);
   return result;
 }
 
@@ -401,11 +436,9 @@ Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& optio
   Filler filler(domain, options);
   filler.place_seeds();
   filler.place_edges();
-  filler.fill_surface(0);
-  filler.fill_interior(0);
-  Sprinkling result;
-  result.nodes = filler.take_nodes();
-  return finish(domain, options, std::move(result));
+  filler.fill_surface();
+  filler.fill_interior();
+  return filler.finish();
 }
 
 Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& previous) {
@@ -413,14 +446,10 @@ Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& opt
   Filler filler(domain, options);
   filler.place_seeds();
   filler.keep(previous);
-  const int kept = filler.size();
   filler.place_edges();
-  filler.fill_surface(kept);
-  filler.fill_interior(kept);
-  Sprinkling result;
-  result.nodes = filler.take_nodes();
-  result.kept_from = filler.take_kept();
-  return finish(domain, options, std::move(result));
+  filler.fill_surface();
+  filler.fill_interior();
+  return filler.finish();
 }
 
 } // namespace spherecut::solvers

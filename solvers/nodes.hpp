@@ -83,9 +83,11 @@ Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& optio
 
 /// The same after the fine zone has moved (the tool slides): the new seeds first, then every node of `previous` that
 /// still fits, in its order and with identical position, then new nodes in the gaps. A node fits when the spacing it
-/// was placed with is at most 25 % below and 10 % above the new one, and its distance to every node kept before it is
-/// at least 0.7 of their mean spacing. A seed that coincides with a previous node counts as kept. With unchanged
-/// options the result is the previous cloud, bit for bit. Throws as sprinkle does.
+/// was placed with is at most 25 % below and 10 % above the one wanted now (coarser is the tighter limit because
+/// spacing too coarse by 10 % already costs a quarter of the density), when no node kept before it is nearer than 0.7
+/// of their mean spacing, 0.82 where the spacing has grown, and when it still keeps clear of the wall. A seed that
+/// coincides with a previous node counts as kept. With unchanged options the result is the previous cloud, bit for bit.
+/// Throws as sprinkle does.
 Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& previous);
 
 /// Nearest-neighbour distance and density of a cloud per zone of h; options.seeds are its first nodes.

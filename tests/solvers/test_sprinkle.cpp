@@ -29,11 +29,13 @@ SprinkleOptions graded_to_pole(double slope) {
   return options;
 }
 
+/// Smallest distance of node i to another, in units of the mean spacing of the two.
 double brute_nearest(const NodeCloud& nodes, int i) {
   double best = std::numeric_limits<double>::infinity();
   for (int j = 0; j < nodes.size(); ++j)
     if (j != i)
-      best = std::min(best, (nodes.positions[j] - nodes.positions[i]).norm());
+      best = std::min(best,
+                      2 * (nodes.positions[j] - nodes.positions[i]).norm() / (nodes.spacings[j] + nodes.spacings[i]));
   return best;
 }
 
@@ -62,7 +64,7 @@ void check_cloud(const topology::Domain& domain, const SprinkleOptions& options,
       wrong += !(std::abs(distance) <= tolerance) || !(std::abs(nodes.normals[i].norm() - 1) < 1e-12) ||
                !(domain.signed_distance(nodes.positions[i] + 0.01 * h * nodes.normals[i]) > 0);
     if (i >= std::ssize(options.seeds))
-      crowded += brute_nearest(nodes, i) < 0.7 * h;
+      crowded += brute_nearest(nodes, i) < 0.7;
   }
   CHECK(wrong == 0);
   CHECK(crowded == 0);
@@ -197,6 +199,19 @@ TEST_CASE("A cylinder and a body without any edge are filled") {
   check_cloud(*cylinder, smooth, edgeless);
 }
 
+TEST_CASE("An organ given by its triangles is filled as the exact body is") {
+  const auto organ = topology::make_organ_domain(topology::make_cylinder(0.05, 0.1, 0.01), 0.004);
+  const SprinkleOptions options = uniform(0.01);
+  const Sprinkling sprinkling = sprinkle(*organ, options);
+  check_cloud(*organ, options, sprinkling);
+  const Sprinkling exact = sprinkle(*topology::make_cylinder_domain(0.05, 0.1, 0.01), options);
+  CHECK(sprinkling.report.edge_nodes == exact.report.edge_nodes);
+  CHECK(sprinkling.nodes.size() == Approx(exact.nodes.size()).epsilon(0.05));
+  REQUIRE(sprinkling.report.zones.size() == 1);
+  CHECK(sprinkling.report.zones[0].density > 1);
+  CHECK(sprinkling.report.zones[0].density < 1.15);
+}
+
 TEST_CASE("The same random seed gives the same bits and another one other nodes") {
   const auto hemisphere = topology::make_hemisphere_domain(0.1, 0.02);
   SprinkleOptions options = graded_to_pole(0.4);
@@ -226,6 +241,72 @@ TEST_CASE("Seeds come first, unmoved, and others keep away from them") {
   }
   CHECK((sprinkling.nodes.normals[0] - Vector3::UnitZ()).norm() < 1e-12);
   CHECK((sprinkling.nodes.normals[25] - Vector3(1, 0, 1).normalized()).norm() < 1e-9);
+}
+
+TEST_CASE("A sprinkling repeated without a move is the same cloud") {
+  const auto hemisphere = topology::make_hemisphere_domain(0.1, 0.02);
+  SprinkleOptions options = graded_to_pole(0.3);
+  for (int k = 0; k < 8; ++k) {
+    const double angle = 2 * std::numbers::pi * k / 8;
+    for (double r : {0.009, 0.012}) {
+      const Vector3 x = Vector3(r * std::cos(angle), r * std::sin(angle), 0.1).normalized() * 0.1;
+      options.seeds.push_back({x, NodeKind::surface});
+    }
+  }
+  const Sprinkling first = sprinkle(*hemisphere, options);
+  CHECK(first.kept_from.empty());
+  const Sprinkling again = resprinkle(*hemisphere, options, first.nodes);
+  require_same_bits(first.nodes, again.nodes);
+  REQUIRE(std::ssize(again.kept_from) == first.nodes.size());
+  for (int i = 0; i < first.nodes.size(); ++i)
+    CHECK(again.kept_from[i] == i);
+}
+
+TEST_CASE("A small slide of the fine zone keeps most nodes and fills what it leaves") {
+  const auto hemisphere = topology::make_hemisphere_domain(0.1, 0.01);
+  SprinkleOptions options = graded_to_pole(0.3);
+  NodeCloud previous = sprinkle(*hemisphere, options).nodes;
+  for (int step = 1; step <= 5; ++step) { // 6 mm, one fine spacing, each
+    const double angle = 0.06 * step;
+    options.spacing.centres = {{0.1 * std::sin(angle), 0, 0.1 * std::cos(angle)}};
+    const Sprinkling slid = resprinkle(*hemisphere, options, previous);
+    INFO("step " << step);
+    check_cloud(*hemisphere, options, slid);
+    for (const SprinkleZone& zone : slid.report.zones) {
+      CHECK(zone.density > 0.85);
+      CHECK(zone.density < 1.35);
+      CHECK(zone.nearest_min >= 0.7);
+      CHECK(zone.nearest_median > 0.8);
+    }
+    REQUIRE(std::ssize(slid.kept_from) == slid.nodes.size());
+    int kept = 0, last = -1, wrong = 0;
+    for (int i = 0; i < slid.nodes.size(); ++i)
+      if (const int from = slid.kept_from[i]; from >= 0) {
+        wrong += slid.nodes.positions[i] != previous.positions[from] || from <= last;
+        last = from;
+        ++kept;
+      }
+    CHECK(wrong == 0);
+    CHECK(kept > 0.6 * previous.size());
+    CHECK(kept < previous.size());
+    previous = slid.nodes;
+  }
+}
+
+TEST_CASE("A far move of the fine zone leaves no trace of the old one") {
+  const auto box = topology::make_box_domain({0, 0, 0}, {0.1, 0.05, 0.05}, 0.01);
+  SprinkleOptions options;
+  options.spacing = {0.004, 0.012, 0.3, 0.005, 1.5, {{0.02, 0.025, 0.05}}};
+  const NodeCloud previous = sprinkle(*box, options).nodes;
+  options.spacing.centres = {{0.08, 0.025, 0.05}};
+  const Sprinkling moved = resprinkle(*box, options, previous);
+  check_cloud(*box, options, moved);
+  int stale = 0;
+  for (int i = 0; i < moved.nodes.size(); ++i)
+    stale += moved.nodes.positions[i].x() < 0.04 && moved.nodes.spacings[i] < 0.008;
+  CHECK(stale == 0);
+  const int fresh = sprinkle(*box, options).nodes.size();
+  CHECK(std::abs(moved.nodes.size() - fresh) < 0.1 * fresh);
 }
 
 TEST_CASE("An emptied zone is reported and refused") {
