@@ -11,6 +11,7 @@
 
 namespace spherecut::solvers {
 
+using shape_kernel::evaluate_support;
 using shape_kernel::Kernel;
 using shape_kernel::Support;
 
@@ -79,33 +80,6 @@ void resize(ShapeFunctions& out, int n, bool second) {
     array->resize(second ? n : 0);
 }
 
-// Shape functions on a given support, in place of what `out` held. False when the support is not sound.
-bool evaluate_support(const Kernel& kernel, const Support& support, Basis basis, bool second, double worst_condition,
-                      ShapeFunctions& out) {
-  const int n = support.count;
-  if (n < basis_size(basis))
-    return false;
-  if (basis == Basis::linear) {
-    const int padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
-    resize(out, padded, second);
-    shape_kernel::LinearOutput output{out.value.data(), out.dx.data(), out.dy.data(), out.dz.data(), {}};
-    if (second) {
-      output.second = {out.dxx.data(), out.dyy.data(), out.dzz.data(), out.dxy.data(), out.dxz.data(), out.dyz.data()};
-      out.moment_condition = kernel.evaluate_linear_second(support, output);
-    } else {
-      out.moment_condition = kernel.evaluate_linear(support, output);
-    }
-    resize(out, n, second);
-  } else {
-    resize(out, n, second);
-    evaluate_quadratic(support, second, out);
-  }
-  if (!(out.moment_condition <= worst_condition))
-    return false;
-  out.nodes.assign(support.ids, support.ids + n);
-  return true;
-}
-
 // Tries the support of x with all radii grown step by step. Rare: every sphere is looked at.
 bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
   SupportMemory memory(spheres.size());
@@ -154,6 +128,32 @@ void check(const std::vector<Vector3>& centres, const std::vector<double>& spaci
 }
 
 } // namespace
+
+bool shape_kernel::evaluate_support(const Kernel& kernel, const Support& support, Basis basis, bool second,
+                                    double worst_condition, ShapeFunctions& out) {
+  const int n = support.count;
+  if (n < basis_size(basis))
+    return false;
+  if (basis == Basis::linear) {
+    const int padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
+    resize(out, padded, second);
+    shape_kernel::LinearOutput output{out.value.data(), out.dx.data(), out.dy.data(), out.dz.data(), {}};
+    if (second) {
+      output.second = {out.dxx.data(), out.dyy.data(), out.dzz.data(), out.dxy.data(), out.dxz.data(), out.dyz.data()};
+      out.moment_condition = kernel.evaluate_linear_second(support, output);
+    } else {
+      out.moment_condition = kernel.evaluate_linear(support, output);
+    }
+    resize(out, n, second);
+  } else {
+    resize(out, n, second);
+    evaluate_quadratic(support, second, out);
+  }
+  if (!(out.moment_condition <= worst_condition))
+    return false;
+  out.nodes.assign(support.ids, support.ids + n);
+  return true;
+}
 
 double quartic_spline(double s) {
   if (s >= 1)

@@ -45,6 +45,11 @@ const Kernel* avx512();
 /// The widest kernel this machine can run.
 const Kernel& dispatched();
 
+/// Shape functions on a given support, in place of what `out` held; allocates only where the arrays of `out` are too
+/// small. False when the support has fewer nodes than basis functions or is worse conditioned than allowed.
+bool evaluate_support(const Kernel& kernel, const Support& support, Basis basis, bool second, double worst_condition,
+                      ShapeFunctions& out);
+
 /// Does what solvers::evaluate does for the linear basis, with a given kernel.
 bool evaluate_with(const Kernel& kernel, const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
 

@@ -1,6 +1,8 @@
 #include "solvers/published.hpp"
 
+#include "solvers/published_step.hpp"
 #include "tests/support/finite_differences.hpp"
+#include "tests/support/tip_pattern.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/LU>
@@ -259,4 +261,65 @@ TEST_CASE("The published scheme refuses problems it cannot solve", "[published]"
   tipped.problem.prescribed.erase(tipped.problem.prescribed.begin(), tipped.problem.prescribed.end() - 1);
   CHECK_THROWS_WITH(make_published(tipped.problem, tipped.options), Catch::Contains("nothing but tip"));
   CHECK_THROWS_AS(tip_stiffness(*make_published(clamped_box(4, 8), {Method::published})), InputError);
+}
+
+TEST_CASE("The real-time step gives the force of the general scheme", "[published]") {
+  const double spacing = 0.005;
+  const tests::TipPattern pattern = tests::tip_pattern(spacing);
+  REQUIRE(pattern.nodes.size() == 34);
+  const Material material{8000, 0.3, 1000};
+  const Vector3 normal = Vector3(0.2, -0.4, 0.8).normalized(), contact(0.1, 0.2, -0.3);
+  const Vector3 displacement(1e-3, 5e-4, -2e-3);
+  NodeCloud placed = pattern.nodes;
+  PublishedStep published(34, material);
+  // The step before this one, on another cloud, must leave nothing behind.
+  REQUIRE(published.step(placed, pattern.held, 0, displacement).status == StepStatus::solved);
+  tests::place(pattern, contact, normal, placed);
+  const PublishedStepResult result = published.step(placed, pattern.held, 0, displacement);
+  REQUIRE(result.status == StepStatus::solved);
+
+  Problem problem;
+  problem.nodes = placed;
+  problem.material = material;
+  for (int i = 0; i < 34; ++i)
+    if (pattern.held[i] != 0)
+      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  problem.prescribed.push_back({0, {true, true, true}, displacement});
+  DiscretisationOptions options;
+  options.tip_node = 0;
+  const auto body = make_published(problem, options);
+  REQUIRE(body->report().grown_supports == 0);
+  const PublishedTip tip = tip_stiffness(*body);
+  CHECK((result.stiffness - tip.stiffness).norm() < 1e-9 * tip.stiffness.norm());
+  CHECK((result.force - tip.stiffness * displacement).norm() < 1e-9 * result.force.norm());
+  CHECK(result.worst_moment_condition == Approx(body->report().worst_moment_condition).epsilon(1e-6));
+  const Field field = body->solve();
+  for (int i = 0; i < 34; ++i) {
+    Vector3 moved = Vector3::Zero();
+    for (int axis = 0; axis < 3; ++axis)
+      moved += displacement[axis] * published.response(i, axis);
+    CHECK((moved - field.coefficients.segment<3>(3 * i)).norm() < 1e-9 * displacement.norm());
+  }
+}
+
+TEST_CASE("The real-time step reports what it cannot solve", "[published]") {
+  const tests::TipPattern pattern = tests::tip_pattern(0.005);
+  PublishedStep published(34, {8000, 0.3, 1000});
+  const Vector3 displacement(0, 0, -1e-3);
+  CHECK(published.step(pattern.nodes, pattern.held, 34, displacement).status == StepStatus::wrong_size);
+  CHECK(published.step(pattern.nodes, std::span(pattern.held).first(33), 0, displacement).status ==
+        StepStatus::wrong_size);
+  NodeCloud stray = pattern.nodes;
+  stray.positions[20] = Vector3(1, 1, 1);
+  const PublishedStepResult apart = published.step(stray, pattern.held, 0, displacement);
+  CHECK(apart.status == StepStatus::unsound_support);
+  CHECK(apart.node == 20);
+  // Two nodes with the same rows.
+  NodeCloud twins = pattern.nodes;
+  twins.positions[5] = twins.positions[4];
+  CHECK(published.step(twins, pattern.held, 0, displacement).status == StepStatus::singular);
+  CHECK(published.step(pattern.nodes, pattern.held, 0, displacement).status == StepStatus::solved);
+  CHECK_THROWS_AS(PublishedStep(3, {8000, 0.3, 1000}), InputError);
+  CHECK_THROWS_AS(PublishedStep(34, {8000, 0.5, 1000}), InputError);
+  CHECK_THROWS_AS(PublishedStep(34, {8000, 0.3, 1000}, 0), InputError);
 }
