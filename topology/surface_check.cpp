@@ -1,0 +1,425 @@
+#include "topology/surface_check.hpp"
+
+#include "topology/errors.hpp"
+#include "topology/self_intersections.hpp"
+#include "topology/surface_mending.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdint>
+#include <fmt/format.h>
+#include <optional>
+#include <set>
+#include <tuple>
+#include <utility>
+
+namespace spherecut::topology {
+
+namespace {
+
+constexpr int shown_elements = 3; // offending elements that a message lists
+constexpr int filled = -1;        // source of triangles that close a hole
+constexpr int small_hole_edges = 12;
+constexpr double small_hole_perimeter = 0.2; // of the square root of the area
+
+constexpr std::size_t parted_pairs = 20;  // pairs of triangles that may be parted
+constexpr double parted_movement = 0.005; // of the bounding box's diagonal, to part them
+
+/// One side of a triangle: the edge low < high, and whether the triangle runs from low to high.
+struct Side {
+  int low, high, triangle;
+  bool rising;
+};
+
+class Checker {
+ public:
+  Checker(const PolygonSoup& soup, std::string name) : soup_(soup), name_(std::move(name)) {
+    mesh_.vertices = soup.vertices;
+    diagonal_ = bounds(mesh_).extent().norm();
+  }
+
+  CheckedSurface run() {
+    require_readable(soup_, name_);
+    if (soup_.polygons.empty())
+      refuse("there are no faces");
+    require_three_dimensions();
+    make_triangles();
+    remove_repeated_triangles();
+    std::vector<Side> sides = sorted_sides();
+    require_manifold_edges(sides);
+    require_manifold_vertices();
+    orient(sides);
+    fill_small_holes();
+    mend_slivers();
+    turn_outwards();
+    part_self_intersections();
+    remove_unused_vertices(mesh_);
+    warn_about_size();
+    result_.mesh = std::move(mesh_);
+    return std::move(result_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& defect) const { throw InputError(name_ + ": " + defect); }
+
+  [[nodiscard]] std::string vertex(int v) const {
+    const Vector3& x = mesh_.vertices[v];
+    return fmt::format("vertex {} ({:.6g}, {:.6g}, {:.6g})", v, x.x(), x.y(), x.z());
+  }
+
+  [[nodiscard]] std::string face(int triangle) const {
+    if (source_[triangle] == filled)
+      return "a filled hole";
+    const Triangle& t = mesh_.triangles[triangle];
+    const Vector3 x = (mesh_.vertices[t[0]] + mesh_.vertices[t[1]] + mesh_.vertices[t[2]]) / 3;
+    return fmt::format("face {} at ({:.6g}, {:.6g}, {:.6g})", source_[triangle], x.x(), x.y(), x.z());
+  }
+
+  /// The first few offending elements, and how many more there are.
+  static std::string listed(const std::vector<std::string>& elements) {
+    std::string text;
+    for (int i = 0; i < std::min<int>(shown_elements, static_cast<int>(elements.size())); ++i)
+      text += (i > 0 ? "; " : "") + elements[i];
+    if (std::ssize(elements) > shown_elements)
+      text += fmt::format("; and {} more", std::ssize(elements) - shown_elements);
+    return text;
+  }
+
+  void require_three_dimensions() const {
+    Vector3 mean = Vector3::Zero();
+    for (const Vector3& v : mesh_.vertices)
+      mean += v / static_cast<double>(mesh_.vertices.size());
+    Matrix3 covariance = Matrix3::Zero();
+    for (const Vector3& v : mesh_.vertices)
+      covariance += (v - mean) * (v - mean).transpose() / static_cast<double>(mesh_.vertices.size());
+    const Vector3 spread = Eigen::SelfAdjointEigenSolver<Matrix3>(covariance, Eigen::EigenvaluesOnly).eigenvalues();
+    const double thickness = std::sqrt(std::max(0.0, spread[0]));
+    if (thickness <= 1e-6 * diagonal_)
+      refuse(
+          fmt::format("all vertices lie in one plane (thickness {:.3g} m of an extent of {:.3g} m): there is no body",
+                      thickness, diagonal_));
+  }
+
+  void make_triangles() {
+    const std::vector<int> first = coinciding_vertices(mesh_.vertices, 1e-7 * diagonal_);
+    std::vector<bool> used(first.size(), false);
+    for (const std::vector<int>& polygon : soup_.polygons)
+      for (const int v : polygon)
+        used[v] = true;
+    int joined = 0, unused = 0;
+    for (int v = 0; v < std::ssize(first); ++v) {
+      joined += used[v] && first[v] != v;
+      unused += !used[v];
+    }
+    if (joined > 0)
+      result_.mended.push_back(fmt::format("joined {} vertices to others at the same place", joined));
+    if (unused > 0)
+      result_.mended.push_back(fmt::format("removed {} vertices that no face uses", unused));
+    int collapsed = 0, cut = 0;
+    for (int f = 0; f < std::ssize(soup_.polygons); ++f) {
+      std::vector<int> corners;
+      for (const int v : soup_.polygons[f])
+        if (corners.empty() || corners.back() != first[v])
+          corners.push_back(first[v]);
+      if (corners.size() > 1 && corners.front() == corners.back())
+        corners.pop_back();
+      if (corners.size() < 3) {
+        ++collapsed;
+        continue;
+      }
+      if (corners.size() == 3) {
+        add({corners[0], corners[1], corners[2]}, f);
+        continue;
+      }
+      ++cut;
+      std::vector<Vector3> positions;
+      for (const int v : corners)
+        positions.push_back(mesh_.vertices[v]);
+      for (const auto& [a, b, c] : triangulate_polygon(positions))
+        add({corners[a], corners[b], corners[c]}, f);
+    }
+    if (collapsed > 0)
+      result_.mended.push_back(fmt::format("removed {} faces with fewer than three different corners", collapsed));
+    if (cut > 0)
+      result_.mended.push_back(fmt::format("cut {} polygons of four or more corners into triangles", cut));
+    if (mesh_.triangles.empty())
+      refuse("no face has three different corners");
+  }
+
+  void add(const Triangle& triangle, int face_number) {
+    mesh_.triangles.push_back(triangle);
+    source_.push_back(face_number);
+  }
+
+  void remove_repeated_triangles() {
+    std::set<Triangle> seen;
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+      Triangle sorted = mesh_.triangles[t];
+      std::sort(sorted.begin(), sorted.end());
+      if (!seen.insert(sorted).second)
+        continue;
+      source_[kept] = source_[t];
+      mesh_.triangles[kept++] = mesh_.triangles[t];
+    }
+    if (kept < mesh_.triangles.size())
+      result_.mended.push_back(fmt::format("removed {} faces that repeat others", mesh_.triangles.size() - kept));
+    mesh_.triangles.resize(kept);
+    source_.resize(kept);
+  }
+
+  [[nodiscard]] std::vector<Side> sorted_sides() const {
+    std::vector<Side> sides;
+    sides.reserve(3 * mesh_.triangles.size());
+    for (int t = 0; t < std::ssize(mesh_.triangles); ++t)
+      for (int e = 0; e < 3; ++e) {
+        const int a = mesh_.triangles[t][e], b = mesh_.triangles[t][(e + 1) % 3];
+        sides.push_back({std::min(a, b), std::max(a, b), t, a < b});
+      }
+    std::sort(sides.begin(), sides.end(), [](const Side& p, const Side& q) {
+      return std::tie(p.low, p.high, p.triangle) < std::tie(q.low, q.high, q.triangle);
+    });
+    return sides;
+  }
+
+  /// Calls visit(first, last) for the sides of each edge.
+  template <typename Visit>
+  static void for_each_edge(const std::vector<Side>& sides, Visit visit) {
+    for (std::size_t i = 0; i < sides.size();) {
+      std::size_t j = i;
+      while (j < sides.size() && sides[j].low == sides[i].low && sides[j].high == sides[i].high)
+        ++j;
+      visit(i, j);
+      i = j;
+    }
+  }
+
+  void require_manifold_edges(const std::vector<Side>& sides) const {
+    std::vector<std::string> bad;
+    for_each_edge(sides, [&](std::size_t first, std::size_t last) {
+      if (last - first > 2)
+        bad.push_back(fmt::format("the edge from {} to {} has {} faces, among them {}", vertex(sides[first].low),
+                                  vertex(sides[first].high), last - first, source_[sides[first].triangle]));
+    });
+    if (!bad.empty())
+      refuse("not a 2-manifold: " + listed(bad));
+  }
+
+  /// The triangles around every vertex must hang together by their edges at it.
+  void require_manifold_vertices() const {
+    std::vector<std::vector<int>> around(mesh_.vertices.size());
+    for (int t = 0; t < std::ssize(mesh_.triangles); ++t)
+      for (const int v : mesh_.triangles[t])
+        around[v].push_back(t);
+    std::vector<std::string> bad;
+    for (int v = 0; v < std::ssize(around); ++v) {
+      if (around[v].empty())
+        continue;
+      std::vector<bool> reached(around[v].size(), false);
+      std::vector<std::size_t> open = {0};
+      reached[0] = true;
+      std::size_t count = 1;
+      while (!open.empty()) {
+        const Triangle& t = mesh_.triangles[around[v][open.back()]];
+        open.pop_back();
+        for (std::size_t i = 0; i < around[v].size(); ++i) {
+          if (reached[i])
+            continue;
+          const Triangle& other = mesh_.triangles[around[v][i]];
+          const bool joined = std::any_of(t.begin(), t.end(), [&](int corner) {
+            return corner != v && std::find(other.begin(), other.end(), corner) != other.end();
+          });
+          if (joined) {
+            reached[i] = true;
+            ++count;
+            open.push_back(i);
+          }
+        }
+      }
+      if (count < around[v].size())
+        bad.push_back(fmt::format("at {} sheets of the surface touch in a point", vertex(v)));
+    }
+    if (!bad.empty())
+      refuse("not a 2-manifold: " + listed(bad));
+  }
+
+  /// Turns the triangles so that neighbours agree with the first triangle; the surface must be one piece.
+  void orient(const std::vector<Side>& sides) {
+    struct Link {
+      int triangle;
+      bool agrees;
+    };
+    std::vector<std::vector<Link>> links(mesh_.triangles.size());
+    for_each_edge(sides, [&](std::size_t first, std::size_t last) {
+      if (last - first != 2)
+        return;
+      const Side &a = sides[first], &b = sides[first + 1];
+      links[a.triangle].push_back({b.triangle, a.rising != b.rising});
+      links[b.triangle].push_back({a.triangle, a.rising != b.rising});
+    });
+    enum class Turn : std::uint8_t { unknown, keep, flip };
+    std::vector<Turn> turn(mesh_.triangles.size(), Turn::unknown);
+    std::vector<int> first_of_piece, size_of_piece;
+    for (int seed = 0; seed < std::ssize(turn); ++seed) {
+      if (turn[seed] != Turn::unknown)
+        continue;
+      first_of_piece.push_back(seed);
+      size_of_piece.push_back(0);
+      turn[seed] = Turn::keep;
+      std::vector<int> open = {seed};
+      while (!open.empty()) {
+        const int t = open.back();
+        open.pop_back();
+        ++size_of_piece.back();
+        for (const auto& [other, agrees] : links[t]) {
+          const Turn wanted = agrees == (turn[t] == Turn::keep) ? Turn::keep : Turn::flip;
+          if (turn[other] == Turn::unknown) {
+            turn[other] = wanted;
+            open.push_back(other);
+          } else if (turn[other] != wanted) {
+            refuse(fmt::format("the surface has one side only, like a Moebius strip: no orientation fits {} and {}",
+                               face(t), face(other)));
+          }
+        }
+      }
+    }
+    if (first_of_piece.size() > 1) {
+      std::vector<std::string> pieces;
+      for (std::size_t p = 0; p < first_of_piece.size(); ++p)
+        pieces.push_back(fmt::format("{} triangles from {}", size_of_piece[p], face(first_of_piece[p])));
+      refuse(fmt::format("the surface is in {} separate pieces: {}", first_of_piece.size(), listed(pieces)));
+    }
+    oriented_ = static_cast<int>(turn.size());
+    for (std::size_t t = 0; t < turn.size(); ++t)
+      if (turn[t] == Turn::flip) {
+        std::swap(mesh_.triangles[t][1], mesh_.triangles[t][2]);
+        ++turned_;
+      }
+  }
+
+  void fill_small_holes() {
+    const std::vector<std::vector<int>> loops = border_loops(mesh_);
+    const double longest = small_hole_perimeter * std::sqrt(area(mesh_));
+    std::vector<std::string> large;
+    for (const std::vector<int>& loop : loops) {
+      double perimeter = 0;
+      for (std::size_t i = 0; i < loop.size(); ++i)
+        perimeter += (mesh_.vertices[loop[i]] - mesh_.vertices[loop[(i + 1) % loop.size()]]).norm();
+      if (loop.size() > small_hole_edges || perimeter > longest)
+        large.push_back(fmt::format("a hole of {} edges and {:.4g} m around, at the edge from {} to {}", loop.size(),
+                                    perimeter, vertex(loop[0]), vertex(loop[1])));
+    }
+    if (!large.empty())
+      refuse(fmt::format("the surface is open: {} (filled are holes of up to {} edges and {:.4g} m); is the file "
+                         "complete?",
+                         listed(large), small_hole_edges, longest));
+    for (const std::vector<int>& loop : loops) {
+      std::vector<Vector3> corners;
+      for (const int v : loop)
+        corners.push_back(mesh_.vertices[v]);
+      for (const auto& [a, b, c] : triangulate_polygon(corners))
+        add({loop[a], loop[b], loop[c]}, filled);
+    }
+    if (loops.empty())
+      return;
+    for_each_edge(sorted_sides(), [&](std::size_t first, std::size_t last) {
+      if (last - first != 2)
+        refuse(fmt::format("a small hole at {} cannot be filled without leaving the surface's own edges crossed",
+                           vertex(loops.front().front())));
+    });
+    result_.mended.push_back(fmt::format("filled {} small holes", loops.size()));
+  }
+
+  void mend_slivers() {
+    if (const int operations = remove_slivers(mesh_, source_); operations > 0)
+      result_.mended.push_back(fmt::format("removed slivers by {} collapses and flips of edges", operations));
+    std::vector<std::string> flat;
+    int slivers = 0;
+    for (int t = 0; t < std::ssize(mesh_.triangles); ++t) {
+      slivers += is_sliver(mesh_, mesh_.triangles[t]);
+      if (!triangle_normal(mesh_, t).allFinite() || triangle_normal(mesh_, t).norm() < 0.5)
+        flat.push_back(face(t));
+    }
+    if (!flat.empty())
+      refuse("triangles without area that cannot be removed: " + listed(flat));
+    if (slivers > 0)
+      result_.warnings.push_back(fmt::format("{}: {} slivers remain", name_, slivers));
+  }
+
+  void turn_outwards() {
+    const double enclosed = volume(mesh_);
+    if (std::abs(enclosed) < 1e-9 * std::pow(diagonal_, 3))
+      refuse(fmt::format("the surface encloses no volume ({:.3g} m3)", enclosed));
+    if (enclosed < 0) {
+      for (Triangle& t : mesh_.triangles)
+        std::swap(t[1], t[2]);
+      turned_ = oriented_ - turned_;
+    }
+    if (turned_ == oriented_)
+      result_.mended.push_back("turned the whole surface outwards: it was inside out");
+    else if (turned_ > 0)
+      result_.mended.push_back(
+          fmt::format("turned {} of {} triangles, whose orientation was inconsistent, outwards", turned_, oriented_));
+  }
+
+  /// Walls of a thin fold that just pass each other are parted by evening out their vertices; anything more is refused.
+  void part_self_intersections() {
+    const auto pairs = self_intersections(mesh_);
+    if (pairs.empty())
+      return;
+    std::vector<std::string> bad;
+    for (const auto& [a, b] : pairs)
+      bad.push_back(face(a) + " meets " + face(b));
+    if (pairs.size() <= parted_pairs)
+      if (const std::optional<Smoothing> smoothing = smooth_apart(mesh_, parted_movement * diagonal_)) {
+        result_.mended.push_back(fmt::format(
+            "moved {} vertices by up to {:.2g} mm to part {} pairs of triangles that passed through each other: {}",
+            smoothing->vertices, 1e3 * smoothing->movement, pairs.size(), listed(bad)));
+        return;
+      }
+    refuse(fmt::format("the surface passes through itself at {} pairs of triangles: {}", bad.size(), listed(bad)));
+  }
+
+  void warn_about_size() {
+    constexpr double largest = 2, smallest = 0.005; // m
+    const double extent = bounds(mesh_).extent().maxCoeff();
+    if (extent > largest)
+      result_.warnings.push_back(
+          fmt::format("{}: the surface is {:.4g} m across; is it in millimetres? use scale = 0.001", name_, extent));
+    else if (extent < smallest)
+      result_.warnings.push_back(
+          fmt::format("{}: the surface is {:.4g} m across, small for an organ; is the scale right?", name_, extent));
+  }
+
+  const PolygonSoup& soup_;
+  std::string name_;
+  SurfaceMesh mesh_;
+  std::vector<int> source_; // face of the soup that each triangle comes from
+  double diagonal_ = 0;     // m, of the bounding box
+  int oriented_ = 0;        // triangles of the soup that were given an orientation
+  int turned_ = 0;          // triangles whose orientation differs from the soup's
+  CheckedSurface result_;
+};
+
+} // namespace
+
+CheckedSurface check_surface(const PolygonSoup& soup, const std::string& name) {
+  return Checker(soup, name).run();
+}
+
+CheckedSurface read_surface(const std::filesystem::path& file, double scale_to_metres) {
+  const PolygonSoup soup = read_polygons(file, scale_to_metres);
+  CheckedSurface checked = check_surface(soup, file.string());
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".stl")
+    checked.mended.insert(checked.mended.begin(),
+                          fmt::format("joined the {} corners of STL facets into {} shared vertices",
+                                      3 * soup.polygons.size(), soup.vertices.size()));
+  return checked;
+}
+
+} // namespace spherecut::topology
