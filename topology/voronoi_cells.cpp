@@ -107,9 +107,11 @@ class CurvedClipper {
   [[nodiscard]] Vector3 surface_mean() const { return surface_sum_ / surface_count_; }
 
  private:
-  /// Crossing of the edge a b with phi = 0 by the Illinois form of false position.
+  /// Crossing of the edge a b with phi = 0 by the Illinois form of false position: the value at an end that stays for a
+  /// second time is halved.
   Vector3 root(Vector3 a, double phi_a, Vector3 b, double phi_b) const {
     Vector3 x = a;
+    int stayed = 0; // +1: b stayed last time, -1: a did
     for (int iteration = 0; iteration < 12; ++iteration) {
       x = a + phi_a / (phi_a - phi_b) * (b - a);
       const double value = phi(x);
