@@ -120,11 +120,15 @@ class CurvedClipper {
       if ((value < 0) == (phi_a < 0)) {
         a = x;
         phi_a = value;
-        phi_b *= 0.5;
+        if (stayed > 0)
+          phi_b *= 0.5;
+        stayed = 1;
       } else {
         b = x;
         phi_b = value;
-        phi_a *= 0.5;
+        if (stayed < 0)
+          phi_a *= 0.5;
+        stayed = -1;
       }
     }
     return x;
@@ -265,8 +269,13 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
       middle += polygon.vertices.back() / size;
     }
     const bool planar_boundary = neighbour <= first_plane_id;
-    if (neighbour < 0 && !planar_boundary)
+    if (neighbour < 0 && !planar_boundary) {
+      if (neighbour > cap_id && (!near_surface || CurvedClipper(domain, x, h).clip(polygon)))
+        throw InputError(fmt::format("the cell of node {} at ({:.6g}, {:.6g}, {:.6g}) m reaches farther than {} times "
+                                     "its spacing {:.3g} m inside the body: the nodes leave a hole there",
+                                     i, x.x(), x.y(), x.z(), cell_reach, h));
       continue; // the cap or the box: outside the body
+    }
     if (near_surface && !clipper.clip(polygon))
       continue;
     Measure face = measure(polygon.vertices);

@@ -37,7 +37,7 @@ struct CellComplex {
 /// (voro++ half-spaces); the curved part clips each face polygon by the zero set of Domain::curved_distance, with one
 /// extra vertex on each arc. The boundary of a cell on the curved part is what closes it: the area vectors of every
 /// cell sum to zero to rounding. `spacings` (m) set the search radius. Throws InputError when a node coincides with
-/// another.
+/// another, or when a cell reaches farther than six times its node's spacing inside the body.
 CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain);
 
 } // namespace spherecut::topology
