@@ -25,7 +25,7 @@ constexpr double penalty = 1e5;
 
 double default_support_radius(double poisson_ratio) {
   // Larger supports carry more volume-preserving modes: they cure locking.
-  return poisson_ratio >= 0.45 ? 2.2 : 1.7;
+  return poisson_ratio >= 0.45 ? 2.2 : 2.0;
 }
 
 /// Shape function gradients of one background cell over the union of its points' supports.
