@@ -1,5 +1,7 @@
 #include "experiments/experiment.hpp"
 
+#include "experiments/registered.hpp"
+
 #include "topology/errors.hpp"
 
 #include <cmath>
@@ -16,7 +18,10 @@ bool Check::pass() const {
 }
 
 const std::vector<Experiment>& all_experiments() {
-  static const std::vector<Experiment> experiments = {};
+  static const std::vector<Experiment> experiments = {
+      {"patch_test", "a linear field is reproduced on irregular nodes", run_patch_test},
+      {"smooth_convergence", "a smooth field converges with the square of the spacing", run_smooth_convergence},
+  };
   return experiments;
 }
 

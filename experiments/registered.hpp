@@ -1,0 +1,11 @@
+// The run functions of all experiments, one per folder. experiment.cpp lists them with their names.
+#pragma once
+
+#include "experiments/experiment.hpp"
+
+namespace spherecut::experiments {
+
+std::vector<Check> run_patch_test(const ExperimentContext& context);
+std::vector<Check> run_smooth_convergence(const ExperimentContext& context);
+
+} // namespace spherecut::experiments

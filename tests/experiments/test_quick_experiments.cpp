@@ -1,0 +1,58 @@
+// The quick variant of every experiment: same code as the full run on fewer sizes and seeds, and all its checks hold.
+#include "experiments/experiment.hpp"
+
+#include "tests/support/temporary_folder.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+using namespace spherecut;
+using namespace spherecut::experiments;
+using spherecut::tests::TemporaryFolder;
+
+namespace {
+
+void require_quick_run_passes(const std::string& name) {
+  const TemporaryFolder folder;
+  const std::vector<Check> checks = run_experiment(name, folder.path() / name, true, [](const std::string&) {});
+  REQUIRE_FALSE(checks.empty());
+  for (const Check& check : checks) {
+    INFO(name << ": " << check.name << " = " << check.value << ", " << check.relation << " " << check.bound);
+    CHECK(check.pass());
+  }
+  std::ifstream file(folder.path() / name / "summary.json");
+  const auto summary = nlohmann::json::parse(file);
+  CHECK(summary.at("experiment") == name);
+  CHECK(summary.at("checks").size() == checks.size());
+  bool table = false, figure = false;
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path() / name)) {
+    table = table || entry.path().extension() == ".csv";
+    figure = figure || entry.path().extension() == ".png";
+  }
+  CHECK(table);
+  CHECK(figure);
+}
+
+} // namespace
+
+TEST_CASE("Experiments have distinct names and a purpose") {
+  std::set<std::string> names;
+  for (const Experiment& experiment : all_experiments()) {
+    CHECK(names.insert(experiment.name).second);
+    CHECK_FALSE(experiment.purpose.empty());
+  }
+  CHECK_THROWS_AS(run_experiment("no_such_experiment", "unused", true, [](const std::string&) {}), InputError);
+}
+
+TEST_CASE("Quick patch test: linear fields are reproduced") {
+  require_quick_run_passes("patch_test");
+}
+
+TEST_CASE("Quick smooth convergence: second order, every seed alike, forces in balance") {
+  require_quick_run_passes("smooth_convergence");
+}
