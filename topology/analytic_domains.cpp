@@ -65,8 +65,8 @@ class BoxDomain final : public AnalyticDomain {
 
  protected:
   [[nodiscard]] Nearest nearest(const Vector3& x) const override {
-    const Plane* face = nullptr;
-    double distance = -std::numeric_limits<double>::infinity();
+    const Plane* face = &planes().front();
+    double distance = face->signed_distance(x);
     for (const Plane& plane : planes())
       if (const double d = plane.signed_distance(x); d > distance) {
         distance = d;

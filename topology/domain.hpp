@@ -48,10 +48,11 @@ std::shared_ptr<const Domain> make_hemisphere_domain(double radius, double edge)
 std::shared_ptr<const Domain> make_cylinder_domain(double radius, double height, double edge);
 
 /// An organ given by a checked closed surface; it has no planes and its curved distance is its distance. Distances come
-/// from the exact nearest point of the triangles, signed by pseudonormals (surface_distance.hpp), except that deeper
-/// inside than two voxels signed_distance is read from an OpenVDB level set (level_set.hpp, which states its error) of
-/// the given voxel size, m (0: derived as 1/128 of the largest extent). Const calls are thread safe. Throws InputError
-/// when the surface is not closed or the voxel size does not fit it.
+/// from the exact nearest point of the triangles, signed by pseudonormals (surface_distance.hpp), except that farther
+/// from the surface than 1.5 voxels signed_distance is read from an OpenVDB level set (level_set.hpp, which states its
+/// error) of the given voxel size, m (0: derived as 1/128 of the largest extent). The sign is right everywhere. Normals
+/// and closest points are always exact. Const calls are thread safe. Throws InputError when the surface is not closed
+/// or the voxel size does not fit it.
 std::shared_ptr<const Domain> make_organ_domain(SurfaceMesh surface, double voxel_size = 0);
 
 } // namespace spherecut::topology

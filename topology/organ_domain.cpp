@@ -3,14 +3,16 @@
 #include "topology/level_set.hpp"
 #include "topology/surface_distance.hpp"
 
+#include <cmath>
 #include <utility>
 
 namespace spherecut::topology {
 
 namespace {
 
-/// Deeper than this many voxels the level set's trilinear value answers signed_distance.
-constexpr double exact_voxels = 2;
+/// Farther from the surface than this many voxels the level set's trilinear value answers signed_distance. Its error is
+/// below one voxel there, so the sign stays right.
+constexpr double exact_voxels = 1.5;
 
 class OrganDomain final : public Domain {
  public:
@@ -20,8 +22,10 @@ class OrganDomain final : public Domain {
 
   [[nodiscard]] double signed_distance(const Vector3& x) const override {
     const double sampled = level_set_.distance(x);
-    const double deep = exact_voxels * level_set_.voxel_size();
-    return sampled < -deep ? sampled : nearest(x).distance;
+    const double voxel = level_set_.voxel_size();
+    // The last voxel of the outer band already mixes in the value that stands for everything farther away.
+    const bool known = std::abs(sampled) > exact_voxels * voxel && sampled < level_set_.outside_band() - voxel;
+    return known ? sampled : nearest(x).distance;
   }
   [[nodiscard]] double curved_distance(const Vector3& x) const override { return signed_distance(x); }
   [[nodiscard]] Vector3 curved_gradient(const Vector3& x) const override { return nearest(x).normal; }

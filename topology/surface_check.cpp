@@ -135,6 +135,7 @@ class Checker {
       }
       ++cut;
       std::vector<Vector3> positions;
+      positions.reserve(corners.size());
       for (const int v : corners)
         positions.push_back(mesh_.vertices[v]);
       for (const auto& [a, b, c] : triangulate_polygon(positions))
@@ -317,6 +318,7 @@ class Checker {
                          listed(large), small_hole_edges, longest));
     for (const std::vector<int>& loop : loops) {
       std::vector<Vector3> corners;
+      corners.reserve(loop.size());
       for (const int v : loop)
         corners.push_back(mesh_.vertices[v]);
       for (const auto& [a, b, c] : triangulate_polygon(corners))
@@ -370,6 +372,7 @@ class Checker {
     if (pairs.empty())
       return;
     std::vector<std::string> bad;
+    bad.reserve(pairs.size());
     for (const auto& [a, b] : pairs)
       bad.push_back(face(a) + " meets " + face(b));
     if (pairs.size() <= parted_pairs)

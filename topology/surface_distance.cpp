@@ -27,12 +27,9 @@ constexpr int leaf_size = 8;
 
 /// Lower bound of the squared distance from x to anything in the node.
 double squared_bound(const Node& node, const Vector3& x) {
-  double sum = 0;
-  for (int d = 0; d < 3; ++d) {
-    const double gap = std::max({node.lower[d] - x[d], x[d] - node.upper[d], 0.0});
-    sum += gap * gap;
-  }
-  return sum;
+  const auto gap = [&](int d) { return std::max(std::max(node.lower[d] - x[d], x[d] - node.upper[d]), 0.0); };
+  const double u = gap(0), v = gap(1), w = gap(2);
+  return u * u + v * v + w * w;
 }
 
 float below(double value) {
