@@ -1,5 +1,5 @@
-// Body of DenseSystem::solve, compiled once per instruction set in a namespace of its own. Loops run over blocks of eight
-// with a fixed inner loop, which the compiler turns into whole registers.
+// Body of DenseSystem::solve, compiled once per instruction set in a namespace of its own. Loops run over blocks of
+// eight with a fixed inner loop, which the compiler turns into whole registers.
 //
 // Four columns (a panel) are factored at a time in a copy stored by columns; every row below is then updated with the
 // four pivot rows at once. The factor L is not kept, because B is carried along: columns left of the panel may be
@@ -58,7 +58,7 @@ inline bool factor_panel(const Layout& a, int first, int count, double (&upper)[
     if (pivot != k) {
       for (int d = 0; d < count; ++d)
         exchange(a.panel[d * a.padded + k], a.panel[d * a.padded + pivot]);
-      double *__restrict one = a.row(k), *__restrict other = a.row(pivot);
+      double* __restrict one = a.row(k), * __restrict other = a.row(pivot);
       for (int j = end / block * block; j < a.width; j += block)
         for (int l = 0; l < block; ++l)
           exchange(one[j + l], other[j + l]);

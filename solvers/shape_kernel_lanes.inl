@@ -166,9 +166,8 @@ double evaluate(const Support& support, const LinearOutput& output) {
   add_lanes(third, 10, t);
   for (int i = 3; i < 9; ++i)
     t[i] *= scale;
-  const double right[3][4] = {{-t[0], scale - t[3], -t[4], -t[5]},
-                              {-t[1], -t[4], scale - t[6], -t[7]},
-                              {-t[2], -t[5], -t[7], scale - t[8]}};
+  const double right[3][4] = {
+      {-t[0], scale - t[3], -t[4], -t[5]}, {-t[1], -t[4], scale - t[6], -t[7]}, {-t[2], -t[5], -t[7], scale - t[8]}};
   double c1[3][4];
   for (int i = 0; i < 3; ++i) {
     multiply(b, right[i], c1[i]);

@@ -286,7 +286,7 @@ TEST_CASE("A node whose support never becomes sound is named", "[shape_functions
 
   Cloud plane; // every moment matrix is singular
   for (int i = 0; i < 36; ++i) {
-    plane.centres.emplace_back(corner + Vector3(i % 6, i / 6, 0));
+    plane.centres.emplace_back(corner + Vector3(i % 6, std::floor(i / 6.0), 0));
     plane.spacings.push_back(1);
   }
   CHECK_THROWS_WITH(Spheres(plane.centres, plane.spacings, 1.8), Catch::Contains("node 0"));
