@@ -21,6 +21,10 @@ const std::vector<Experiment>& all_experiments() {
   static const std::vector<Experiment> experiments = {
       {"patch_test", "a linear field is reproduced on irregular nodes", run_patch_test},
       {"smooth_convergence", "a smooth field converges with the square of the spacing", run_smooth_convergence},
+      {"punch", "force and surface of a flat punch on a half-space", run_punch},
+      {"hertz", "force, contact radius and surface of a sphere on a half-space", run_hertz},
+      {"hemisphere_palpation", "the paper's Figure 3: surface displacement and force against finite elements",
+       run_hemisphere_palpation},
   };
   return experiments;
 }

@@ -7,5 +7,8 @@ namespace spherecut::experiments {
 
 std::vector<Check> run_patch_test(const ExperimentContext& context);
 std::vector<Check> run_smooth_convergence(const ExperimentContext& context);
+std::vector<Check> run_punch(const ExperimentContext& context);
+std::vector<Check> run_hertz(const ExperimentContext& context);
+std::vector<Check> run_hemisphere_palpation(const ExperimentContext& context);
 
 } // namespace spherecut::experiments

@@ -56,3 +56,15 @@ TEST_CASE("Quick patch test: linear fields are reproduced") {
 TEST_CASE("Quick smooth convergence: second order, every seed alike, forces in balance") {
   require_quick_run_passes("smooth_convergence");
 }
+
+TEST_CASE("Quick punch: force and far boundary agree with the exact contact") {
+  require_quick_run_passes("punch");
+}
+
+TEST_CASE("Quick Hertz: force and far boundary agree with the exact contact") {
+  require_quick_run_passes("hertz");
+}
+
+TEST_CASE("Quick hemisphere palpation: the whole organ at 500 nodes against finite elements") {
+  require_quick_run_passes("hemisphere_palpation");
+}
