@@ -197,6 +197,8 @@ double one_norm(const SparseMatrix& matrix, bool lower_triangle_of_symmetric) {
   VectorX sums = VectorX::Zero(matrix.cols());
   for (int column = 0; column < matrix.outerSize(); ++column)
     for (SparseMatrix::InnerIterator entry(matrix, column); entry; ++entry) {
+      if (lower_triangle_of_symmetric && entry.row() < column)
+        continue;
       sums[column] += std::abs(entry.value());
       if (lower_triangle_of_symmetric && entry.row() != column)
         sums[entry.row()] += std::abs(entry.value());

@@ -34,7 +34,7 @@ std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower, const
 /// L U with partial pivoting and iterative refinement. Throws NumericalError when the matrix is singular.
 std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering = {});
 
-/// Largest column sum of absolute values.
+/// Largest column sum of absolute values; with `lower_triangle_of_symmetric` entries above the diagonal are not read.
 double one_norm(const SparseMatrix& matrix, bool lower_triangle_of_symmetric = false);
 
 /// Estimate of the 1-norm condition number ||A|| ||A^-1|| (Hager 1984, Higham 1988); a lower bound, usually within a

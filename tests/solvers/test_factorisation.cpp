@@ -1,0 +1,154 @@
+#include "solvers/factorisation.hpp"
+
+#include "topology/errors.hpp"
+
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+#include <numeric>
+#include <random>
+
+using namespace spherecut;
+using solvers::SparseMatrix;
+
+namespace {
+
+/// Values of a random sparse matrix with `extra` couplings a row and a dominant or weak diagonal.
+MatrixX random_matrix(int size, int extra, double diagonal, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> value(-1, 1);
+  std::uniform_int_distribution<int> place(0, size - 1);
+  MatrixX matrix = MatrixX::Zero(size, size);
+  for (int row = 0; row < size; ++row) {
+    matrix(row, row) += diagonal;
+    for (int k = 0; k < extra; ++k) {
+      const int column = place(random);
+      matrix(row, column) += value(random);
+    }
+  }
+  return matrix;
+}
+
+MatrixX random_right(Eigen::Index rows, Eigen::Index columns) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> value(-1, 1);
+  return MatrixX::NullaryExpr(rows, columns, [&]() { return value(random); });
+}
+
+SparseMatrix sparse(const MatrixX& matrix) {
+  return matrix.sparseView();
+}
+
+SparseMatrix lower(const MatrixX& matrix) {
+  return MatrixX(matrix.triangularView<Eigen::Lower>()).sparseView();
+}
+
+double one_norm(const MatrixX& matrix) {
+  return matrix.cwiseAbs().colwise().sum().maxCoeff();
+}
+
+std::vector<int> reversed(int size) {
+  std::vector<int> order(size);
+  std::iota(order.rbegin(), order.rend(), 0);
+  return order;
+}
+
+} // namespace
+
+TEST_CASE("Cholesky and LU factorisations solve what dense solvers solve") {
+  for (int size : {1, 5, 60, 250}) {
+    const MatrixX general = random_matrix(size, 4, 3, 21);
+    const MatrixX symmetric = general * general.transpose() + MatrixX::Identity(size, size);
+    const MatrixX right = random_right(size, 3);
+    const Eigen::PartialPivLU<MatrixX> dense(general);
+    const MatrixX exact = symmetric.llt().solve(right);
+    for (const std::vector<int>& order : {std::vector<int>{}, reversed(size)}) {
+      const auto cholesky = solvers::factor_symmetric(lower(symmetric), order);
+      CHECK((cholesky->solve(right) - exact).norm() < 1e-10 * exact.norm());
+      CHECK((cholesky->solve_transposed(right) - exact).norm() < 1e-10 * exact.norm());
+      CHECK(cholesky->nonzeros() >= size);
+      const auto lu = solvers::factor_general(sparse(general), order);
+      const MatrixX x = dense.solve(right), y = MatrixX(general.transpose()).partialPivLu().solve(right);
+      CHECK((lu->solve(right) - x).norm() < 1e-10 * x.norm());
+      CHECK((lu->solve_transposed(right) - y).norm() < 1e-10 * y.norm());
+      CHECK(lu->nonzeros() >= size);
+    }
+  }
+}
+
+TEST_CASE("Cholesky reads the lower triangle alone") {
+  const MatrixX general = random_matrix(40, 4, 3, 2);
+  const MatrixX symmetric = general * general.transpose() + MatrixX::Identity(40, 40);
+  MatrixX spoiled = symmetric;
+  for (int k = 0; k + 1 < 40; ++k)
+    spoiled(k, k + 1) += 100;
+  const MatrixX right = random_right(40, 1), exact = symmetric.llt().solve(right);
+  CHECK((solvers::factor_symmetric(sparse(spoiled))->solve(right) - exact).norm() < 1e-10 * exact.norm());
+}
+
+TEST_CASE("The 1-norm is the dense one, from all entries or from the lower triangle") {
+  const MatrixX general = random_matrix(50, 4, -2, 5);
+  const MatrixX symmetric = general + general.transpose();
+  CHECK(solvers::one_norm(sparse(general)) == Approx(one_norm(general)));
+  CHECK(solvers::one_norm(lower(symmetric), true) == Approx(one_norm(symmetric)));
+  // Entries above the diagonal do not belong to the lower triangle, whether they are stored or not.
+  CHECK(solvers::one_norm(sparse(symmetric), true) == Approx(one_norm(symmetric)));
+}
+
+TEST_CASE("The condition estimate is a lower bound within a factor of three") {
+  for (double diagonal : {0.5, 3.0, 10.0})
+    for (std::uint64_t seed = 0; seed < 8; ++seed) {
+      const MatrixX general = random_matrix(80, 3, diagonal, seed);
+      const double exact = one_norm(general) * one_norm(general.inverse());
+      const auto lu = solvers::factor_general(sparse(general));
+      const double estimate = solvers::condition_estimate(*lu, solvers::one_norm(sparse(general)), 80);
+      CHECK(estimate < 1.0001 * exact);
+      CHECK(estimate > exact / 3);
+    }
+  // Badly conditioned: the second difference with natural conditions at one end, condition about 2 n^2.
+  const int n = 200;
+  MatrixX difference = 2 * MatrixX::Identity(n, n);
+  difference.diagonal(1).setConstant(-1);
+  difference.diagonal(-1).setConstant(-1);
+  difference(n - 1, n - 1) = 1;
+  const double exact = one_norm(difference) * one_norm(difference.inverse());
+  const auto cholesky = solvers::factor_symmetric(lower(difference));
+  const double estimate = solvers::condition_estimate(*cholesky, solvers::one_norm(lower(difference), true), n);
+  CHECK(estimate == Approx(exact).epsilon(0.01)); // the inverse is positive: the estimate is exact
+}
+
+TEST_CASE("Singular and indefinite matrices are refused") {
+  MatrixX singular = random_matrix(30, 4, 3, 6);
+  singular.row(7).setZero();
+  CHECK_THROWS_AS(solvers::factor_general(sparse(singular)), NumericalError);
+  const MatrixX indefinite = Eigen::Vector4d(1, 2, -1, 3).asDiagonal();
+  CHECK_THROWS_AS(solvers::factor_symmetric(lower(indefinite)), NumericalError);
+  CHECK_THROWS_WITH(solvers::factor_symmetric(lower(indefinite)), Catch::Contains("not positive definite"));
+  const MatrixX empty_row = Eigen::Vector4d(1, 2, 0, 3).asDiagonal();
+  CHECK_THROWS_AS(solvers::factor_symmetric(lower(empty_row)), NumericalError);
+}
+
+TEST_CASE("A fill-reducing ordering is a permutation and saves fill on a grid") {
+  const int side = 24, count = side * side;
+  std::vector<int> start{0}, neighbours;
+  MatrixX laplace = MatrixX::Zero(count, count);
+  for (int i = 0; i < count; ++i) {
+    const int row = i / side, column = i % side;
+    for (int step : {-side, -1, 0, 1, side}) {
+      if ((step == -1 && column == 0) || (step == 1 && column + 1 == side) || (step == -side && row == 0) ||
+          (step == side && row + 1 == side))
+        continue;
+      neighbours.push_back(i + step);
+      laplace(i, i + step) = step == 0 ? 4.1 : -1;
+    }
+    start.push_back(static_cast<int>(neighbours.size()));
+  }
+  const std::vector<int> order = solvers::fill_reducing_ordering(start, neighbours);
+  std::vector<int> sorted = order, all(count);
+  std::sort(sorted.begin(), sorted.end());
+  std::iota(all.begin(), all.end(), 0);
+  CHECK(sorted == all);
+  std::vector<int> shuffled = all;
+  std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937_64(1));
+  const long ordered = solvers::factor_symmetric(lower(laplace), order)->nonzeros();
+  CHECK(ordered < solvers::factor_symmetric(lower(laplace), shuffled)->nonzeros() / 2);
+}
