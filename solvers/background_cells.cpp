@@ -155,6 +155,10 @@ BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud
                                  const BackgroundOptions& options) {
   if (options.gauss < 1 || options.gauss > 3)
     throw InputError(fmt::format("quadrature of {} points per direction; there are 1, 2 and 3", options.gauss));
+  if (!(options.cell_size > 0) || !std::isfinite(options.cell_size))
+    throw InputError(fmt::format("background cells of {} node spacings: the size must be positive", options.cell_size));
+  if (nodes.size() == 0)
+    throw InputError("background cells need nodes: their spacings set the size");
   return Octree(domain, nodes, options).build();
 }
 
