@@ -66,6 +66,7 @@ class Collocation final : public ElasticBody {
     report_.factor_seconds = factor.seconds();
     report_.condition_estimate =
         spherecut::solvers::condition_estimate(*factorisation_, one_norm(system), report_.unknowns);
+    require_regular(report_);
   }
 
   Method method() const override { return Method::collocation; }
@@ -246,6 +247,9 @@ void Collocation::assemble_balance() {
       flux.diagonal().array() += mu_g.dot(area) + diagonal;
       target.topLeftCorner<3, 3>() += flux;
     };
+    if (sides[i].empty())
+      throw InputError(fmt::format("node {} at ({:.6g}, {:.6g}, {:.6g}) m has no cell: it lies outside the body", i,
+                                   x[i].x(), x[i].y(), x[i].z()));
     block(i);
     for (const Side& side : sides[i]) {
       const topology::CellFace& face = cells_.faces[side.face];
@@ -273,7 +277,10 @@ void Collocation::assemble_balance() {
     if (mixed_) {
       block(i)(3, 3) += cells_.volumes[i] / problem_.material.lame_lambda();
       for (int b : boundary[i]) {
-        evaluate(spheres_, cells_.boundary[b].centroid, shape);
+        if (!evaluate(spheres_, cells_.boundary[b].centroid, shape))
+          throw NumericalError(fmt::format("the surface of the cell of node {} has {} supporting nodes: the nodes "
+                                           "leave a hole there",
+                                           i, shape.size()));
         for (int k = 0; k < shape.size(); ++k)
           block(shape.nodes[k]).block<1, 3>(3, 0) += shape.value[k] * cells_.boundary[b].area.transpose();
       }
@@ -365,6 +372,7 @@ double Collocation::residual(const Field& field, const std::vector<int>& loaded_
 } // namespace
 
 std::unique_ptr<Discretisation> make_collocation(Problem problem, const DiscretisationOptions& options) {
+  require_domain(problem);
   return std::make_unique<Collocation>(std::move(problem), options);
 }
 

@@ -20,6 +20,10 @@ Problem checked(Problem problem) {
 void check_problem(const Problem& problem) {
   problem.material.check();
   const NodeCloud& nodes = problem.nodes;
+  if (nodes.spacings.size() != nodes.positions.size() || nodes.kinds.size() != nodes.positions.size() ||
+      nodes.normals.size() != nodes.positions.size())
+    throw InputError(fmt::format("{} node positions, but {} spacings, {} kinds and {} normals", nodes.positions.size(),
+                                 nodes.spacings.size(), nodes.kinds.size(), nodes.normals.size()));
   if (nodes.size() < 4)
     throw InputError(fmt::format("{} nodes: a linear basis in three dimensions needs at least 4", nodes.size()));
   for (int i = 0; i < nodes.size(); ++i) {
@@ -28,16 +32,23 @@ void check_problem(const Problem& problem) {
     if (!(nodes.spacings[i] > 0) || !std::isfinite(nodes.spacings[i]))
       throw InputError(fmt::format("node {}: spacing {} m must be positive", i, nodes.spacings[i]));
   }
-  std::vector<Vector3> held;
+  std::vector<std::array<bool, 3>> held(nodes.positions.size(), {false, false, false});
+  bool any_held = false;
   for (const Prescribed& entry : problem.prescribed) {
     if (entry.node < 0 || entry.node >= nodes.size())
       throw InputError(fmt::format("prescribed node {} does not exist; there are {}", entry.node, nodes.size()));
     if (!entry.value.allFinite())
       throw InputError(fmt::format("prescribed displacement of node {} is not finite", entry.node));
-    if (entry.components[0] || entry.components[1] || entry.components[2])
-      held.push_back(nodes.positions[entry.node]);
+    for (int c = 0; c < 3; ++c) {
+      if (!entry.components[c])
+        continue;
+      // Two values contradict each other, and one value twice would count its force twice.
+      if (held[entry.node][c])
+        throw InputError(fmt::format("node {}: displacement component {} is prescribed twice", entry.node, "xyz"[c]));
+      held[entry.node][c] = any_held = true;
+    }
   }
-  if (held.empty())
+  if (!any_held)
     throw InputError("nothing is fixed: no node has a prescribed displacement, so the body can move freely (6 rigid "
                      "motions); fix a part of its surface");
 }
@@ -150,6 +161,19 @@ Vector3 held_part(const Prescribed& entry, const Vector3& value) {
     if (!entry.components[c])
       held[c] = 0;
   return held;
+}
+
+void require_domain(const Problem& problem) {
+  if (problem.domain == nullptr)
+    throw InputError("the problem has no domain: the body that the nodes fill");
+}
+
+void require_regular(const AssemblyReport& report) {
+  constexpr double limit = 1e15; // a free rigid motion gives 1e19, bodies that are held 1e3 to 1e12
+  if (!(report.condition_estimate < limit))
+    throw NumericalError(fmt::format("the system of {} unknowns is singular (condition estimate {:.1e}, limit {:.0e}): "
+                                     "the body is not held against every rigid motion, or a support is unsound",
+                                     report.unknowns, report.condition_estimate, limit));
 }
 
 void require_finite(const Field& field, const AssemblyReport& report) {

@@ -20,8 +20,9 @@ struct NodalSupports {
 /// Evaluates the shape functions at all nodes. Throws NumericalError naming the node whose support is not sound.
 NodalSupports nodal_supports(const Spheres& spheres);
 
-/// Throws InputError for bad material, fewer than 4 nodes, non-finite positions, a prescribed node out of range, or
-/// nothing prescribed (the body would float: 6 rigid motions).
+/// Throws InputError for bad material, fewer than 4 nodes, arrays of unequal length, non-finite positions, a
+/// prescribed node out of range, a component prescribed twice, or nothing prescribed (the body would float: 6 rigid
+/// motions).
 void check_problem(const Problem& problem);
 
 /// Stress of isotropic linear elasticity from the displacement gradient, Pa.
@@ -52,6 +53,12 @@ VectorX prescribed_values(const Problem& problem, const std::vector<Vector3>& va
 
 /// The components of `value` that the entry constrains, zero in the others.
 Vector3 held_part(const Prescribed& entry, const Vector3& value);
+
+/// Throws InputError when the problem has no domain; only `published` does without.
+void require_domain(const Problem& problem);
+
+/// Throws NumericalError when the condition estimate says that the factored matrix is singular to rounding.
+void require_regular(const AssemblyReport& report);
 
 /// Throws NumericalError when the field holds a number that is not finite.
 void require_finite(const Field& field, const AssemblyReport& report);

@@ -61,6 +61,7 @@ class Galerkin final : public ElasticBody {
     report_.factor_seconds = factor.seconds();
     report_.condition_estimate =
         spherecut::solvers::condition_estimate(*factorisation_, one_norm(stiffness_, true), report_.unknowns);
+    require_regular(report_);
   }
 
   Method method() const override { return Method::galerkin; }
@@ -380,6 +381,7 @@ double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nod
 } // namespace
 
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
+  require_domain(problem);
   return std::make_unique<Galerkin>(std::move(problem), options);
 }
 
