@@ -109,7 +109,8 @@ void press_frictionless(const ContactPatch& patch, const topology::ToolShape& to
   VectorX gaps(count);
   std::vector<Vector3> normals(count);
   state.converged = false;
-  double relaxation = 1, last_change = std::numeric_limits<double>::infinity();
+  double relaxation = 1;
+  VectorX last_step;
   for (int iteration = 0; iteration < options.maximum_iterations; ++iteration) {
     ++state.iterations;
     for (int c = 0; c < count; ++c) {
@@ -127,16 +128,21 @@ void press_frictionless(const ContactPatch& patch, const topology::ToolShape& to
       state.nodal_forces[c] = solution.forces[c] * normals[c];
     state.active = solution.active;
     const VectorX displacement = displacement_of(patch, state.nodal_forces);
-    const double change = (displacement - state.displacement).lpNorm<Eigen::Infinity>();
-    if (change < options.gap_tolerance && solution.converged) {
+    const VectorX step = displacement - state.displacement;
+    if (step.lpNorm<Eigen::Infinity>() < options.gap_tolerance && solution.converged) {
       state.displacement = displacement;
       state.converged = true;
       break;
     }
-    if (change > 0.7 * last_change)
-      relaxation = std::max(0.25, 0.7 * relaxation); // the linearisations alternate: take shorter steps
-    last_change = change;
-    state.displacement += relaxation * (displacement - state.displacement);
+    // Aitken's factor from the last two steps: shorter where the linearisations alternate, longer where they creep, as
+    // they do on the flanks of a deep ball, whose normals turn as the nodes slide outwards.
+    if (last_step.size() > 0) {
+      const VectorX turn = step - last_step;
+      if (turn.squaredNorm() > 0)
+        relaxation = std::clamp(-relaxation * last_step.dot(turn) / turn.squaredNorm(), 0.25, 4.0);
+    }
+    last_step = step;
+    state.displacement += relaxation * step;
   }
 }
 
