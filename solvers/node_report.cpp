@@ -152,12 +152,14 @@ SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOpt
 }
 
 void require_filled(const SprinkleReport& report, double minimum_density) {
-  for (const SprinkleZone& zone : report.zones)
-    if (!(zone.density >= minimum_density))
+  for (const SprinkleZone& zone : report.zones) {
+    const double limit = minimum_density - 0.3 / std::sqrt(zone.expected);
+    if (!(zone.density >= limit))
       throw NumericalError(
           fmt::format("sprinkle: the zone with spacings of {:.4g} to {:.4g} m is under-filled: {} nodes, "
                       "density {:.3f} where at least {:.3f} is needed",
-                      zone.spacing_from, zone.spacing_to, zone.nodes, zone.density, minimum_density));
+                      zone.spacing_from, zone.spacing_to, zone.nodes, zone.density, limit));
+  }
 }
 
 double expected_count(const topology::Domain& domain, const SpacingField& spacing, double sharp_edge_degrees) {

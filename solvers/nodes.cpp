@@ -170,7 +170,8 @@ Vector3 Filler::normal_of_edge_seed(const Vector3& x, double h) const {
 void Filler::place_seeds() {
   const double tolerance = 1e-6 * domain_.bounds().extent().norm();
   for (int k = 0; k < std::ssize(options_.seeds); ++k) {
-    const auto& [x, kind] = options_.seeds[k];
+    const Vector3& x = options_.seeds[k].position;
+    const NodeKind kind = options_.seeds[k].kind;
     const double outside = domain_.signed_distance(x), h = spacing_(x);
     const auto place = [&] { return fmt::format("seed {} at ({}, {}, {}) m", k, x.x(), x.y(), x.z()); };
     if (!x.allFinite() || !(outside <= tolerance))

@@ -43,7 +43,7 @@ constexpr int surface_steps = 8;
 
 /// The point at `length` from `start` along the surface, setting out in a tangential direction.
 Vector3 follow_surface(const topology::Domain& domain, const Vector3& start, const Vector3& direction, double length) {
-  const Vector3 straight = domain.closest_surface_point(start + length * direction);
+  Vector3 straight = domain.closest_surface_point(start + length * direction);
   if (std::abs((straight - start).norm() - length) <= distance_tolerance * length)
     return straight;
   Vector3 x = start, heading = direction;
