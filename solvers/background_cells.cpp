@@ -14,7 +14,7 @@ namespace {
 
 /// Halving a cell that is a little too large would cost eight times the points: where the spacing is graded, cells
 /// range from slack / 2 to slack times the size asked for.
-constexpr double slack = 1.35;
+constexpr double slack = 1.6;
 
 /// Part of a box on the inner side of a plane through it, by the distance of its centre: exact for a box cut parallel
 /// to a face, second order otherwise.

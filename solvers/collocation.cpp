@@ -64,9 +64,11 @@ class Collocation final : public ElasticBody {
     factorisation_ = factor_general(system);
     report_.factor_nonzeros = factorisation_->nonzeros();
     report_.factor_seconds = factor.seconds();
-    report_.condition_estimate =
-        spherecut::solvers::condition_estimate(*factorisation_, one_norm(system), report_.unknowns);
-    require_regular(report_);
+    if (options.estimate_condition) {
+      report_.condition_estimate =
+          spherecut::solvers::condition_estimate(*factorisation_, one_norm(system), report_.unknowns);
+      require_regular(report_);
+    }
   }
 
   Method method() const override { return Method::collocation; }

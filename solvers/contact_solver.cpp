@@ -217,16 +217,8 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
         patch.responses[3 * c + axis].add(1, far);
     }
   }
-  const auto restrict_to_patch = [&](const Field& field) {
-    VectorX own(3 * size_of(patch));
-    for (int c = 0; c < size_of(patch); ++c)
-      own.segment<3>(3 * c) = body.contact_displacement(candidates[c], field);
-    return own;
-  };
-  patch.base_displacement = restrict_to_patch(patch.base);
-  patch.compliance.resize(3 * size_of(patch), 3 * size_of(patch));
-  for (int k = 0; k < 3 * size_of(patch); ++k)
-    patch.compliance.col(k) = restrict_to_patch(patch.responses[k]);
+  patch.base_displacement = body.contact_displacements(candidates, {patch.base}).col(0);
+  patch.compliance = body.contact_displacements(candidates, patch.responses);
   return patch;
 }
 

@@ -49,10 +49,11 @@ struct Problem {
 
 struct DiscretisationOptions {
   Method method = Method::galerkin;
-  double support_radius = 0; // rho, support radius / h; 0: the method's default for this Poisson ratio
-  int quadrature = 2;        // Gauss points per direction in a background cell (galerkin)
-  double cell_size = 0.75;   // edge of a background cell in units of h (galerkin)
-  int tip_node = -1;         // the tool-tip node of `published`
+  double support_radius = 0;      // rho, support radius / h; 0: the method's default for this Poisson ratio
+  int quadrature = 2;             // Gauss points per direction in a background cell (galerkin)
+  double cell_size = 0.75;        // edge of a background cell in units of h (galerkin)
+  int tip_node = -1;              // the tool-tip node of `published`
+  bool estimate_condition = true; // a dozen more solves; leave out where every rebuild counts
 };
 
 /// Diagnostics of assembly and factorisation. Times are wall clock, s.
@@ -61,7 +62,7 @@ struct AssemblyReport {
   int unknowns = 0;
   long matrix_nonzeros = 0;
   long factor_nonzeros = 0;
-  double condition_estimate = 0;     // 1-norm estimate (Hager-Higham)
+  double condition_estimate = 0;     // 1-norm estimate (Hager-Higham), 0 when not asked for
   double worst_moment_condition = 0; // largest condition number of a moment matrix
   int grown_supports = 0;            // supports whose radius had to grow
   double supports_seconds = 0, assembly_seconds = 0, factor_seconds = 0;
@@ -111,7 +112,12 @@ class Discretisation {
   /// Where a unit force on a surface node acts, and the displacement conjugate to it: the node's own in `published` and
   /// `collocation`, the mean over its share of the surface in `galerkin`.
   [[nodiscard]] virtual Vector3 contact_point(int node) const = 0;
-  [[nodiscard]] virtual Vector3 contact_displacement(int node, const Field& field) const = 0;
+  /// Column k of the result holds the displacements (3 per node, m) under fields[k].
+  [[nodiscard]] virtual MatrixX contact_displacements(const std::vector<int>& nodes,
+                                                      const std::vector<Field>& fields) const = 0;
+  [[nodiscard]] Vector3 contact_displacement(int node, const Field& field) const {
+    return contact_displacements({node}, {field}).col(0);
+  }
 
   /// Displacement of every node, u_h(x_i), 3N.
   [[nodiscard]] virtual VectorX nodal_displacements(const Field& field) const = 0;

@@ -108,11 +108,14 @@ std::vector<Vector3> ElasticBody::constraint_points() const {
   return points;
 }
 
-Vector3 ElasticBody::contact_displacement(int node, const Field& field) const {
-  Vector3 displacement = Vector3::Zero();
-  for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
-    displacement += supports_.value[k] * field.coefficients.segment<3>(3 * supports_.nodes[k]);
-  return displacement;
+MatrixX ElasticBody::contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const {
+  MatrixX displacements = MatrixX::Zero(3 * std::ssize(nodes), std::ssize(fields));
+  for (Eigen::Index f = 0; f < displacements.cols(); ++f)
+    for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
+      for (int k = supports_.start[nodes[c]]; k < supports_.start[nodes[c] + 1]; ++k)
+        displacements.col(f).segment<3>(3 * c) +=
+            supports_.value[k] * fields[f].coefficients.segment<3>(3 * supports_.nodes[k]);
+  return displacements;
 }
 
 PointState ElasticBody::at(const Vector3& x, const Field& field) const {

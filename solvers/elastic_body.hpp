@@ -37,7 +37,8 @@ class ElasticBody : public Discretisation {
   [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
   [[nodiscard]] std::vector<Vector3> constraint_points() const override;
   [[nodiscard]] Vector3 contact_point(int node) const override { return problem_.nodes.positions[node]; }
-  [[nodiscard]] Vector3 contact_displacement(int node, const Field& field) const override;
+  [[nodiscard]] MatrixX contact_displacements(const std::vector<int>& nodes,
+                                              const std::vector<Field>& fields) const override;
 
  protected:
   ElasticBody(Problem problem, double rho);

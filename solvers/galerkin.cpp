@@ -59,9 +59,11 @@ class Galerkin final : public ElasticBody {
     factorisation_ = factor_symmetric(stiffness_, order);
     report_.factor_nonzeros = factorisation_->nonzeros();
     report_.factor_seconds = factor.seconds();
-    report_.condition_estimate =
-        spherecut::solvers::condition_estimate(*factorisation_, one_norm(stiffness_, true), report_.unknowns);
-    require_regular(report_);
+    if (options.estimate_condition) {
+      report_.condition_estimate =
+          spherecut::solvers::condition_estimate(*factorisation_, one_norm(stiffness_, true), report_.unknowns);
+      require_regular(report_);
+    }
   }
 
   Method method() const override { return Method::galerkin; }
@@ -100,8 +102,14 @@ class Galerkin final : public ElasticBody {
     return points;
   }
   Vector3 contact_point(int node) const override { return contact_mean(node).centroid; }
-  Vector3 contact_displacement(int node, const Field& field) const override {
-    return contact_mean(node).of(field.coefficients);
+  MatrixX contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const override {
+    MatrixX displacements(3 * std::ssize(nodes), std::ssize(fields));
+    for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
+      const DisplacementMean mean = contact_mean(nodes[c]);
+      for (Eigen::Index f = 0; f < displacements.cols(); ++f)
+        displacements.col(f).segment<3>(3 * c) = mean.of(fields[f].coefficients);
+    }
+    return displacements;
   }
   std::vector<Vector3> constraint_forces(const Field& field) const override;
   double residual(const Field& field, const std::vector<int>& loaded_nodes,
