@@ -45,17 +45,15 @@ cholmod_sparse view(const SparseMatrix& matrix, int symmetry) {
 
 class CholeskyFactorisation final : public Factorisation {
  public:
-  CholeskyFactorisation(const SparseMatrix& lower, const std::vector<int>& ordering) {
+  CholeskyFactorisation(const SparseMatrix& lower, bool ordered) {
     cholmod_sparse matrix = view(lower, -1);
     cholmod_common& common = workspace_.common;
-    if (ordering.empty()) {
-      factor_ = cholmod_analyze(&matrix, &common);
-    } else {
+    if (ordered) {
       common.nmethods = 1;
-      common.method[0].ordering = CHOLMOD_GIVEN;
-      common.postorder = 1;
-      factor_ = cholmod_analyze_p(&matrix, const_cast<int*>(ordering.data()), nullptr, 0, &common);
+      common.method[0].ordering = CHOLMOD_NATURAL;
+      common.postorder = 0;
     }
+    factor_ = cholmod_analyze(&matrix, &common);
     if (factor_ == nullptr)
       throw NumericalError(fmt::format("Cholesky analysis failed (CHOLMOD status {})", common.status));
     cholmod_factorize(&matrix, factor_, &common);
@@ -187,8 +185,12 @@ std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std
   return ordering;
 }
 
-std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower, const std::vector<int>& ordering) {
-  return std::make_unique<CholeskyFactorisation>(lower, ordering);
+std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower) {
+  return std::make_unique<CholeskyFactorisation>(lower, false);
+}
+
+std::unique_ptr<Factorisation> factor_ordered(const SparseMatrix& lower) {
+  return std::make_unique<CholeskyFactorisation>(lower, true);
 }
 
 std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering) {

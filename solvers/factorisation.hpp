@@ -26,10 +26,14 @@ class Factorisation {
 /// CHOLMOD finds better). Returns the permutation: entry k is the vertex eliminated k-th.
 std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours);
 
-/// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle. `ordering` (may be empty:
-/// CHOLMOD chooses) is a permutation of the rows. Throws NumericalError naming the column where the matrix is not
+/// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle; CHOLMOD orders it. Throws
+/// NumericalError naming the column where the matrix is not
 /// positive definite.
-std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower, const std::vector<int>& ordering = {});
+std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower);
+
+/// The same for a matrix that already stands in its elimination order (postordered, as fill_reducing_ordering gives
+/// it): nothing is permuted.
+std::unique_ptr<Factorisation> factor_ordered(const SparseMatrix& lower);
 
 /// L U with partial pivoting and iterative refinement. Throws NumericalError when the matrix is singular.
 std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering = {});

@@ -12,6 +12,7 @@
 #include "solvers/stiffness_kernel.hpp"
 #include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
+#include "topology/point_tree.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +31,8 @@ double default_support_radius(double poisson_ratio) {
 
 /// Shape function gradients of one background cell over the union of its points' supports.
 struct CellShapes {
-  std::vector<int> nodes; // ascending
+  std::vector<int> ranks; // elimination ranks of the nodes, ascending
+  bool grown = false;     // some support had to reach beyond its radius
   int points = 0;
   int stride = 0;
   std::vector<double> gradients; // [point][axis][stride], times sqrt(weight)
@@ -47,16 +49,17 @@ class Galerkin final : public ElasticBody {
     background.gauss = options.quadrature;
     background.cell_size = options.cell_size;
     cells_ = background_cells(*problem_.domain, problem_.nodes, background);
-    evaluate_cells();
     hold_surface();
-    const std::vector<int> order = build_pattern();
+    order_nodes();
+    evaluate_cells();
+    build_pattern();
     assemble();
     assemble_loads();
     report_.unknowns = 3 * problem_.nodes.size();
     report_.matrix_nonzeros = stiffness_.nonZeros();
     report_.assembly_seconds = assembly.seconds();
     const Stopwatch factor;
-    factorisation_ = factor_symmetric(stiffness_, order);
+    factorisation_ = factor_ordered(stiffness_);
     report_.factor_nonzeros = factorisation_->nonzeros();
     report_.factor_seconds = factor.seconds();
     if (options.estimate_condition) {
@@ -73,7 +76,7 @@ class Galerkin final : public ElasticBody {
     if (problem_.prescribed_field)
       for (std::size_t k = 0; k < held_.size(); ++k)
         prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) = problem_.prescribed_field(held_[k].centroid);
-    return field_of(factorisation_->solve(loads_ + constraint_loads(prescribed)), 1, prescribed);
+    return field_of(solve_ordered(loads_ + constraint_loads(prescribed)), 1, prescribed);
   }
 
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
@@ -81,7 +84,7 @@ class Galerkin final : public ElasticBody {
     for (std::size_t c = 0; c < candidates.size(); ++c)
       for (int axis = 0; axis < 3; ++axis)
         add_force(contact_mean(candidates[c]), Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
-    const MatrixX solution = factorisation_->solve(right);
+    const MatrixX solution = solve_ordered(right);
     const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
     std::vector<Field> responses;
     responses.reserve(static_cast<std::size_t>(solution.cols()));
@@ -92,7 +95,7 @@ class Galerkin final : public ElasticBody {
 
   Field prescribed_response(const std::vector<Vector3>& values) const override {
     const VectorX prescribed = prescribed_values(problem_, values);
-    return field_of(factorisation_->solve(constraint_loads(prescribed)), 0, prescribed);
+    return field_of(solve_ordered(constraint_loads(prescribed)), 0, prescribed);
   }
 
   std::vector<Vector3> constraint_points() const override {
@@ -116,13 +119,30 @@ class Galerkin final : public ElasticBody {
                   const std::vector<Vector3>& nodal_forces) const override;
 
  private:
+  void order_nodes();
   void evaluate_cells();
   void hold_surface();
-  std::vector<int> build_pattern();
+  void build_pattern();
   void assemble();
   void assemble_loads();
   [[nodiscard]] double constraint_stiffness(int node) const {
     return penalty * problem_.material.young_modulus * problem_.nodes.spacings[node];
+  }
+  /// The matrix is kept in elimination order; vectors outside are in node order.
+  [[nodiscard]] MatrixX ordered(const MatrixX& by_node) const {
+    MatrixX by_rank(by_node.rows(), by_node.cols());
+    for (Eigen::Index i = 0; i < std::ssize(rank_); ++i)
+      by_rank.middleRows<3>(3 * static_cast<Eigen::Index>(rank_[i])) = by_node.middleRows<3>(3 * i);
+    return by_rank;
+  }
+  [[nodiscard]] MatrixX unordered(const MatrixX& by_rank) const {
+    MatrixX by_node(by_rank.rows(), by_rank.cols());
+    for (Eigen::Index i = 0; i < std::ssize(rank_); ++i)
+      by_node.middleRows<3>(3 * i) = by_rank.middleRows<3>(3 * static_cast<Eigen::Index>(rank_[i]));
+    return by_node;
+  }
+  [[nodiscard]] MatrixX solve_ordered(const MatrixX& right) const {
+    return unordered(factorisation_->solve(ordered(right)));
   }
   template <typename Column>
   static void add_force(const DisplacementMean& mean, const Vector3& force, Column&& right) {
@@ -151,14 +171,47 @@ class Galerkin final : public ElasticBody {
   BackgroundCells cells_;
   std::unique_ptr<SurfacePatches> patches_;
   std::vector<DisplacementMean> held_; // one per prescribed entry
+  std::vector<int> rank_;              // elimination rank of every node
   std::vector<CellShapes> shapes_;
-  std::vector<int> cells_start_, cells_of_node_;             // compressed rows: (cell, place of the node in it) pairs
-  std::vector<int> constraints_start_, constraints_of_node_; // prescribed entries whose support holds the node
-  std::vector<int> column_start_, column_rows_;              // lower block pattern, rows >= column, ascending
-  SparseMatrix stiffness_;                                   // lower triangle (diagonal blocks full)
+  std::vector<int> cells_start_, cells_of_rank_;             // compressed rows: (cell, place of the node in it) pairs
+  std::vector<int> constraints_start_, constraints_of_rank_; // prescribed entries whose mean holds the node
+  std::vector<int> column_start_, column_rows_;              // lower block pattern in ranks, rows >= column, ascending
+  SparseMatrix stiffness_;                                   // lower triangle (diagonal blocks full), in ranks
   VectorX loads_;
   std::unique_ptr<Factorisation> factorisation_;
 };
+
+void Galerkin::order_nodes() {
+  // Nodes couple where their spheres overlap and through the means of the held surface. Ordering nodes instead of
+  // unknowns is a ninth of the graph, and a matrix assembled in elimination order needs no permutation in the
+  // factorisation.
+  const int count = problem_.nodes.size();
+  const std::vector<double>& radii = spheres_.radii();
+  const double largest = *std::max_element(radii.begin(), radii.end());
+  const topology::PointTree tree(problem_.nodes.positions);
+  std::vector<topology::PointTree::Found> near;
+  std::vector<std::vector<int>> means_of_node(count);
+  for (int p = 0; p < std::ssize(held_); ++p)
+    for (int node : held_[p].nodes)
+      means_of_node[node].push_back(p);
+  std::vector<int> start(1, 0), neighbours;
+  for (int i = 0; i < count; ++i) {
+    near.clear();
+    tree.within(problem_.nodes.positions[i], radii[i] + largest, near);
+    for (const topology::PointTree::Found& other : near) {
+      const double reach = radii[i] + radii[other.index];
+      if (other.squared_distance < reach * reach)
+        neighbours.push_back(other.index);
+    }
+    for (int p : means_of_node[i])
+      neighbours.insert(neighbours.end(), held_[p].nodes.begin(), held_[p].nodes.end());
+    start.push_back(static_cast<int>(neighbours.size()));
+  }
+  const std::vector<int> order = fill_reducing_ordering(start, neighbours);
+  rank_.resize(count);
+  for (int k = 0; k < count; ++k)
+    rank_[order[k]] = k;
+}
 
 void Galerkin::evaluate_cells() {
   const int cell_count = static_cast<int>(cells_.start.size()) - 1;
@@ -175,34 +228,39 @@ void Galerkin::evaluate_cells() {
                                          "nodes leave a hole there",
                                          x.x(), x.y(), x.z(), at_point[q].size()));
       for (int node : at_point[q].nodes)
-        if (place[node] < 0) {
-          place[node] = 0;
-          cell.nodes.push_back(node);
+        if (place[rank_[node]] < 0) {
+          place[rank_[node]] = 0;
+          cell.ranks.push_back(rank_[node]);
         }
     }
-    std::sort(cell.nodes.begin(), cell.nodes.end());
-    if (std::ssize(cell.nodes) > stiffness_kernel_rows)
+    std::sort(cell.ranks.begin(), cell.ranks.end());
+    if (std::ssize(cell.ranks) > stiffness_kernel_rows)
       throw NumericalError(fmt::format("a background cell is covered by {} nodes; at most {} are handled: the node "
                                        "spacing changes too abruptly",
-                                       cell.nodes.size(), stiffness_kernel_rows));
-    cell.stride = (static_cast<int>(cell.nodes.size()) + 7) / 8 * 8;
+                                       cell.ranks.size(), stiffness_kernel_rows));
+    cell.stride = (static_cast<int>(cell.ranks.size()) + 7) / 8 * 8;
     cell.gradients.assign(static_cast<std::size_t>(3 * cell.points) * cell.stride, 0.0);
-    for (int k = 0; k < std::ssize(cell.nodes); ++k)
-      place[cell.nodes[k]] = k;
+    for (int k = 0; k < std::ssize(cell.ranks); ++k)
+      place[cell.ranks[k]] = k;
     for (int q = 0; q < cell.points; ++q) {
       const double root = std::sqrt(cells_.points[cells_.start[c] + q].weight);
       double* x = cell.gradients.data() + static_cast<std::size_t>(3 * q) * cell.stride;
       double* y = x + cell.stride;
       double* z = y + cell.stride;
       for (int k = 0; k < at_point[q].size(); ++k) {
-        const int p = place[at_point[q].nodes[k]];
+        const int node = at_point[q].nodes[k];
+        const double radius = spheres_.radii()[node];
+        cell.grown = cell.grown ||
+                     (cells_.points[cells_.start[c] + q].position - problem_.nodes.positions[node]).squaredNorm() >=
+                         radius * radius;
+        const int p = place[rank_[node]];
         x[p] = root * at_point[q].dx[k];
         y[p] = root * at_point[q].dy[k];
         z[p] = root * at_point[q].dz[k];
       }
     }
-    for (int node : cell.nodes)
-      place[node] = -1;
+    for (int rank : cell.ranks)
+      place[rank] = -1;
   }
 }
 
@@ -220,66 +278,68 @@ void Galerkin::hold_surface() {
     held_.push_back(value_at(spheres_, problem_.nodes.positions[node]));
 }
 
-std::vector<int> Galerkin::build_pattern() {
+void Galerkin::build_pattern() {
   const int count = problem_.nodes.size();
   cells_start_.assign(count + 1, 0);
   for (const CellShapes& cell : shapes_)
-    for (int node : cell.nodes)
-      ++cells_start_[node + 1];
+    for (int rank : cell.ranks)
+      ++cells_start_[rank + 1];
   constraints_start_.assign(count + 1, 0);
   for (const DisplacementMean& mean : held_)
     for (int node : mean.nodes)
-      ++constraints_start_[node + 1];
+      ++constraints_start_[rank_[node] + 1];
   for (int i = 0; i < count; ++i) {
     cells_start_[i + 1] += cells_start_[i];
     constraints_start_[i + 1] += constraints_start_[i];
   }
-  cells_of_node_.resize(2 * static_cast<std::size_t>(cells_start_[count]));
-  constraints_of_node_.resize(constraints_start_[count]);
+  cells_of_rank_.resize(2 * static_cast<std::size_t>(cells_start_[count]));
+  constraints_of_rank_.resize(constraints_start_[count]);
   std::vector<int> next(cells_start_.begin(), cells_start_.end() - 1);
   for (int c = 0; c < std::ssize(shapes_); ++c)
-    for (int k = 0; k < std::ssize(shapes_[c].nodes); ++k) {
-      const int slot = next[shapes_[c].nodes[k]]++;
-      cells_of_node_[2 * slot] = c;
-      cells_of_node_[2 * slot + 1] = k;
+    for (int k = 0; k < std::ssize(shapes_[c].ranks); ++k) {
+      const int slot = next[shapes_[c].ranks[k]]++;
+      cells_of_rank_[2 * slot] = c;
+      cells_of_rank_[2 * slot + 1] = k;
     }
   next.assign(constraints_start_.begin(), constraints_start_.end() - 1);
   for (int p = 0; p < std::ssize(held_); ++p)
     for (int node : held_[p].nodes)
-      constraints_of_node_[next[node]++] = p;
+      constraints_of_rank_[next[rank_[node]]++] = p;
 
+  // Two nodes of one cell whose spheres do not overlap share no point of it: their block is zero and left out.
+  std::vector<Vector3> centre(count);
+  std::vector<double> radius(count);
+  for (int i = 0; i < count; ++i) {
+    centre[rank_[i]] = problem_.nodes.positions[i];
+    radius[rank_[i]] = spheres_.radii()[i];
+  }
+  const auto overlap = [&](int a, int b) {
+    const double reach = radius[a] + radius[b];
+    return (centre[a] - centre[b]).squaredNorm() < reach * reach;
+  };
   column_start_.assign(1, 0);
   column_rows_.clear();
-  std::vector<int> full_start(1, 0), full;
   std::vector<int> seen(count, -1);
   for (int j = 0; j < count; ++j) {
     const auto visit = [&](int i) {
-      if (seen[i] == j)
-        return;
-      seen[i] = j;
-      full.push_back(i);
-      if (i >= j)
+      if (i >= j && seen[i] != j) {
+        seen[i] = j;
         column_rows_.push_back(i);
+      }
     };
     visit(j);
-    for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot)
-      for (int i : shapes_[cells_of_node_[2 * slot]].nodes)
-        visit(i);
+    for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot) {
+      const CellShapes& cell = shapes_[cells_of_rank_[2 * slot]];
+      for (std::size_t k = cells_of_rank_[2 * slot + 1]; k < cell.ranks.size(); ++k)
+        if (cell.grown || overlap(j, cell.ranks[k]))
+          visit(cell.ranks[k]);
+    }
     for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot)
-      for (int i : held_[constraints_of_node_[slot]].nodes)
-        visit(i);
+      for (int node : held_[constraints_of_rank_[slot]].nodes)
+        visit(rank_[node]);
     std::sort(column_rows_.begin() + column_start_.back(), column_rows_.end());
     column_start_.push_back(static_cast<int>(column_rows_.size()));
-    full_start.push_back(static_cast<int>(full.size()));
   }
-  // Ordering nodes instead of unknowns: a ninth of the graph.
-  const std::vector<int> node_order = fill_reducing_ordering(full_start, full);
-  std::vector<int> order;
-  order.reserve(3 * node_order.size());
-  for (int node : node_order)
-    for (int c = 0; c < 3; ++c)
-      order.push_back(3 * node + c);
-  return order;
 }
 
 void Galerkin::assemble() {
@@ -314,25 +374,29 @@ void Galerkin::assemble() {
           inner[offset + 3 * rows * b + 3 * k + a] = 3 * i + a;
     }
     for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot) {
-      const CellShapes& cell = shapes_[cells_of_node_[2 * slot]];
-      const int own = cells_of_node_[2 * slot + 1], size = static_cast<int>(cell.nodes.size());
+      const CellShapes& cell = shapes_[cells_of_rank_[2 * slot]];
+      const int own = cells_of_rank_[2 * slot + 1], size = static_cast<int>(cell.ranks.size());
       stiffness_column(cell.gradients.data(), cell.points, cell.stride, own, size, own, lambda, mu, column);
       for (int k = own; k < size; ++k) {
-        const int p = 3 * place[cell.nodes[k]];
+        const int p = 3 * place[cell.ranks[k]];
+        if (p < 0)
+          continue;
         for (int b = 0; b < 3; ++b)
           for (int a = 0; a < 3; ++a)
             target[b][p + a] += column.plane[3 * a + b][k];
       }
     }
     for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot) {
-      const Prescribed& entry = problem_.prescribed[constraints_of_node_[slot]];
-      const DisplacementMean& mean = held_[constraints_of_node_[slot]];
-      const std::size_t own = std::lower_bound(mean.nodes.begin(), mean.nodes.end(), j) - mean.nodes.begin();
+      const Prescribed& entry = problem_.prescribed[constraints_of_rank_[slot]];
+      const DisplacementMean& mean = held_[constraints_of_rank_[slot]];
+      std::size_t own = 0;
+      while (rank_[mean.nodes[own]] != j)
+        ++own;
       const double factor = constraint_stiffness(entry.node) * mean.weights[own];
-      for (std::size_t k = own; k < mean.nodes.size(); ++k)
+      for (std::size_t k = 0; k < mean.nodes.size(); ++k)
         for (int c = 0; c < 3; ++c)
-          if (entry.components[c])
-            target[c][3 * place[mean.nodes[k]] + c] += factor * mean.weights[k];
+          if (entry.components[c] && rank_[mean.nodes[k]] >= j)
+            target[c][3 * place[rank_[mean.nodes[k]]] + c] += factor * mean.weights[k];
     }
     for (int k = 0; k < rows; ++k)
       place[column_rows_[begin + k]] = -1;
@@ -378,7 +442,8 @@ double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nod
     add_force(contact_mean(loaded_nodes[k]), nodal_forces[k], applied);
   // The penalty terms stand on both sides; as forces they are of the size of the others.
   const std::vector<Vector3> held = constraint_forces(field);
-  VectorX rows = stiffness_.selfadjointView<Eigen::Lower>() * field.coefficients - constraint_loads(field.prescribed);
+  const VectorX product = stiffness_.selfadjointView<Eigen::Lower>() * VectorX(ordered(field.coefficients));
+  const VectorX rows = unordered(product) - constraint_loads(field.prescribed);
   const double unbalanced = (rows - applied).lpNorm<Eigen::Infinity>();
   double largest = applied.lpNorm<Eigen::Infinity>();
   for (const Vector3& force : held)
