@@ -327,16 +327,17 @@ SparseMatrix Collocation::constrained_system() const {
 }
 
 std::vector<Field> Collocation::force_responses(const std::vector<int>& candidates) const {
+  const VectorX no_displacement = VectorX::Zero(3 * std::ssize(problem_.prescribed));
+  MatrixX right = MatrixX::Zero(report_.unknowns, 3 * std::ssize(candidates));
+  for (Eigen::Index c = 0; c < std::ssize(candidates); ++c)
+    for (int axis = 0; axis < 3; ++axis)
+      if (!constrained_[candidates[c]][axis])
+        right(stride_ * candidates[c] + axis, 3 * c + axis) = 1;
+  const MatrixX solution = factorisation_->solve(right);
   std::vector<Field> responses;
   responses.reserve(3 * candidates.size());
-  const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
-  for (int candidate : candidates)
-    for (int axis = 0; axis < 3; ++axis) {
-      VectorX right = VectorX::Zero(report_.unknowns);
-      if (!constrained_[candidate][axis])
-        right[stride_ * candidate + axis] = 1;
-      responses.push_back(field_of(factorisation_->solve(right).col(0), 0, no_displacement));
-    }
+  for (Eigen::Index k = 0; k < solution.cols(); ++k)
+    responses.push_back(field_of(solution.col(k), 0, no_displacement));
   return responses;
 }
 
