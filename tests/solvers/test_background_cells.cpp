@@ -81,7 +81,7 @@ TEST_CASE("Background cells are as small as the local spacing asks") {
   for (const solvers::QuadraturePoint& point : cells.points) {
     const double edge = std::cbrt(point.weight);
     if (point.position.z() > 0.5)
-      CHECK(edge < 1.36 * 0.05);
+      CHECK(edge < 1.61 * 0.05);
     else if (point.position.z() < 0.25)
       CHECK(edge > 0.09); // and no smaller than it need be
   }
