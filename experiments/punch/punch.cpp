@@ -4,8 +4,8 @@
 // Reference: F = 2 E a d / (1 - nu^2); depth of the surface beside the punch (2 d / pi) asin(a / r) [Sneddon 1965].
 // Command:   spherecut experiment run punch --out DIR
 #include "experiments/analytic/half_space.hpp"
+#include "experiments/punch/press_punch.hpp"
 #include "experiments/registered.hpp"
-#include "experiments/support/half_space_contact.hpp"
 #include "experiments/support/statistics.hpp"
 
 #include "src/figure.hpp"
@@ -20,8 +20,6 @@ namespace {
 
 using solvers::Method;
 
-constexpr double depth = 1e-6 * contact_radius;
-
 /// One size and Poisson ratio with the bounds of the default method and of the other; 0: no bound.
 struct Size {
   double poisson_ratio;
@@ -32,6 +30,21 @@ struct Size {
 const std::vector<Size> sizes = {
     {0.3, 300, 0.06, 0.06, 0}, {0.3, 600, 0, 0, 0}, {0.3, 1200, 0.02, 0.035, 0.03}, {0.49, 1500, 0.05, 0.05, 0.03}};
 
+/// Adds the surface of one run to the figure, the first time with the exact one.
+void draw_profile(const PunchRun& run, const std::string& method, app::Figure& figure) {
+  app::Series computed{fmt::format("{}, {} nodes", method, run.body.nodes()), {}, {}, app::SeriesStyle::points};
+  app::Series exact{"exact", {}, {}, app::SeriesStyle::lines};
+  for (const SurfaceSample& sample : run.profile) {
+    computed.x.push_back(sample.r / contact_radius);
+    computed.y.push_back(sample.mean / punch_depth);
+    exact.x.push_back(sample.r / contact_radius);
+    exact.y.push_back(flat_punch_profile(contact_radius, punch_depth, sample.r) / punch_depth);
+  }
+  if (figure.series.empty())
+    figure.series.push_back(exact);
+  figure.series.push_back(computed);
+}
+
 } // namespace
 
 std::vector<Check> run_punch(const ExperimentContext& context) {
@@ -41,7 +54,6 @@ std::vector<Check> run_punch(const ExperimentContext& context) {
   app::Figure forces{"Flat punch: force over exact", "nodes", "F / F exact", true, false, {}};
   app::Figure profiles{"Flat punch: surface beside the punch", "r / a", "depth / d", false, false, {}};
   double worst_imbalance = 0;
-  bool exact_drawn = false;
   for (Method method : {Method::galerkin, Method::collocation}) {
     app::Series dots{std::string(solvers::to_string(method)) + ", nu = 0.3", {}, {}, app::SeriesStyle::points};
     for (const Size& size : sizes) {
@@ -52,43 +64,17 @@ std::vector<Check> run_punch(const ExperimentContext& context) {
       for (int seed = 1; seed <= seeds; ++seed) {
         const HalfSpaceCase half_space{Indenter::punch, method, size.poisson_ratio, size.nodes,
                                        static_cast<std::uint64_t>(seed)};
-        const HalfSpaceBody body = half_space_body(half_space);
-        const topology::FlatPunch punch{contact_radius, 10 * contact_radius};
-        solvers::ContactOptions options;
-        options.gap_tolerance = 1e-9 * depth;
-        const solvers::ContactState state =
-            solvers::press(body.patch, punch, topology::pose_at(punch, {0, 0, -depth}), options);
-        const solvers::Field field = solvers::deform(body.patch, state);
-        const auto exact = [](double r) { return flat_punch_profile(contact_radius, depth, r); };
-        const auto profile = surface_profile(body, field, contact_radius + body.fine, 3 * contact_radius, exact);
-        double error = 0;
-        for (const SurfaceSample& sample : profile)
-          error = std::max(error, sample.largest_error / depth);
-        const double ratio = state.tool_force.z() / flat_punch_force({1, size.poisson_ratio, 0}, contact_radius, depth);
-        const double imbalance = far_force_imbalance(body, state, field);
-        worst_imbalance = std::max(worst_imbalance, imbalance);
-        ratios.push_back(ratio);
-        errors.push_back(error);
-        table.add(half_space_row(half_space, body, ratio, error, imbalance));
+        const PunchRun run = press_punch(half_space);
+        worst_imbalance = std::max(worst_imbalance, run.imbalance);
+        ratios.push_back(run.force_ratio);
+        errors.push_back(run.profile_error);
+        table.add(half_space_row(half_space, run.body, run.force_ratio, run.profile_error, run.imbalance));
         if (size.poisson_ratio == 0.3) {
-          dots.x.push_back(body.nodes());
-          dots.y.push_back(ratio);
+          dots.x.push_back(run.body.nodes());
+          dots.y.push_back(run.force_ratio);
         }
-        if (size.poisson_ratio == 0.3 && size.nodes == (context.quick ? 300 : 1200) && seed == 1) {
-          app::Series curve{
-              fmt::format("{}, {} nodes", solvers::to_string(method), body.nodes()), {}, {}, app::SeriesStyle::points};
-          app::Series line{"exact", {}, {}, app::SeriesStyle::lines};
-          for (const SurfaceSample& sample : profile) {
-            curve.x.push_back(sample.r / contact_radius);
-            curve.y.push_back(sample.mean / depth);
-            line.x.push_back(sample.r / contact_radius);
-            line.y.push_back(exact(sample.r) / depth);
-          }
-          if (!exact_drawn)
-            profiles.series.push_back(line);
-          exact_drawn = true;
-          profiles.series.push_back(curve);
-        }
+        if (size.poisson_ratio == 0.3 && size.nodes == (context.quick ? 300 : 1200) && seed == 1)
+          draw_profile(run, std::string(solvers::to_string(method)), profiles);
       }
       context.say(fmt::format("{}, nu = {}, about {} nodes: force / exact {:.4f} ({:.4f} to {:.4f}), profile {:.4f}",
                               solvers::to_string(method), size.poisson_ratio, size.nodes, median(ratios),

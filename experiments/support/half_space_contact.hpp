@@ -28,7 +28,7 @@ struct HalfSpaceCase {
   std::uint64_t seed = 1;
 };
 
-/// The body and its condensed patch. Seconds are wall clock.
+/// The body and its condensed patch. Seconds are processor time.
 struct HalfSpaceBody {
   std::unique_ptr<solvers::Discretisation> body;
   solvers::ContactPatch patch;

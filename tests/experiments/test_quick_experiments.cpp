@@ -68,3 +68,7 @@ TEST_CASE("Quick Hertz: force and far boundary agree with the exact contact") {
 TEST_CASE("Quick hemisphere palpation: the whole organ at 500 nodes against finite elements") {
   require_quick_run_passes("hemisphere_palpation");
 }
+
+TEST_CASE("Quick method comparison: no node set goes astray with either method") {
+  require_quick_run_passes("method_comparison");
+}
