@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <numbers>
 
 namespace spherecut::solvers {
 
@@ -24,14 +25,39 @@ struct Gap {
   Vector3 normal; // outward from the tool
 };
 
-/// Gap between a point and the part of the tool that can press on it. Under a flat punch that is its end face, whatever
-/// the depth: the nearest side wall must not squeeze nodes out sideways.
+/// Steepest flank of a ball that presses, from its axis. Beyond it the surface runs on as the tangent cone. On a liver
+/// at 1.6 radii depth, 65 degrees already lost single nodes and convergence; 55 did not, in both methods at three
+/// spacings.
+constexpr double flank = 55 * std::numbers::pi / 180;
+
+/// Gap to the front of a ball whose lowest point is the tool's reference point, continued by its tangent cone.
+Gap ball_gap(const topology::ToolPose& pose, const Vector3& x, double radius) {
+  const Vector3 arm = x - pose.point - radius * pose.axis; // from the centre
+  const double along = arm.dot(pose.axis);
+  const Vector3 across = arm - along * pose.axis;
+  const double distance = across.norm();
+  if (std::atan2(distance, -along) <= flank)
+    return {arm.norm() - radius, arm.normalized()};
+  const Vector3 sideways = distance > 0 ? Vector3(across / distance) : pose.axis.unitOrthogonal();
+  const Vector3 normal = std::sin(flank) * sideways - std::cos(flank) * pose.axis;
+  return {normal.dot(arm) - radius, normal};
+}
+
+/// Gap between a point and the part of the tool that can press on it. Linear elasticity cannot fold tissue over the
+/// flank of a tool: nodes driven past it would slip off one by one. So nothing is pushed sideways more than `flank`
+/// from the axis: under a flat punch the end face counts, whatever the depth, and a ball runs on as its tangent cone.
+/// This changes nothing for presses shallower than about half the radius. An instrument's shaft counts as it is.
 Gap contact_gap(const topology::ToolShape& tool, const topology::ToolPose& pose, const Vector3& x) {
+  const double along = (x - pose.point).dot(pose.axis);
   if (const auto* punch = std::get_if<topology::FlatPunch>(&tool)) {
-    const Vector3 arm = x - pose.point;
-    const double along = arm.dot(pose.axis);
-    if ((arm - along * pose.axis).squaredNorm() < punch->radius * punch->radius && along < 0.5 * punch->length)
+    if ((x - pose.point - along * pose.axis).squaredNorm() < punch->radius * punch->radius &&
+        along < 0.5 * punch->length)
       return {-along, -pose.axis};
+  } else if (const auto* ball = std::get_if<topology::SphereTip>(&tool)) {
+    return ball_gap(pose, x, ball->radius);
+  } else if (const auto* instrument = std::get_if<topology::Laparoscope>(&tool)) {
+    if (along < 3 * instrument->tip_radius)
+      return ball_gap(pose, x, instrument->tip_radius);
   }
   return {topology::tool_distance(tool, pose, x), topology::tool_normal(tool, pose, x)};
 }
