@@ -1,8 +1,123 @@
+// The command line. Exit status: 0 done, 1 a check of an experiment failed, 2 unusable input or command line,
+// 3 numerical failure, 130 interrupted.
+#include "experiments/experiment.hpp"
+#include "src/run.hpp"
+#include "src/scenario_keys.hpp"
 #include "src/version.hpp"
+#include "topology/errors.hpp"
 
+#include <CLI/CLI.hpp>
+#include <csignal>
 #include <fmt/core.h>
 
-int main() {
-  fmt::print("spherecut {}\n", spherecut::app::version());
+namespace {
+
+using namespace spherecut;
+
+constexpr int status_check_failed = 1;
+constexpr int status_bad_input = 2;
+constexpr int status_numerical = 3;
+constexpr int status_interrupted = 130;
+
+int complain(const std::string& message, int status) {
+  fmt::print(stderr, "spherecut: error: {}\n", message);
+  return status;
+}
+
+void list_experiments(bool names_only) {
+  for (const experiments::Experiment& experiment : experiments::all_experiments())
+    if (names_only)
+      fmt::print("{}\n", experiment.name);
+    else
+      fmt::print("{:<24} {}\n", experiment.name, experiment.purpose);
+}
+
+int run_experiment(const std::string& name, const std::string& out, bool quick) {
+  const auto say = [](const std::string& line) {
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+  };
+  const auto checks = experiments::run_experiment(name, out, quick, say);
+  std::size_t width = 5;
+  for (const experiments::Check& check : checks)
+    width = std::max(width, check.name.size());
+  bool all_pass = true;
+  fmt::print("\n{:<{}}  {:>12}     {:>10}\n", "check", width, "value", "bound");
+  for (const experiments::Check& check : checks) {
+    all_pass = all_pass && check.pass();
+    fmt::print("{:<{}}  {:>12.5g}  {} {:>10.4g}  {}\n", check.name, width, check.value, check.relation, check.bound,
+               check.pass() ? "pass" : "FAIL");
+  }
+  fmt::print("{}: {}; results in {}\n", name, all_pass ? "every check passed" : "a check FAILED", out);
+  return all_pass ? 0 : status_check_failed;
+}
+
+int run(int argc, char** argv) {
+  CLI::App commands("Spherecut: palpation of soft tissue by the method of finite spheres", "spherecut");
+  commands.set_version_flag("--version", fmt::format("spherecut {}", app::version()));
+  commands.require_subcommand(1);
+  std::string scenario;
+  std::string out;
+  std::string name;
+  bool quick = false;
+  bool names_only = false;
+
+  auto* run_command = commands.add_subcommand("run", "Run a scenario");
+  run_command->add_option("scenario", scenario, "TOML file")->required();
+  run_command->add_option("--out", out, "Folder for the results; must not hold results yet")->required();
+
+  auto* check = commands.add_subcommand("check", "Check a scenario without running it");
+  check->add_option("scenario", scenario, "TOML file")->required();
+
+  auto* experiment = commands.add_subcommand("experiment", "List or run the experiments");
+  experiment->require_subcommand(1);
+  auto* list = experiment->add_subcommand("list", "List the experiments");
+  list->add_flag("--names", names_only, "Names alone");
+  auto* run_one = experiment->add_subcommand("run", "Run one experiment");
+  run_one->add_option("name", name, "Name, from the list")->required();
+  run_one->add_option("--out", out, "Folder for tables, figures and summary.json")->required();
+  run_one->add_flag("--quick", quick, "Smaller variant");
+
+  auto* help = commands.add_subcommand("scenario-help", "Every key of a scenario file");
+  bool markdown = false;
+  help->add_flag("--markdown", markdown, "As the reference part of docs/scenario.md");
+
+  try {
+    commands.parse(argc, argv);
+  } catch (const CLI::Success& success) { // --help, --version
+    return commands.exit(success);
+  } catch (const CLI::ParseError& error) {
+    return complain(fmt::format("{} (spherecut --help)", error.what()), status_bad_input);
+  }
+
+  if (run_command->parsed())
+    return app::run_scenario(scenario, out, stdout) == app::RunEnd::complete ? 0 : status_interrupted;
+  if (check->parsed())
+    app::check_scenario(scenario, stdout);
+  else if (list->parsed())
+    list_experiments(names_only);
+  else if (run_one->parsed())
+    return run_experiment(name, out, quick);
+  else
+    fmt::print("{}", markdown ? app::scenario_reference() : app::scenario_help());
   return 0;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGPIPE, SIG_IGN); // a run goes on when nobody reads its progress
+  try {
+    return run(argc, argv);
+  } catch (const InputError& error) {
+    return complain(error.what(), status_bad_input);
+  } catch (const NumericalError& error) {
+    return complain(error.what(), status_numerical);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return complain(error.what(), status_bad_input);
+  } catch (const std::bad_alloc&) {
+    return complain("out of memory; use fewer nodes or a coarser mesh", status_numerical);
+  } catch (const std::exception& error) {
+    return complain(fmt::format("unexpected: {}", error.what()), status_numerical);
+  }
 }

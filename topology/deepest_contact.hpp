@@ -138,11 +138,13 @@ Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const T
   const Vector3 across = pose.axis.cross(down);
 
   const double margin = 1e-7 * punch.radius; // differences below it are rounding
+  int last = at_centre.triangle;
   const auto probe = [&](double along_down, double along_across) {
     const Vector3 x = pose.point + punch.radius * (along_down * down + along_across * across);
     // Nearer to the surface than the depth to beat: not deeper, whichever side it is on.
     const double enough = std::max(0.0, best.depth + margin);
-    const NearestPoint nearest = surface.nearest(x, punch.radius, -1, enough);
+    const NearestPoint nearest = surface.nearest(x, punch.radius, last, enough);
+    last = nearest.triangle;
     if (-nearest.signed_distance > best.depth + margin)
       best = {nearest, x, -nearest.signed_distance};
   };

@@ -1,0 +1,115 @@
+#include "src/run.hpp"
+
+#include "src/interrupt.hpp"
+#include "src/progress.hpp"
+#include "src/run_output.hpp"
+#include "topology/errors.hpp"
+
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+std::string short_text(const Session& session) {
+  const topology::Domain& domain = *session.organ().domain;
+  const Vector3 extent = 1e3 * domain.bounds().extent();
+  return fmt::format("organ: {} triangles, {:.0f} x {:.0f} x {:.0f} mm, {:.4g} litres",
+                     domain.surface().triangles.size(), extent.x(), extent.y(), extent.z(),
+                     1e3 * topology::volume(domain.surface()));
+}
+
+std::string findings_text(const Session& session, const RunOutput& output, const std::filesystem::path& out) {
+  const RunFindings& found = output.findings();
+  std::string text;
+  if (found.touched) {
+    const StepResult& peak = found.peak;
+    text += fmt::format("peak force {:.4g} N at t = {:.3g} s, tool {:.3g} mm below the surface at rest\n",
+                        peak.force.norm(), peak.time, 1e3 * peak.contact.depth);
+    text += fmt::format("  on the tool [{:.4g}, {:.4g}, {:.4g}] N; contact radius {:.3g} mm, {} nodes in contact\n",
+                        peak.force.x(), peak.force.y(), peak.force.z(), 1e3 * peak.contact_radius, peak.active_nodes);
+    text += fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
+                        solvers::to_string(session.scenario().method.method),
+                        session.body()->report().condition_estimate, found.largest_residual);
+  } else {
+    text += fmt::format("no contact: the force is zero in all {} steps\n", found.steps);
+  }
+  for (const std::string& remark : output.remarks())
+    text += fmt::format("warning: {}\n", remark);
+  text += fmt::format("results in {}:", out.string());
+  for (const std::string& file : output.files())
+    text += " " + file;
+  return text;
+}
+
+// A folder made for a run that never began is not left behind.
+class FolderClaim {
+ public:
+  explicit FolderClaim(const std::filesystem::path& folder)
+      : folder_(folder), existed_(std::filesystem::exists(folder)) {
+    claim_results_folder(folder);
+  }
+  ~FolderClaim() {
+    std::error_code ignored;
+    if (!existed_ && !begun_)
+      std::filesystem::remove(folder_, ignored); // refuses a folder that is not empty
+  }
+  FolderClaim(const FolderClaim&) = delete;
+  FolderClaim& operator=(const FolderClaim&) = delete;
+  void begin() { begun_ = true; }
+
+ private:
+  std::filesystem::path folder_;
+  bool existed_;
+  bool begun_ = false;
+};
+
+} // namespace
+
+RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::path& out, std::FILE* screen) {
+  const InterruptWatch watch;
+  Progress progress(screen);
+  const auto say = [&](const std::string& line) { progress.say(line); };
+  Scenario scenario = read_scenario(file);
+  FolderClaim claim(out);
+  Session session(std::move(scenario), say);
+  say(short_text(session));
+  claim.begin();
+  RunOutput output(out, session);
+  RunEnd end = RunEnd::complete;
+  try {
+    for (const ToolSample& sample : session.motion()) {
+      if (watch.interrupted()) {
+        end = RunEnd::interrupted;
+        break;
+      }
+      const StepResult result = session.step(sample);
+      output.add(session, result);
+      progress.step(output.findings().steps, session.motion().size(),
+                    fmt::format("t = {:.3g} s, force {:.4g} N", result.time, result.force.norm()));
+    }
+    output.draw_figures(session);
+    output.write_summary(session, end == RunEnd::complete ? RunStatus::complete : RunStatus::interrupted, "");
+  } catch (const std::exception& error) {
+    try {
+      output.write_summary(session, RunStatus::failed, error.what());
+    } catch (const InputError&) { // the first error says why nothing can be written
+      say("summary.json could not be written either");
+    }
+    throw;
+  }
+  say((end == RunEnd::interrupted ? "interrupted; " : "") + findings_text(session, output, out));
+  return end;
+}
+
+void check_scenario(const std::filesystem::path& file, std::FILE* screen) {
+  Progress progress(screen);
+  const auto say = [&](const std::string& line) { progress.say(line); };
+  const Session session(read_scenario(file), say);
+  say(short_text(session));
+  if (session.touches())
+    say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
+                    1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
+  say(fmt::format("{}: good, {} steps", file.string(), session.motion().size()));
+}
+
+} // namespace spherecut::app

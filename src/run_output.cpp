@@ -1,0 +1,210 @@
+#include "src/run_output.hpp"
+
+#include "src/summary.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+constexpr std::string_view force_columns =
+    "time_s,tool_x_m,tool_y_m,tool_z_m,axis_x,axis_y,axis_z,force_x_N,force_y_N,force_z_N,force_N,contact_x_m,"
+    "contact_y_m,contact_z_m,depth_m,contact_radius_m,active_nodes,candidate_nodes,nodes,iterations,converged,residual,"
+    "penetration_m,rotation_deg,resprinkled,force_jump,seconds\n";
+
+std::string force_row(const StepResult& s) {
+  const auto vector = [](const Vector3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z()); };
+  return fmt::format("{:.9g},{},{},{},{:.9g},{},{:.9g},{:.9g},{},{},{},{},{},{:.3e},{:.3e},{:.4g},{},{:.4g},{:.4g}\n",
+                     s.time, vector(s.pose.point), vector(s.pose.axis), vector(s.force), s.force.norm(),
+                     vector(s.contact.point), s.contact.depth, s.contact_radius, s.active_nodes, s.candidates, s.nodes,
+                     s.iterations, s.converged ? 1 : 0, s.residual, s.largest_penetration, s.rotation_degrees,
+                     s.resprinkled ? 1 : 0, s.force_jump, s.seconds);
+}
+
+double von_mises(const Matrix3& stress) {
+  const Matrix3 deviator = stress - stress.trace() / 3 * Matrix3::Identity();
+  return std::sqrt(1.5) * deviator.norm();
+}
+
+struct SampledField {
+  std::vector<Vector3> displacement; // m
+  std::vector<double> von_mises;     // Pa
+};
+
+SampledField sample(const std::vector<solvers::PointState>& states) {
+  SampledField sampled;
+  for (const solvers::PointState& state : states) {
+    sampled.displacement.push_back(state.displacement);
+    sampled.von_mises.push_back(von_mises(state.stress));
+  }
+  return sampled;
+}
+
+// The field at any point of the organ; nothing has moved before the first contact. A point beyond every sphere takes
+// the state of the nearest node.
+solvers::PointState state_at(const Session& session, const Vector3& x) {
+  if (session.body() == nullptr || session.node_states().empty())
+    return {};
+  try {
+    return session.body()->at(x, session.field());
+  } catch (const InputError&) {
+    const std::vector<Vector3>& nodes = session.sprinkling().nodes.positions;
+    const auto nearest = std::min_element(nodes.begin(), nodes.end(), [&](const Vector3& a, const Vector3& b) {
+      return (a - x).squaredNorm() < (b - x).squaredNorm();
+    });
+    return session.node_states()[static_cast<std::size_t>(nearest - nodes.begin())];
+  }
+}
+
+std::vector<Vector3> moved(const std::vector<Vector3>& points, const std::vector<Vector3>& displacement) {
+  std::vector<Vector3> out;
+  out.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    out.push_back(points[i] + displacement[i]);
+  return out;
+}
+
+// Height of the underside of the tool above the tangent plane at `origin`, mm, along one vertical; NaN beside the tool.
+double underside(const Session& session, const topology::ToolPose& pose, const Vector3& foot, const Vector3& up,
+                 double reach) {
+  constexpr int samples = 400;
+  for (int i = 0; i <= samples; ++i) {
+    const double height = reach * (2.0 * i / samples - 1);
+    if (topology::tool_distance(session.scenario().tool.shape, pose, foot + height * up) <= 0)
+      return 1e3 * height;
+  }
+  return std::nan("");
+}
+
+} // namespace
+
+RunOutput::RunOutput(std::filesystem::path folder, const Session& session)
+    : folder_(std::move(folder)), forces_(folder_ / "forces.csv") {
+  findings_.planned = session.motion().size();
+  forces_.write(force_columns);
+}
+
+void RunOutput::add(const Session& session, const StepResult& step) {
+  forces_.write(force_row(step));
+  if (const int every = session.scenario().output.vtp_every;
+      every > 0 && (findings_.steps % static_cast<std::size_t>(every) == 0 || findings_.steps + 1 == findings_.planned))
+    add_frame(session, step);
+  ++findings_.steps;
+  findings_.largest_residual = std::max(findings_.largest_residual, step.residual);
+  findings_.largest_rotation_degrees = std::max(findings_.largest_rotation_degrees, step.rotation_degrees);
+  if (step.resprinkled)
+    findings_.resprinkles.emplace_back(step.time, step.force_jump);
+  if (step.force.norm() > 0)
+    findings_.touched = true;
+  if (step.force.norm() > findings_.peak.force.norm()) {
+    findings_.peak = step;
+    keep_profile(session, step);
+  }
+  history_.push_back(step);
+}
+
+void RunOutput::add_frame(const Session& session, const StepResult& step) {
+  if (series_.empty()) {
+    std::filesystem::create_directory(folder_ / "frames");
+    files_.insert(files_.end(), {"series.pvd", "frames"});
+  }
+  const auto name = [&](std::string_view what) { return fmt::format("frames/{}_{:05}.vtp", what, findings_.steps); };
+
+  const topology::SurfaceMesh& surface = session.organ().domain->surface();
+  std::vector<solvers::PointState> states;
+  states.reserve(surface.vertices.size());
+  for (const Vector3& x : surface.vertices)
+    states.push_back(state_at(session, x));
+  const SampledField skin = sample(states);
+  write_vtp(folder_ / name("surface"), moved(surface.vertices, skin.displacement), surface.triangles,
+            {vector_data("displacement [m]", skin.displacement), scalar_data("von Mises stress [Pa]", skin.von_mises)});
+  series_.push_back({step.time, 0, name("surface")});
+
+  const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+  if (nodes.size() > 0) {
+    std::vector<solvers::PointState> node_states = session.node_states();
+    node_states.resize(nodes.positions.size()); // at rest before the first contact
+    const SampledField inside = sample(node_states);
+    write_vtp(folder_ / name("nodes"), moved(nodes.positions, inside.displacement), {},
+              {vector_data("displacement [m]", inside.displacement),
+               scalar_data("von Mises stress [Pa]", inside.von_mises), scalar_data("spacing [m]", nodes.spacings),
+               vector_data("normal", nodes.normals)});
+    series_.push_back({step.time, 1, name("nodes")});
+  }
+
+  const topology::ToolShape& tool = session.scenario().tool.shape;
+  const topology::SurfaceMesh mesh = topology::tool_mesh(tool, step.pose, topology::tip_radius(tool) / 6);
+  write_vtp(folder_ / name("tool"), mesh.vertices, mesh.triangles, {});
+  series_.push_back({step.time, 2, name("tool")});
+  write_pvd(folder_ / "series.pvd", series_);
+}
+
+// The surface at rest, deformed, and the tool in the plane through the contact that holds its normal and the axis
+// nearest to x.
+void RunOutput::keep_profile(const Session& session, const StepResult& step) {
+  const Vector3 up = step.contact.normal;
+  Vector3 along = Vector3::UnitX() - up.x() * up;
+  if (along.norm() < 0.1)
+    along = Vector3::UnitY() - up.y() * up;
+  along.normalize();
+  const Vector3 origin = step.contact.point;
+  const double reach = 4 * std::max(session.zone().spacing.radius, step.contact_radius);
+  Series rest{"surface at rest", {}, {}, SeriesStyle::lines};
+  Series deformed{"deformed surface", {}, {}, SeriesStyle::lines};
+  Series tool{"tool", {}, {}, SeriesStyle::lines};
+  constexpr int samples = 200;
+  for (int i = -samples; i <= samples; ++i) {
+    const double s = reach * i / samples;
+    const Vector3 x = session.organ().domain->closest_surface_point(origin + s * along);
+    const Vector3 y = x + state_at(session, x).displacement;
+    rest.x.push_back(1e3 * along.dot(x - origin));
+    rest.y.push_back(1e3 * up.dot(x - origin));
+    deformed.x.push_back(1e3 * along.dot(y - origin));
+    deformed.y.push_back(1e3 * up.dot(y - origin));
+    tool.x.push_back(1e3 * s);
+    tool.y.push_back(underside(session, step.pose, origin + s * along, up, reach));
+  }
+  profile_ = Figure{};
+  profile_.title = fmt::format("Profile through the contact at t = {:.4g} s", step.time);
+  profile_.x_label = "distance from the contact [mm]";
+  profile_.y_label = "height over the contact [mm]";
+  profile_.series = {std::move(rest), std::move(deformed), std::move(tool)};
+}
+
+void RunOutput::draw_figures(const Session& session) {
+  if (!session.scenario().output.figures || history_.empty())
+    return;
+  Figure force;
+  force.title = session.scenario().title.empty() ? "Force on the tool" : session.scenario().title;
+  force.x_label = "time [s]";
+  force.y_label = "force on the tool [N]";
+  force.series = {{"|F|", {}, {}, SeriesStyle::lines_and_points},
+                  {"x", {}, {}, SeriesStyle::lines},
+                  {"y", {}, {}, SeriesStyle::lines},
+                  {"z", {}, {}, SeriesStyle::lines}};
+  for (const StepResult& step : history_)
+    for (std::size_t k = 0; k < 4; ++k) {
+      force.series[k].x.push_back(step.time);
+      force.series[k].y.push_back(k == 0 ? step.force.norm() : step.force[static_cast<Eigen::Index>(k) - 1]);
+    }
+  try {
+    write_png(force, folder_ / "force.png");
+    files_.emplace_back("force.png");
+    if (!profile_.series.empty()) {
+      write_png(profile_, folder_ / "profile.png");
+      files_.emplace_back("profile.png");
+    }
+  } catch (const InputError& error) {
+    remarks_.push_back(fmt::format("figures: {}", error.what()));
+  }
+}
+
+void RunOutput::write_summary(const Session& session, RunStatus status, const std::string& message) {
+  files_.emplace_back("summary.json");
+  replace_file(folder_ / "summary.json", summary_json(session, *this, status, message));
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,55 @@
+// What a run leaves behind: forces.csv row by row, VTP frames in a PVD series, figures, summary.json.
+#pragma once
+
+#include "src/figure.hpp"
+#include "src/output_file.hpp"
+#include "src/session.hpp"
+#include "src/vtp.hpp"
+
+namespace spherecut::app {
+
+enum class RunStatus { complete, interrupted, failed };
+
+/// What the run found, for the summary and the last lines on the screen.
+struct RunFindings {
+  std::size_t steps = 0;   // done
+  std::size_t planned = 0; // of the motion
+  bool touched = false;    // a force was felt
+  StepResult peak;         // step of the largest force
+  double largest_residual = 0, largest_rotation_degrees = 0;
+  std::vector<std::pair<double, double>> resprinkles; // time, relative jump of the force
+};
+
+class RunOutput {
+ public:
+  /// Opens forces.csv in a folder of claim_results_folder(). Throws InputError when a file cannot be written; so do the
+  /// others.
+  RunOutput(std::filesystem::path folder, const Session& session);
+
+  /// Adds the row, and the frame when one is due, of the step that the session has just done.
+  void add(const Session& session, const StepResult& step);
+
+  /// Draws the figures. What stops gnuplot is a remark in the summary, the numbers are safe by then.
+  void draw_figures(const Session& session);
+
+  void write_summary(const Session& session, RunStatus status, const std::string& message);
+
+  [[nodiscard]] const RunFindings& findings() const { return findings_; }
+  [[nodiscard]] const std::vector<std::string>& files() const { return files_; }
+  [[nodiscard]] const std::vector<std::string>& remarks() const { return remarks_; }
+
+ private:
+  void add_frame(const Session& session, const StepResult& step);
+  void keep_profile(const Session& session, const StepResult& step);
+
+  std::filesystem::path folder_;
+  OutputFile forces_;
+  RunFindings findings_;
+  std::vector<SeriesEntry> series_;
+  std::vector<StepResult> history_;
+  Figure profile_;
+  std::vector<std::string> files_{"forces.csv"};
+  std::vector<std::string> remarks_;
+};
+
+} // namespace spherecut::app

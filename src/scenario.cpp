@@ -1,0 +1,211 @@
+#include "src/scenario.hpp"
+
+#include "src/scenario_document.hpp"
+#include "topology/errors.hpp"
+
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+constexpr long most_steps = 1000000;
+constexpr double on_the_plane = 1e-9; // m, so that rounding does not lose the nodes of a face that bounds a region
+
+std::string text_of(const Vector3& v) {
+  return fmt::format("[{:g}, {:g}, {:g}]", v.x(), v.y(), v.z());
+}
+
+// A direction of any length but zero, made a unit vector.
+Vector3 direction(const Section& section, std::string_view name, std::string_view key, Offences& offences) {
+  const Vector3 value = section.vector(key);
+  if (value.norm() > 0)
+    return value.normalized();
+  offences.add(section.line(key), fmt::format("{} = [0, 0, 0]: has no direction; allowed: any other vector", name));
+  return Vector3::UnitZ();
+}
+
+OrganSettings organ(const Section& section, const std::filesystem::path& scenario, Offences& offences) {
+  OrganSettings organ;
+  const std::string shape = section.text("shape");
+  if (shape == "block") {
+    organ.shape = BlockOrgan{section.vector("size")};
+  } else if (shape == "cylinder") {
+    organ.shape = CylinderOrgan{section.number("radius"), section.number("height")};
+  } else if (shape == "hemisphere") {
+    organ.shape = HemisphereOrgan{section.number("radius")};
+  } else if (shape == "liver") {
+    organ.shape = LiverOrgan{static_cast<int>(section.integer("triangles"))};
+  } else {
+    const std::filesystem::path file = scenario.parent_path() / section.text("file");
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(file, ignored))
+      offences.add(section.line("file"), fmt::format("organ.file = \"{}\": there is no file {}", section.text("file"),
+                                                     file.lexically_normal().string()));
+    organ.shape = FileOrgan{file, section.number("scale")};
+  }
+  organ.edge = section.optional_number("edge").value_or(0);
+  organ.voxel_size = section.optional_number("voxel_size").value_or(0);
+  return organ;
+}
+
+FixedRegion fixed_region(const Section& section, std::size_t number, Offences& offences) {
+  FixedRegion region;
+  region.line = static_cast<int>(section.line());
+  region.name = section.text("name");
+  if (region.name.empty())
+    region.name = fmt::format("{}", number);
+  region.components = section.axes("axes");
+  const std::string kind = section.text("region");
+  if (kind == "box") {
+    const BoxRegion box{section.vector("lower"), section.vector("upper")};
+    if ((box.lower.array() > box.upper.array()).any())
+      offences.add(section.line("lower"), fmt::format("fixed[{}].lower = {} m: above upper = {} m; allowed: lower <= "
+                                                      "upper in every coordinate",
+                                                      number, text_of(box.lower), text_of(box.upper)));
+    region.shape = box;
+  } else if (kind == "sphere") {
+    region.shape = SphereRegion{section.vector("centre"), section.number("radius")};
+  } else {
+    const Vector3 normal = direction(section, fmt::format("fixed[{}].normal", number), "normal", offences);
+    region.shape = Plane{normal, normal.dot(section.vector("point"))};
+  }
+  return region;
+}
+
+NodeSettings nodes(const Section& section, Offences& offences) {
+  NodeSettings nodes;
+  nodes.fine_spacing = section.optional_number("fine_spacing").value_or(0);
+  nodes.coarse_spacing = section.optional_number("coarse_spacing").value_or(0);
+  nodes.slope = section.number("slope");
+  nodes.fine_radius = section.optional_number("fine_radius").value_or(0);
+  nodes.count = static_cast<int>(section.optional_integer("count").value_or(0));
+  nodes.random_seed = static_cast<std::uint64_t>(section.integer("random_seed"));
+  if (nodes.fine_spacing > 0 && nodes.coarse_spacing > 0 && nodes.coarse_spacing < nodes.fine_spacing)
+    offences.add(section.line("coarse_spacing"),
+                 fmt::format("nodes.coarse_spacing = {:g} m: below fine_spacing; allowed: at least {:g} m",
+                             nodes.coarse_spacing, nodes.fine_spacing));
+  return nodes;
+}
+
+topology::ToolShape tool_shape(const Section& section, Offences& offences) {
+  const std::string shape = section.text("shape");
+  if (shape == "sphere_tip")
+    return topology::SphereTip{section.number("radius")};
+  if (shape == "flat_punch")
+    return topology::FlatPunch{section.number("radius"), section.number("length")};
+  const topology::Laparoscope tool{section.number("tip_radius"), section.number("shaft_radius"),
+                                   section.number("shaft_length"), section.vector("port")};
+  if (tool.shaft_radius > tool.tip_radius)
+    offences.add(section.line("shaft_radius"),
+                 fmt::format("tool.shaft_radius = {:g} m: thicker than the tip; allowed: at most tip_radius = {:g} m",
+                             tool.shaft_radius, tool.tip_radius));
+  return tool;
+}
+
+std::vector<PathPoint> tool_path(const Section& tool, Offences& offences) {
+  std::vector<PathPoint> path;
+  for (const Section& section : tool.tables("path")) {
+    const PathPoint point{section.number("time"), section.vector("position")};
+    if (!path.empty() && point.time <= path.back().time)
+      offences.add(section.line("time"), fmt::format("tool.path[{}].time = {:g} s: not after the pose before it; "
+                                                     "allowed: above {:g} s",
+                                                     path.size() + 1, point.time, path.back().time));
+    path.push_back(point);
+  }
+  if (path.size() < 2)
+    offences.add(tool.line("path"), fmt::format("tool.path has {} pose; allowed: two or more", path.size()));
+  return path;
+}
+
+Approach approach(const Section& section, const ToolSettings& tool, Offences& offences) {
+  Approach approach;
+  approach.target = section.vector("target");
+  approach.direction = direction(section, "tool.approach.direction", "direction", offences);
+  approach.depth = section.number("depth");
+  approach.clearance = section.number("clearance");
+  approach.duration = section.number("duration");
+  Vector3 axis = tool.axis;
+  if (const auto* laparoscope = std::get_if<topology::Laparoscope>(&tool.shape))
+    axis = laparoscope->port - approach.target;
+  if (approach.direction.dot(axis) >= 0)
+    offences.add(section.line("direction"),
+                 fmt::format("tool.approach.direction = {}: moves the tool backwards; allowed: more than 90 degrees "
+                             "from its axis {}",
+                             text_of(approach.direction), text_of(axis.normalized())));
+  return approach;
+}
+
+ToolSettings tool(const Section& section, Offences& offences) {
+  ToolSettings tool;
+  tool.shape = tool_shape(section, offences);
+  if (!std::holds_alternative<topology::Laparoscope>(tool.shape))
+    tool.axis = direction(section, "tool.axis", "axis", offences);
+  tool.step = section.optional_number("step").value_or(0);
+  if (section.has("approach") == section.has("path")) {
+    offences.add(section.line(),
+                 fmt::format("tool has {} approach {} path; allowed: one of the two",
+                             section.has("approach") ? "both" : "neither", section.has("approach") ? "and" : "nor"));
+    return tool;
+  }
+  double duration = 0;
+  if (section.has("approach")) {
+    tool.motion = approach(section.table("approach"), tool, offences);
+    duration = std::get<Approach>(tool.motion).duration;
+  } else {
+    tool.motion = tool_path(section, offences);
+    const auto& path = std::get<std::vector<PathPoint>>(tool.motion);
+    duration = path.empty() ? 0 : path.back().time - path.front().time;
+  }
+  if (duration > 0 && tool.step > 0 && (tool.step > duration || duration / tool.step > most_steps))
+    offences.add(section.line("step"), fmt::format("tool.step = {:g} s: allowed for a motion of {:g} s: {:g} to {:g} s",
+                                                   tool.step, duration, duration / most_steps, duration));
+  return tool;
+}
+
+} // namespace
+
+bool FixedRegion::holds(const Vector3& x) const {
+  if (const auto* box = std::get_if<BoxRegion>(&shape))
+    return (x.array() >= box->lower.array() - on_the_plane).all() &&
+           (x.array() <= box->upper.array() + on_the_plane).all();
+  if (const auto* sphere = std::get_if<SphereRegion>(&shape))
+    return (x - sphere->centre).norm() <= sphere->radius + on_the_plane;
+  return std::get<Plane>(shape).signed_distance(x) <= on_the_plane;
+}
+
+Scenario read_scenario(const std::filesystem::path& file) {
+  const ScenarioDocument document(file);
+  const Section& root = document.root();
+  Offences offences(file.string());
+  Scenario scenario;
+  scenario.file = file;
+  scenario.text = document.text();
+  scenario.title = root.text("title");
+  scenario.organ = organ(root.table("organ"), file, offences);
+  const Section material = root.table("material");
+  scenario.material = {material.number("young_modulus"), material.number("poisson_ratio"), material.number("density")};
+  for (const Section& section : root.tables("fixed"))
+    scenario.fixed.push_back(fixed_region(section, scenario.fixed.size() + 1, offences));
+  if (scenario.fixed.empty())
+    offences.add(root.line("fixed"),
+                 "fixed = []: nothing is fixed, the organ would float; allowed: one region or more");
+  scenario.nodes = nodes(root.table("nodes"), offences);
+  const Section method = root.table("method");
+  scenario.method.method = solvers::method_from_string(method.text("name"));
+  scenario.method.support_radius = method.optional_number("support_radius").value_or(0);
+  scenario.method.quadrature = static_cast<int>(method.integer("quadrature"));
+  if (root.has("gravity"))
+    scenario.gravity = root.table("gravity").vector("acceleration");
+  scenario.tool = tool(root.table("tool"), offences);
+  const Section contact = root.table("contact");
+  if (contact.text("condition") == "bonded")
+    scenario.contact.condition = solvers::ContactCondition::bonded;
+  scenario.contact.candidate_radius = contact.optional_number("candidate_radius").value_or(0);
+  scenario.contact.follow_fraction = contact.number("follow_fraction");
+  const Section output = root.table("output");
+  scenario.output = {static_cast<int>(output.integer("vtp_every")), output.boolean("figures")};
+  offences.throw_if_any();
+  return scenario;
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,115 @@
+// A scenario file: organ, material, fixed regions, nodes, method, tool and its way, output. SI units throughout.
+#pragma once
+
+#include "solvers/contact_solver.hpp"
+#include "solvers/discretisation.hpp"
+#include "topology/tool.hpp"
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace spherecut::app {
+
+struct BlockOrgan {
+  Vector3 size = Vector3::Zero(); // m
+};
+struct CylinderOrgan {
+  double radius = 0, height = 0; // m
+};
+struct HemisphereOrgan {
+  double radius = 0; // m
+};
+struct LiverOrgan {
+  int triangles = 20000;
+};
+struct FileOrgan {
+  std::filesystem::path file; // resolved against the scenario's folder
+  double scale = 1;           // m per unit of the file
+};
+
+struct OrganSettings {
+  std::variant<BlockOrgan, CylinderOrgan, HemisphereOrgan, LiverOrgan, FileOrgan> shape;
+  double edge = 0;       // m, of the built-in block, cylinder, hemisphere; 0: derived
+  double voxel_size = 0; // m, level set of liver and file; 0: derived
+};
+
+struct BoxRegion {
+  Vector3 lower, upper; // m
+};
+struct SphereRegion {
+  Vector3 centre; // m
+  double radius;  // m
+};
+
+struct FixedRegion {
+  std::string name; // for messages
+  std::variant<BoxRegion, SphereRegion, Plane> shape;
+  std::array<bool, 3> components{true, true, true};
+  int line = 0;                                     // of the scenario file
+  [[nodiscard]] bool holds(const Vector3& x) const; // bounds included, to 1e-9 m
+};
+
+struct NodeSettings {
+  double fine_spacing = 0;   // m, 0: derived
+  double coarse_spacing = 0; // m, 0: derived
+  double slope = 0.3;
+  double fine_radius = 0; // m, 0: derived
+  int count = 0;          // 0: not scaled
+  std::uint64_t random_seed = 1;
+};
+
+/// Straight press along a line.
+struct Approach {
+  Vector3 target, direction;       // m; unit vector
+  double depth = 0, clearance = 0; // m after and before the first touch
+  double duration = 0;             // s
+};
+
+/// Where the tool's reference point is at a time.
+struct PathPoint {
+  double time = 0; // s
+  Vector3 position = Vector3::Zero();
+};
+
+struct ToolSettings {
+  topology::ToolShape shape;
+  Vector3 axis = Vector3::UnitZ(); // unit; a laparoscope takes its axis from its port
+  double step = 0;                 // s, 0: derived
+  std::variant<Approach, std::vector<PathPoint>> motion;
+};
+
+struct ContactSettings {
+  solvers::ContactCondition condition = solvers::ContactCondition::frictionless;
+  double candidate_radius = 0; // m, 0: derived
+  double follow_fraction = 0.5;
+};
+
+struct OutputSettings {
+  int vtp_every = 1; // steps, 0: none
+  bool figures = true;
+};
+
+struct Scenario {
+  std::filesystem::path file;
+  std::string text; // of the file, for the summary
+  std::string title;
+  OrganSettings organ;
+  solvers::Material material;
+  std::vector<FixedRegion> fixed;
+  NodeSettings nodes;
+  solvers::DiscretisationOptions method;
+  std::optional<Vector3> gravity; // m/s2
+  ToolSettings tool;
+  ContactSettings contact;
+  OutputSettings output;
+};
+
+/// Reads and checks a scenario file. Throws InputError with one line for every offence: file:line, key, value and what
+/// is allowed.
+Scenario read_scenario(const std::filesystem::path& file);
+
+} // namespace spherecut::app

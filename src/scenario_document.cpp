@@ -1,0 +1,439 @@
+#include "src/scenario_document.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fmt/format.h>
+#include <fstream>
+#include <numeric>
+#include <sstream>
+#include <stdexcept>
+#include <toml++/toml.h>
+
+namespace spherecut::app {
+namespace {
+
+constexpr std::uintmax_t largest_file = 16U << 20U; // bytes; a scenario is a few kilobytes
+
+std::string join(std::string_view table, std::string_view key) {
+  return table.empty() ? std::string(key) : fmt::format("{}.{}", table, key);
+}
+
+long line_of(const toml::node& node) {
+  return node.source().begin.line;
+}
+
+std::string shown(const toml::node& node) {
+  if (node.is_table())
+    return "a table";
+  std::ostringstream out;
+  node.visit([&](const auto& value) { out << value; });
+  std::string text = out.str();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text.size() > 60 ? text.substr(0, 57) + "..." : text;
+}
+
+std::string_view wanted(const ScenarioKey& key) {
+  switch (key.kind) {
+  case KeyKind::table:
+    return "a table";
+  case KeyKind::array_of_tables:
+    return "an array of tables";
+  case KeyKind::number:
+    return "a number";
+  case KeyKind::integer:
+    return "a whole number";
+  case KeyKind::boolean:
+    return "true or false";
+  case KeyKind::text:
+  case KeyKind::choice:
+    return "a string";
+  case KeyKind::vector:
+    return "an array of three numbers";
+  case KeyKind::axes:
+    return "an array of strings";
+  }
+  return "";
+}
+
+std::string_view unit_name(std::string_view unit) {
+  if (unit == "m")
+    return "metres";
+  if (unit == "Pa")
+    return "pascals";
+  if (unit == "s")
+    return "seconds";
+  return unit;
+}
+
+// Edits (insert, delete, replace) between two names, for "did you mean".
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+bool is_child(std::string_view path, std::string_view table) {
+  const auto dot = path.rfind('.');
+  return table == (dot == std::string_view::npos ? std::string_view{} : path.substr(0, dot));
+}
+
+std::string_view leaf(std::string_view path) {
+  return path.substr(path.rfind('.') + 1);
+}
+
+class Checker {
+ public:
+  explicit Checker(Offences& offences) : offences_(offences) {}
+
+  // `path` as in scenario_keys(), `name` as the reader of a message knows the table: "fixed[2]".
+  void table(const toml::table& table, const std::string& path, const std::string& name) {
+    for (const auto& [key, node] : table) {
+      const ScenarioKey* entry = find_scenario_key(join(path, key.str()));
+      if (entry == nullptr)
+        unknown(path, name, key.str(), node);
+      else
+        value(*entry, join(name, key.str()), node);
+    }
+    for (const ScenarioKey& key : scenario_keys())
+      if (is_child(key.path, path))
+        presence(key, table, path, name);
+  }
+
+ private:
+  void unknown(const std::string& path, const std::string& name, std::string_view key, const toml::node& node) {
+    std::string known;
+    std::string_view nearest;
+    std::size_t distance = 4;
+    for (const ScenarioKey& entry : scenario_keys()) {
+      if (!is_child(entry.path, path))
+        continue;
+      known += (known.empty() ? "" : ", ") + std::string(leaf(entry.path));
+      if (const std::size_t d = edit_distance(key, leaf(entry.path)); d < distance) {
+        distance = d;
+        nearest = leaf(entry.path);
+      }
+    }
+    const std::string hint = nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
+    offences_.add(line_of(node), fmt::format("unknown key '{}'{} Allowed here: {}", join(name, key),
+                                             hint.empty() ? "." : hint, known));
+  }
+
+  void wrong_type(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    std::string what = fmt::format("{} = {}: must be {}", name, shown(node), wanted(key));
+    if (!key.unit.empty())
+      what += fmt::format(" in {}, without the unit", unit_name(key.unit));
+    if (const std::string allowed = allowed_values(key); !allowed.empty())
+      what += fmt::format("; allowed: {}", allowed);
+    offences_.add(line_of(node), what);
+  }
+
+  void out_of_range(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    offences_.add(line_of(node), fmt::format("{} = {}{}{}: out of range; allowed: {}", name, shown(node),
+                                             key.unit.empty() ? "" : " ", key.unit, allowed_values(key)));
+  }
+
+  void number(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    const std::optional<double> value = node.value<double>();
+    if (!node.is_number() || !value || (key.kind == KeyKind::integer && !node.is_integer()))
+      wrong_type(key, name, node);
+    else if (!std::isfinite(*value) || !key.range.holds(*value))
+      out_of_range(key, name, node);
+  }
+
+  void choice(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    const std::optional<std::string_view> value = node.value<std::string_view>();
+    if (!value)
+      wrong_type(key, name, node);
+    else if (!in_list(key.choices, *value))
+      out_of_range(key, name, node);
+  }
+
+  void vector(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr || array->size() != 3 ||
+        !std::all_of(array->begin(), array->end(), [](const toml::node& entry) { return entry.is_number(); })) {
+      wrong_type(key, name, node);
+      return;
+    }
+    for (const toml::node& entry : *array) {
+      const double value = entry.value_or(std::nan(""));
+      if (!std::isfinite(value) || !key.range.holds(value)) {
+        out_of_range(key, name, node);
+        return;
+      }
+    }
+  }
+
+  void axes(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    const toml::array* array = node.as_array();
+    std::string seen;
+    bool good = array != nullptr && !array->empty();
+    if (good)
+      for (const toml::node& entry : *array) {
+        const std::string axis = entry.value_or(std::string());
+        good = good && in_list("x, y, z", axis) && seen.find(axis) == std::string::npos;
+        seen += axis;
+      }
+    if (!good)
+      wrong_type(key, name, node);
+  }
+
+  void tables(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr ||
+        !std::all_of(array->begin(), array->end(), [](const toml::node& entry) { return entry.is_table(); })) {
+      wrong_type(key, name, node);
+      return;
+    }
+    for (std::size_t i = 0; i < array->size(); ++i)
+      table(*array->get(i)->as_table(), fmt::format("{}[]", key.path), fmt::format("{}[{}]", name, i + 1));
+  }
+
+  void value(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    switch (key.kind) {
+    case KeyKind::table:
+      if (const toml::table* inner = node.as_table())
+        table(*inner, std::string(key.path), name);
+      else
+        wrong_type(key, name, node);
+      break;
+    case KeyKind::array_of_tables:
+      tables(key, name, node);
+      break;
+    case KeyKind::number:
+    case KeyKind::integer:
+      number(key, name, node);
+      break;
+    case KeyKind::boolean:
+      if (!node.is_boolean())
+        wrong_type(key, name, node);
+      break;
+    case KeyKind::text:
+      if (!node.is_string())
+        wrong_type(key, name, node);
+      break;
+    case KeyKind::choice:
+      choice(key, name, node);
+      break;
+    case KeyKind::vector:
+      vector(key, name, node);
+      break;
+    case KeyKind::axes:
+      axes(key, name, node);
+      break;
+    }
+  }
+
+  // Whether `key` belongs beside the value of the sibling that it names: yes, no, or unknown when that is bad itself.
+  static std::optional<bool> applies(const ScenarioKey& key, const toml::table& table, const std::string& path) {
+    if (key.when.empty())
+      return true;
+    const auto equals = key.when.find(" = ");
+    const std::string_view sibling = key.when.substr(0, equals);
+    const std::optional<std::string_view> value = table[sibling].value<std::string_view>();
+    const ScenarioKey* entry = find_scenario_key(join(path, sibling));
+    if (!value || entry == nullptr || !in_list(entry->choices, *value))
+      return std::nullopt;
+    return in_list(key.when.substr(equals + 3), *value);
+  }
+
+  void presence(const ScenarioKey& key, const toml::table& table, const std::string& path, const std::string& name) {
+    const std::string_view own = leaf(key.path);
+    const std::optional<bool> wanted_here = applies(key, table, path);
+    const toml::node* node = table.get(own);
+    if (node != nullptr && wanted_here == false)
+      offences_.add(line_of(*node), fmt::format("{} = {}: goes only with {}", join(name, own), shown(*node), key.when));
+    if (node == nullptr && wanted_here == true && key.fallback == "required") {
+      std::string what = fmt::format("{} is missing: {}", join(name, own), wanted(key));
+      if (!key.unit.empty())
+        what += fmt::format(" in {}", unit_name(key.unit));
+      if (const std::string allowed = allowed_values(key); !allowed.empty())
+        what += fmt::format("; allowed: {}", allowed);
+      if (key.kind == KeyKind::table || key.kind == KeyKind::array_of_tables)
+        what += fmt::format(". {}", key.meaning);
+      offences_.add(std::max<long>(1, line_of(table)), what);
+    }
+  }
+
+  static bool in_list(std::string_view list, std::string_view value) {
+    while (!list.empty()) {
+      const auto comma = list.find(", ");
+      if (list.substr(0, comma) == value)
+        return true;
+      list = comma == std::string_view::npos ? std::string_view{} : list.substr(comma + 2);
+    }
+    return false;
+  }
+
+  Offences& offences_;
+};
+
+std::string read_text(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(status))
+    throw InputError(fmt::format("{}: there is no such file", file.string()));
+  if (std::filesystem::is_directory(status))
+    throw InputError(fmt::format("{}: is a folder, not a scenario file", file.string()));
+  std::ifstream in(file, std::ios::binary);
+  std::string text;
+  std::array<char, 65536> block{};
+  while (in && text.size() <= largest_file) {
+    in.read(block.data(), block.size());
+    text.append(block.data(), static_cast<std::size_t>(in.gcount()));
+  }
+  if (!in.eof() && text.size() <= largest_file)
+    throw InputError(fmt::format("{}: cannot be read", file.string()));
+  if (text.size() > largest_file)
+    throw InputError(fmt::format("{}: larger than {} bytes, not a scenario file", file.string(), largest_file));
+  return text;
+}
+
+} // namespace
+
+void Offences::add(long line, std::string what) {
+  found_.emplace_back(line, std::move(what));
+}
+
+void Offences::throw_if_any() {
+  if (found_.empty())
+    return;
+  std::stable_sort(found_.begin(), found_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::string message;
+  for (const auto& [line, what] : found_)
+    message += fmt::format("{}{}:{}: {}", message.empty() ? "" : "\n", file_, line, what);
+  throw InputError(message);
+}
+
+struct Section::Value {
+  const toml::node* node = nullptr;
+  std::optional<toml::table> fallback{}; // owns the node when it is a fallback
+};
+
+Section::Value Section::find(std::string_view key) const {
+  Value value;
+  if (table_ != nullptr)
+    value.node = static_cast<const toml::table*>(table_)->get(key);
+  const ScenarioKey* entry = find_scenario_key(join(path_, key));
+  if (entry == nullptr)
+    throw std::logic_error(fmt::format("scenario key '{}' is not in the table of keys", join(path_, key)));
+  if (value.node == nullptr && !entry->fallback.empty() && entry->fallback != "required") {
+    value.fallback = toml::parse(fmt::format("value = {}", entry->fallback));
+    value.node = value.fallback->get("value");
+  }
+  return value;
+}
+
+Section::Value Section::require(std::string_view key) const {
+  Value value = find(key);
+  if (value.node == nullptr)
+    throw std::logic_error(fmt::format("scenario key '{}' is absent and has no default", join(path_, key)));
+  return value;
+}
+
+bool Section::has(std::string_view key) const {
+  return table_ != nullptr && static_cast<const toml::table*>(table_)->contains(key);
+}
+
+double Section::number(std::string_view key) const {
+  return require(key).node->value<double>().value();
+}
+
+std::optional<double> Section::optional_number(std::string_view key) const {
+  const Value value = find(key);
+  return value.node == nullptr ? std::nullopt : value.node->value<double>();
+}
+
+long Section::integer(std::string_view key) const {
+  return require(key).node->value<std::int64_t>().value();
+}
+
+std::optional<long> Section::optional_integer(std::string_view key) const {
+  const Value value = find(key);
+  if (value.node == nullptr)
+    return std::nullopt;
+  return value.node->value<std::int64_t>().value();
+}
+
+bool Section::boolean(std::string_view key) const {
+  return require(key).node->value<bool>().value();
+}
+
+std::string Section::text(std::string_view key) const {
+  return require(key).node->value<std::string>().value();
+}
+
+Vector3 Section::vector(std::string_view key) const {
+  const Value value = require(key);
+  const toml::array& array = *value.node->as_array();
+  return {array.get(0)->value<double>().value(), array.get(1)->value<double>().value(),
+          array.get(2)->value<double>().value()};
+}
+
+std::array<bool, 3> Section::axes(std::string_view key) const {
+  const Value value = require(key);
+  std::array<bool, 3> held{false, false, false};
+  for (const toml::node& entry : *value.node->as_array())
+    held[static_cast<std::size_t>(entry.value<std::string_view>().value().front() - 'x')] = true;
+  return held;
+}
+
+Section Section::table(std::string_view key) const {
+  Section inner;
+  inner.document_ = document_;
+  inner.path_ = join(path_, key);
+  if (const toml::node* node = has(key) ? static_cast<const toml::table*>(table_)->get(key) : nullptr)
+    inner.table_ = node->as_table();
+  return inner;
+}
+
+std::vector<Section> Section::tables(std::string_view key) const {
+  std::vector<Section> all;
+  if (!has(key))
+    return all;
+  for (const toml::node& node : *static_cast<const toml::table*>(table_)->get(key)->as_array()) {
+    Section inner;
+    inner.document_ = document_;
+    inner.path_ = join(path_, key) + "[]";
+    inner.table_ = node.as_table();
+    all.push_back(std::move(inner));
+  }
+  return all;
+}
+
+long Section::line(std::string_view key) const {
+  if (table_ == nullptr)
+    return 0;
+  const auto* table = static_cast<const toml::table*>(table_);
+  const toml::node* node = key.empty() ? nullptr : table->get(key);
+  return line_of(node == nullptr ? *table : *node);
+}
+
+ScenarioDocument::ScenarioDocument(const std::filesystem::path& file) : text_(read_text(file)) {
+  Offences offences(file.string());
+  auto document = std::make_shared<toml::table>();
+  try {
+    *document = toml::parse(text_, file.string());
+  } catch (const toml::parse_error& error) {
+    offences.add(error.source().begin.line, fmt::format("not TOML: {}", error.description()));
+    offences.throw_if_any();
+  }
+  Checker(offences).table(*document, "", "");
+  offences.throw_if_any();
+  root_.table_ = document.get();
+  root_.document_ = std::move(document);
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,314 @@
+#include "src/scenario_keys.hpp"
+
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+using enum KeyKind;
+
+constexpr KeyRange above(double lower, double upper = unbounded) {
+  return {.lower = lower, .upper = upper, .lower_open = true, .upper_open = false};
+}
+constexpr KeyRange from(double lower, double upper = unbounded) {
+  return {.lower = lower, .upper = upper, .lower_open = false, .upper_open = false};
+}
+
+constexpr std::array keys = {
+    ScenarioKey{"title", text, "", "\"\"", "Name of the scenario, shown in figures and summary."},
+
+    ScenarioKey{"organ", table, "", "required", "The body at rest."},
+    ScenarioKey{"organ.shape",
+                choice,
+                "",
+                "required",
+                "Built-in shape, or a surface from a file. Block, cylinder and hemisphere stand on z = 0 about the z "
+                "axis; the liver has its dome at +z, the origin at the centre of its bounding box.",
+                {},
+                "block, cylinder, hemisphere, liver, file"},
+    ScenarioKey{"organ.size", vector, "m", "required", "Side lengths along x, y, z.", above(0, 10), "",
+                "shape = block"},
+    ScenarioKey{"organ.radius", number, "m", "required", "Radius.", above(0, 10), "", "shape = cylinder, hemisphere"},
+    ScenarioKey{"organ.height", number, "m", "required", "Height.", above(0, 10), "", "shape = cylinder"},
+    ScenarioKey{"organ.edge", number, "m", "", "Edge length of the surface mesh; left out: 1/40 of the largest size.",
+                above(0, 1), "", "shape = block, cylinder, hemisphere"},
+    ScenarioKey{"organ.triangles", integer, "", "20000", "Triangles of the surface, about.", from(1000, 500000), "",
+                "shape = liver"},
+    ScenarioKey{"organ.file",
+                text,
+                "",
+                "required",
+                "OBJ, PLY, STL or OFF file of a closed surface, relative to the scenario file.",
+                {},
+                "",
+                "shape = file"},
+    ScenarioKey{"organ.scale", number, "", "1", "Metres per unit of the file (0.001 for millimetres).", above(0, 1e6),
+                "", "shape = file"},
+    ScenarioKey{"organ.voxel_size", number, "m", "", "Voxel of the level set; left out: 1/128 of the largest extent.",
+                above(0, 1), "", "shape = liver, file"},
+
+    ScenarioKey{"material", table, "", "required", "Isotropic linear elasticity."},
+    ScenarioKey{"material.young_modulus", number, "Pa", "required", "Young's modulus E. Liver: about 5e3 to 1e4.",
+                above(0, 1e12)},
+    ScenarioKey{"material.poisson_ratio", number, "", "required",
+                "Poisson's ratio nu. Soft tissue: 0.45 to 0.49; 0.5 (incompressible) cannot be computed.",
+                from(0, 0.499)},
+    ScenarioKey{"material.density", number, "kg/m3", "1060.0", "Mass density, used by gravity alone.", above(0, 1e5)},
+
+    ScenarioKey{"fixed", array_of_tables, "", "required",
+                "Regions that hold the organ: every surface node inside one is fixed. At least one region."},
+    ScenarioKey{"fixed[].name", text, "", "\"\"", "Name for messages; left out: the number of the region."},
+    ScenarioKey{"fixed[].region", choice, "", "required", "Kind of region.", {}, "box, sphere, half_space"},
+    ScenarioKey{"fixed[].lower", vector, "m", "required", "Corner of smallest coordinates.", {}, "", "region = box"},
+    ScenarioKey{"fixed[].upper", vector, "m", "required", "Corner of largest coordinates.", {}, "", "region = box"},
+    ScenarioKey{"fixed[].centre", vector, "m", "required", "Centre.", {}, "", "region = sphere"},
+    ScenarioKey{"fixed[].radius", number, "m", "required", "Radius.", above(0), "", "region = sphere"},
+    ScenarioKey{
+        "fixed[].point", vector, "m", "required", "Point of the bounding plane.", {}, "", "region = half_space"},
+    ScenarioKey{"fixed[].normal",
+                vector,
+                "",
+                "required",
+                "Normal of the bounding plane, any length, pointing out of the region.",
+                {},
+                "",
+                "region = half_space"},
+    ScenarioKey{"fixed[].axes", axes, "", "[\"x\", \"y\", \"z\"]", "Components of the displacement that are held."},
+
+    ScenarioKey{"nodes", table, "", "", "Sprinkling of the organ with nodes; left out: all defaults."},
+    ScenarioKey{"nodes.fine_spacing", number, "m", "", "Node spacing at the contact; left out: tip radius / 3.",
+                above(0, 1)},
+    ScenarioKey{"nodes.coarse_spacing", number, "m", "",
+                "Largest node spacing, far from the contact; left out: 1/10 of the largest extent, at least fine.",
+                above(0, 1)},
+    ScenarioKey{"nodes.slope", number, "", "0.3", "Growth of the spacing per distance from the fine zone.",
+                above(0, 1)},
+    ScenarioKey{"nodes.fine_radius", number, "m", "", "Radius of the fine zone; left out: 1.5 tip radii.", above(0)},
+    ScenarioKey{"nodes.count", integer, "", "",
+                "Number of nodes, about: both spacings are scaled by one factor to reach it; left out: not scaled.",
+                from(20, 200000)},
+    ScenarioKey{"nodes.random_seed", integer, "", "1", "Seed of the sprinkling; the same seed gives the same bits.",
+                from(0, 9e15)},
+
+    ScenarioKey{"method", table, "", "", "Discretisation; left out: all defaults."},
+    ScenarioKey{"method.name",
+                choice,
+                "",
+                "\"galerkin\"",
+                "Weak form, force balance of each node's cell, or the scheme of the paper as published (it does not "
+                "converge and its force is not a true one: for comparison).",
+                {},
+                "galerkin, collocation, published"},
+    ScenarioKey{"method.support_radius", number, "", "",
+                "Radius of a sphere of influence in units of the local spacing; left out: the method's own.",
+                from(1.2, 4)},
+    ScenarioKey{"method.quadrature", integer, "", "2", "Gauss points per direction in a background cell (galerkin).",
+                from(1, 3)},
+
+    ScenarioKey{"gravity", table, "", "", "Weight of the organ; left out: none. The given shape is the unloaded one."},
+    ScenarioKey{"gravity.acceleration", vector, "m/s2", "required", "Acceleration, e.g. [0, 0, -9.81].",
+                from(-100, 100)},
+
+    ScenarioKey{"tool", table, "", "required", "The rigid tool and its way."},
+    ScenarioKey{"tool.shape",
+                choice,
+                "",
+                "required",
+                "Ball, flat cylindrical punch, or instrument (shaft and ball) that pivots on a port.",
+                {},
+                "sphere_tip, flat_punch, laparoscope"},
+    ScenarioKey{"tool.radius", number, "m", "required", "Radius of the ball or of the flat end.", above(0, 1), "",
+                "shape = sphere_tip, flat_punch"},
+    ScenarioKey{"tool.length", number, "m", "0.05", "Length of the punch.", above(0, 10), "", "shape = flat_punch"},
+    ScenarioKey{"tool.tip_radius", number, "m", "0.004", "Radius of the tip.", above(0, 1), "", "shape = laparoscope"},
+    ScenarioKey{"tool.shaft_radius", number, "m", "0.0025", "Radius of the shaft, at most the tip's.", above(0, 1), "",
+                "shape = laparoscope"},
+    ScenarioKey{"tool.shaft_length", number, "m", "0.3", "Length of the shaft from the tip centre backwards.",
+                above(0, 10), "", "shape = laparoscope"},
+    ScenarioKey{"tool.port",
+                vector,
+                "m",
+                "required",
+                "Point of the abdominal wall that the shaft pivots on.",
+                {},
+                "",
+                "shape = laparoscope"},
+    ScenarioKey{"tool.axis",
+                vector,
+                "",
+                "[0, 0, 1]",
+                "Direction from the tip into the tool, away from the organ.",
+                {},
+                "",
+                "shape = sphere_tip, flat_punch"},
+    ScenarioKey{"tool.step", number, "s", "", "Time step; left out: 1/20 of the duration.", above(0)},
+    ScenarioKey{"tool.approach", table, "", "",
+                "A straight press: the tool starts outside, touches, and goes on to a depth. This or path."},
+    ScenarioKey{"tool.approach.target", vector, "m", "required", "Point that the line of motion runs through."},
+    ScenarioKey{"tool.approach.direction", vector, "", "required", "Direction of motion, any length."},
+    ScenarioKey{"tool.approach.depth", number, "m", "required", "Way of the tool after the first touch.", above(0, 1)},
+    ScenarioKey{"tool.approach.clearance", number, "m", "0.002", "Way of the tool before the first touch.",
+                above(0, 1)},
+    ScenarioKey{"tool.approach.duration", number, "s", "1.0", "Duration of the whole motion.", above(0)},
+    ScenarioKey{"tool.path", array_of_tables, "", "",
+                "Poses of the tool, joined by straight lines; at least two. This or approach."},
+    ScenarioKey{"tool.path[].time", number, "s", "required", "Time, rising from pose to pose.", from(0)},
+    ScenarioKey{"tool.path[].position", vector, "m", "required", "The tool's reference point: the end of its tip."},
+
+    ScenarioKey{"contact", table, "", "", "How tool and organ touch; left out: all defaults."},
+    ScenarioKey{"contact.condition",
+                choice,
+                "",
+                "\"frictionless\"",
+                "Frictionless: the tool slides freely. Bonded: what has been touched moves with the tool.",
+                {},
+                "frictionless, bonded"},
+    ScenarioKey{"contact.candidate_radius", number, "m", "",
+                "Surface nodes so near to the first contact may touch the tool; left out: fine radius + 2 fine "
+                "spacings. Grows by itself when the tool reaches farther.",
+                above(0)},
+    ScenarioKey{"contact.follow_fraction", number, "", "0.5",
+                "The fine zone follows when the contact has left its centre by this fraction of the fine radius.",
+                above(0, 1)},
+
+    ScenarioKey{"output", table, "", "", "What is written; left out: all defaults."},
+    ScenarioKey{"output.vtp_every", integer, "", "1", "Steps between two VTP frames; 0: none.", from(0, 1e6)},
+    ScenarioKey{"output.figures", boolean, "", "true", "Draw PNG figures at the end."},
+};
+
+std::string_view name_of(KeyKind kind) {
+  switch (kind) {
+  case table:
+    return "table";
+  case array_of_tables:
+    return "array of tables";
+  case number:
+    return "number";
+  case integer:
+    return "integer";
+  case boolean:
+    return "boolean";
+  case text:
+    return "string";
+  case choice:
+    return "string";
+  case vector:
+    return "[x, y, z]";
+  case axes:
+    return "array of strings";
+  }
+  return "";
+}
+
+bool is_table(const ScenarioKey& key) {
+  return key.kind == table || key.kind == array_of_tables;
+}
+
+// The table that a key stands in: "tool.path[]" for "tool.path[].time", "" at top level.
+std::string_view parent_of(std::string_view path) {
+  const auto dot = path.rfind('.');
+  return dot == std::string_view::npos ? std::string_view{} : path.substr(0, dot);
+}
+
+std::string_view leaf_of(std::string_view path) {
+  const auto dot = path.rfind('.');
+  return dot == std::string_view::npos ? path : path.substr(dot + 1);
+}
+
+std::string heading(const ScenarioKey& key) {
+  return key.kind == table ? fmt::format("[{}]", key.path) : fmt::format("[[{}]]", key.path);
+}
+
+std::string type_and_unit(const ScenarioKey& key) {
+  return key.unit.empty() ? std::string(name_of(key.kind)) : fmt::format("{}, {}", name_of(key.kind), key.unit);
+}
+
+std::string fallback_text(const ScenarioKey& key) {
+  return key.fallback.empty() ? "see meaning" : std::string(key.fallback);
+}
+
+} // namespace
+
+bool KeyRange::holds(double value) const {
+  return (lower_open ? value > lower : value >= lower) && (upper_open ? value < upper : value <= upper);
+}
+
+std::span<const ScenarioKey> scenario_keys() {
+  return keys;
+}
+
+const ScenarioKey* find_scenario_key(std::string_view path) {
+  for (const ScenarioKey& key : keys)
+    if (key.path == path)
+      return &key;
+  return nullptr;
+}
+
+std::string allowed_values(const ScenarioKey& key) {
+  if (key.kind == choice)
+    return fmt::format("one of: {}", key.choices);
+  if (key.kind == axes)
+    return "\"x\", \"y\", \"z\", each at most once, at least one";
+  std::string text;
+  if (std::isfinite(key.range.lower))
+    text += fmt::format("{:g} {} ", key.range.lower, key.range.lower_open ? "<" : "<=");
+  if (std::isfinite(key.range.lower) || std::isfinite(key.range.upper))
+    text += key.kind == vector ? "each" : "value";
+  if (std::isfinite(key.range.upper))
+    text += fmt::format(" {} {:g}", key.range.upper_open ? "<" : "<=", key.range.upper);
+  return text;
+}
+
+std::string scenario_help() {
+  std::string out = "A scenario is a TOML file in SI units: metres, newtons, pascals, seconds, kilograms.\n";
+  const auto list = [&](std::string_view parent) {
+    for (const ScenarioKey& key : keys) {
+      if (is_table(key) || parent_of(key.path) != parent)
+        continue;
+      out += fmt::format("  {:<18} {}", leaf_of(key.path), type_and_unit(key));
+      if (const std::string allowed = allowed_values(key); !allowed.empty())
+        out += fmt::format("; {}", allowed);
+      if (!key.fallback.empty())
+        out += key.fallback == "required" ? "; required" : fmt::format("; default {}", key.fallback);
+      if (!key.when.empty())
+        out += fmt::format("; with {}", key.when);
+      out += fmt::format("\n  {:<18}   {}\n", "", key.meaning);
+    }
+  };
+  list("");
+  for (const ScenarioKey& key : keys)
+    if (is_table(key)) {
+      out += fmt::format("\n{}  {}{}\n", heading(key), key.meaning, key.fallback == "required" ? " Required." : "");
+      list(key.kind == array_of_tables ? fmt::format("{}[]", key.path) : std::string(key.path));
+    }
+  return out;
+}
+
+std::string scenario_reference() {
+  std::string out;
+  const auto list = [&](std::string_view parent) {
+    out += "| key | type, unit | allowed | default | meaning |\n|---|---|---|---|---|\n";
+    for (const ScenarioKey& key : keys) {
+      if (is_table(key) || parent_of(key.path) != parent)
+        continue;
+      std::string meaning(key.meaning);
+      if (!key.when.empty())
+        meaning += fmt::format(" With `{}`.", key.when);
+      out += fmt::format("| `{}` | {} | {} | {} | {} |\n", leaf_of(key.path), type_and_unit(key), allowed_values(key),
+                         fallback_text(key), meaning);
+    }
+  };
+  out += "### Top level\n\n";
+  list("");
+  for (const ScenarioKey& key : keys)
+    if (is_table(key)) {
+      out += fmt::format("\n### `{}`\n\n{}{}\n\n", heading(key), key.meaning,
+                         key.fallback == "required" ? " Required." : "");
+      list(key.kind == array_of_tables ? fmt::format("{}[]", key.path) : std::string(key.path));
+    }
+  return out;
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,119 @@
+#include "src/summary.hpp"
+
+#include "src/version.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace spherecut::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json(const Vector3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+Json inputs(const Session& session) {
+  const Scenario& scenario = session.scenario();
+  const topology::Domain& domain = *session.organ().domain;
+  Json out;
+  out["scenario"] = scenario.file.string();
+  out["scenario_text"] = scenario.text;
+  out["method"] = solvers::to_string(scenario.method.method);
+  out["young_modulus_Pa"] = scenario.material.young_modulus;
+  out["poisson_ratio"] = scenario.material.poisson_ratio;
+  out["density_kg_m3"] = scenario.material.density;
+  out["gravity_m_s2"] = scenario.gravity ? json(*scenario.gravity) : Json(nullptr);
+  out["organ"] = {{"triangles", domain.surface().triangles.size()},
+                  {"volume_m3", topology::volume(domain.surface())},
+                  {"area_m2", topology::area(domain.surface())},
+                  {"lower_m", json(domain.bounds().lower)},
+                  {"upper_m", json(domain.bounds().upper)}};
+  return out;
+}
+
+Json nodes(const Session& session) {
+  const solvers::SprinkleReport& report = session.sprinkling().report;
+  const FineZone& zone = session.zone();
+  Json out = {{"total", session.sprinkling().nodes.size()},
+              {"surface", report.surface_nodes},
+              {"edge", report.edge_nodes},
+              {"interior", report.interior_nodes},
+              {"fine_spacing_m", zone.spacing.fine},
+              {"coarse_spacing_m", zone.spacing.coarse},
+              {"fine_radius_m", zone.spacing.radius},
+              {"random_seed", session.scenario().nodes.random_seed}};
+  out["zones"] = Json::array();
+  for (const solvers::SprinkleZone& z : report.zones)
+    out["zones"].push_back({{"spacing_from_m", z.spacing_from},
+                            {"spacing_to_m", z.spacing_to},
+                            {"nodes", z.nodes},
+                            {"nearest_min", z.nearest_min},
+                            {"nearest_median", z.nearest_median},
+                            {"density", z.density}});
+  return out;
+}
+
+Json peak(const StepResult& step) {
+  return {{"newtons", step.force.norm()},
+          {"vector_N", json(step.force)},
+          {"time_s", step.time},
+          {"contact_m", json(step.contact.point)},
+          {"depth_m", step.contact.depth},
+          {"contact_radius_m", step.contact_radius},
+          {"active_nodes", step.active_nodes}};
+}
+
+Json solver(const Session& session, const RunFindings& findings) {
+  Json out = {{"largest_residual", findings.largest_residual},
+              {"largest_rotation_degrees", findings.largest_rotation_degrees}};
+  if (session.body() != nullptr) {
+    const solvers::AssemblyReport& report = session.body()->report();
+    out["unknowns"] = report.unknowns;
+    out["fixed_nodes"] = session.body()->problem().prescribed.size();
+    out["matrix_nonzeros"] = report.matrix_nonzeros;
+    out["factor_nonzeros"] = report.factor_nonzeros;
+    out["condition_estimate"] = report.condition_estimate;
+    out["worst_moment_condition"] = report.worst_moment_condition;
+    out["grown_supports"] = report.grown_supports;
+  }
+  out["resprinkles"] = Json::array();
+  for (const auto& [time, jump] : findings.resprinkles)
+    out["resprinkles"].push_back({{"time_s", time}, {"force_jump", jump}});
+  return out;
+}
+
+Json timings(const SessionProfile& profile) {
+  return {{"organ", profile.organ},       {"sprinkle", profile.sprinkle}, {"discretise", profile.discretise},
+          {"condense", profile.condense}, {"press", profile.press},       {"evaluate", profile.evaluate}};
+}
+
+} // namespace
+
+std::string summary_json(const Session& session, const RunOutput& output, RunStatus status,
+                         const std::string& message) {
+  const RunFindings& findings = output.findings();
+  Json summary;
+  summary["spherecut"] = version();
+  summary["title"] = session.scenario().title;
+  summary["status"] = status == RunStatus::complete      ? "complete"
+                      : status == RunStatus::interrupted ? "interrupted"
+                                                         : "failed";
+  summary["interrupted"] = status == RunStatus::interrupted;
+  if (!message.empty())
+    summary["message"] = message;
+  summary["touched"] = findings.touched;
+  summary["steps"] = {{"done", findings.steps}, {"planned", findings.planned}};
+  summary["peak_force"] = findings.touched ? peak(findings.peak) : Json(nullptr);
+  summary["nodes"] = nodes(session);
+  summary["solver"] = solver(session, findings);
+  summary["timings_s"] = timings(session.profile());
+  std::vector<std::string> warnings = session.warnings();
+  warnings.insert(warnings.end(), output.remarks().begin(), output.remarks().end());
+  summary["warnings"] = warnings;
+  summary["files"] = output.files();
+  summary["inputs"] = inputs(session);
+  return summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,30 @@
+// The way of the tool as poses at the steps of a run.
+#pragma once
+
+#include "src/scenario.hpp"
+#include "topology/contact.hpp"
+
+namespace spherecut::app {
+
+struct ToolSample {
+  double time = 0; // s
+  topology::ToolPose pose;
+};
+
+/// Poses from the start to the end of the motion, every ToolSettings::step seconds (0: 20 steps) and at the end. An
+/// approach is placed by its first touch of the surface at rest; when its line misses the organ it runs past the target
+/// instead. Throws InputError when the tool touches or is inside the organ at the start.
+std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::ContactQuery& organ,
+                                    const topology::Domain& domain);
+
+/// The first contact on the motion: where the tool begins to touch the surface at rest, between two samples found by
+/// bisection to 1e-7 m. Empty when it never does.
+struct FirstTouch {
+  topology::SurfaceContact contact;
+  topology::ToolPose pose;
+  std::size_t sample = 0; // first sample that touches
+};
+std::optional<FirstTouch> first_touch(const ToolSettings& tool, const std::vector<ToolSample>& motion,
+                                      const topology::ContactQuery& organ);
+
+} // namespace spherecut::app

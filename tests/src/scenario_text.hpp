@@ -1,0 +1,47 @@
+// A small valid scenario, and the same with single lines changed, for tests of the reader and of the command line.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace spherecut::tests {
+
+/// A ball pressed 2 mm into a block of about 200 nodes. Line numbers matter to the tests.
+inline const std::string small_scenario = R"(title = "small"
+[organ]
+shape = "block"
+size = [0.06, 0.06, 0.03]
+edge = 0.006
+[material]
+young_modulus = 1e4
+poisson_ratio = 0.3
+[[fixed]]
+name = "base"
+region = "box"
+lower = [-1, -1, -0.001]
+upper = [1, 1, 0.001]
+[nodes]
+fine_spacing = 0.004
+coarse_spacing = 0.012
+fine_radius = 0.006
+[tool]
+shape = "sphere_tip"
+radius = 0.01
+step = 0.25
+[tool.approach]
+target = [0, 0, 0.03]
+direction = [0, 0, -1]
+depth = 0.002
+clearance = 0.001
+[output]
+figures = false
+)";
+
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  if (at == std::string::npos)
+    throw std::logic_error("'" + from + "' is not in the text");
+  return text.replace(at, from.size(), to);
+}
+
+} // namespace spherecut::tests

@@ -1,0 +1,309 @@
+// The binary as a user meets it: exit status, messages, and what is left on disk.
+#include "src/version.hpp"
+#include "tests/src/scenario_text.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "topology/organs.hpp"
+#include "topology/surface_io.hpp"
+
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+using namespace spherecut;
+using namespace spherecut::tests;
+using Catch::Contains;
+using Catch::StartsWith;
+
+namespace {
+
+const std::filesystem::path source(SPHERECUT_SOURCE_DIR);
+
+std::size_t lines_in(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// A scenario whose organ is a surface file beside it.
+std::string with_file(const std::string& name) {
+  return replaced(small_scenario, "shape = \"block\"\nsize = [0.06, 0.06, 0.03]\nedge = 0.006\n",
+                  "shape = \"file\"\nfile = \"" + name + "\"\n");
+}
+
+topology::SurfaceMesh small_block() {
+  return topology::make_block(Vector3(0.06, 0.06, 0.03), 0.01);
+}
+
+std::string obj_text(const topology::SurfaceMesh& mesh) {
+  std::ostringstream out;
+  out.precision(17);
+  for (const Vector3& x : mesh.vertices)
+    out << "v " << x.x() << ' ' << x.y() << ' ' << x.z() << '\n';
+  for (const Triangle& t : mesh.triangles)
+    out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+  return out.str();
+}
+
+topology::SurfaceMesh joined(topology::SurfaceMesh a, const topology::SurfaceMesh& b, const Vector3& shift) {
+  const int first = static_cast<int>(a.vertices.size());
+  for (const Vector3& x : b.vertices)
+    a.vertices.push_back(x + shift);
+  for (const Triangle& t : b.triangles)
+    a.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  return a;
+}
+
+} // namespace
+
+TEST_CASE("Help, version and scenario-help succeed") {
+  CHECK(run_spherecut({"--help"}).status == 0);
+  const ProgramResult version = run_spherecut({"--version"});
+  CHECK(version.status == 0);
+  CHECK_THAT(version.out, StartsWith("spherecut " + std::string(app::version())));
+  const ProgramResult help = run_spherecut({"scenario-help"});
+  CHECK(help.status == 0);
+  CHECK_THAT(help.out, Contains("poisson_ratio") && Contains("[[fixed]]"));
+  CHECK(run_spherecut({"experiment", "list"}).status == 0);
+}
+
+TEST_CASE("A bad command line exits with 2 and one line that says why") {
+  const std::vector<std::vector<std::string>> commands = {{},
+                                                          {"fly"},
+                                                          {"run"},
+                                                          {"run", "x.toml"},
+                                                          {"check", "x.toml", "--loud"},
+                                                          {"experiment", "run", "none", "--out", "/x"}};
+  for (const auto& arguments : commands) {
+    const ProgramResult result = run_spherecut(arguments);
+    INFO(result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: "));
+    CHECK(lines_in(result.err) == 1);
+  }
+}
+
+TEST_CASE("A run leaves rows, frames, series, figures and a summary that agree") {
+  const TemporaryFolder folder;
+  const auto scenario =
+      write_file(folder.path() / "case.toml", replaced(small_scenario, "figures = false", "figures = true"));
+  const auto out = folder.path() / "out";
+  const ProgramResult result = run_spherecut({"run", scenario, "--out", out});
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  CHECK_THAT(result.out, Contains("peak force"));
+
+  std::istringstream rows(read_file(out / "forces.csv"));
+  std::string header;
+  std::getline(rows, header);
+  const auto columns = std::count(header.begin(), header.end(), ',');
+  CHECK_THAT(header, StartsWith("time_s,tool_x_m"));
+  double peak = 0;
+  int count = 0;
+  for (std::string row; std::getline(rows, row); ++count) {
+    CHECK(std::count(row.begin(), row.end(), ',') == columns);
+    std::istringstream cells(row);
+    std::string cell;
+    for (int k = 0; k <= 10; ++k)
+      std::getline(cells, cell, ',');
+    peak = std::max(peak, std::stod(cell));
+  }
+  CHECK(count == 5);
+
+  const auto summary = nlohmann::json::parse(read_file(out / "summary.json"));
+  CHECK(summary["status"] == "complete");
+  CHECK(summary["interrupted"] == false);
+  CHECK(summary["touched"] == true);
+  CHECK(summary["steps"]["done"] == 5);
+  CHECK(summary["peak_force"]["newtons"].get<double>() == Approx(peak).epsilon(1e-6));
+  CHECK(summary["solver"]["condition_estimate"].get<double>() > 1);
+  CHECK(summary["inputs"]["scenario_text"].get<std::string>() == read_file(scenario));
+
+  const std::string series = read_file(out / "series.pvd");
+  int frames = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(out / "frames")) {
+    CHECK_THAT(series, Contains("file=\"frames/" + entry.path().filename().string() + "\""));
+    ++frames;
+  }
+  CHECK(frames == 15); // surface, nodes and tool in each of five
+  for (const std::string name : {"force.png", "profile.png"})
+    CHECK_THAT(read_file(out / name), StartsWith("\x89PNG"));
+
+  SECTION("a second run into the same folder is refused and changes nothing") {
+    const std::string before = read_file(out / "forces.csv");
+    const ProgramResult again = run_spherecut({"run", scenario, "--out", out});
+    CHECK(again.status == 2);
+    CHECK_THAT(again.err, Contains("holds results already"));
+    CHECK(read_file(out / "forces.csv") == before);
+  }
+}
+
+TEST_CASE("Bad scenarios and surface files exit with 2, a clear line, and leave nothing behind") {
+  const TemporaryFolder folder;
+  const topology::SurfaceMesh block = small_block();
+  const std::string good = obj_text(block);
+  const auto flip = [](topology::SurfaceMesh mesh) {
+    for (Triangle& t : mesh.triangles)
+      std::swap(t[1], t[2]);
+    return mesh;
+  };
+  topology::SurfaceMesh open = block;
+  open.triangles.resize(open.triangles.size() / 2);
+  topology::SurfaceMesh fin = block; // a third triangle on an edge
+  fin.vertices.emplace_back(0, 0, 0.1);
+  fin.triangles.push_back({fin.triangles[0][0], fin.triangles[0][1], static_cast<int>(fin.vertices.size()) - 1});
+  topology::SurfaceMesh flat = block;
+  for (Vector3& x : flat.vertices)
+    x.z() = 0;
+  std::string garbage;
+  for (int i = 0; i < 5000; ++i)
+    garbage += static_cast<char>((i * 7919) % 251);
+
+  struct Case {
+    std::string name, contents;
+  };
+  const std::vector<Case> refused = {
+      {"empty.obj", ""},
+      {"cut.obj", good.substr(0, good.size() - 5) + "9999 1"},
+      {"garbage.stl", garbage},
+      {"garbage.ply", garbage},
+      {"nan.obj", replaced(good, "v ", "v nan ")},
+      {"open.obj", obj_text(open)},
+      {"fin.obj", obj_text(fin)},
+      {"crossing.obj", obj_text(joined(block, block, {0.01, 0.013, 0.011}))},
+      {"two.obj", obj_text(joined(block, block, {0.2, 0, 0}))},
+      {"flat.obj", obj_text(flat)},
+  };
+  for (const Case& c : refused) {
+    write_file(folder.path() / c.name, c.contents);
+    const auto scenario = write_file(folder.path() / "case.toml", with_file(c.name));
+    const auto out = folder.path() / "out";
+    const ProgramResult result = run_spherecut({"run", scenario, "--out", out});
+    INFO(c.name << ": " << result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: ") && Contains(c.name));
+    CHECK_FALSE(std::filesystem::exists(out));
+  }
+
+  const auto says = [&](const std::string& text) {
+    return run_spherecut({"check", write_file(folder.path() / "case.toml", text)});
+  };
+  const ProgramResult missing = says(with_file("nowhere.obj"));
+  CHECK(missing.status == 2);
+  CHECK_THAT(missing.err, Contains("nowhere.obj"));
+
+  write_file(folder.path() / "inside_out.obj", obj_text(flip(block)));
+  const ProgramResult mended = says(with_file("inside_out.obj"));
+  INFO(mended.err);
+  CHECK(mended.status == 0);
+  CHECK_THAT(mended.out, Contains("inside out"));
+
+  topology::SurfaceMesh millimetres = block;
+  for (Vector3& x : millimetres.vertices)
+    x *= 1000;
+  write_file(folder.path() / "millimetres.obj", obj_text(millimetres));
+  const ProgramResult sized =
+      says(replaced(with_file("millimetres.obj"), "lower = [-1, -1, -0.001]\nupper = [1, 1, 0.001]",
+                    "lower = [-100, -100, -1]\nupper = [100, 100, 1]"));
+  CHECK_THAT(sized.out, Contains("warning") && Contains("in millimetres?"));
+  const ProgramResult scaled = says(replaced(with_file("millimetres.obj"), "file = \"millimetres.obj\"\n",
+                                             "file = \"millimetres.obj\"\nscale = 0.001\n"));
+  INFO(scaled.err);
+  CHECK(scaled.status == 0);
+  CHECK_THAT(scaled.out, !Contains("warning"));
+
+  CHECK(says(replaced(small_scenario, "poisson_ratio = 0.3", "poisson_ratio = 0.5")).status == 2);
+  CHECK(says(replaced(small_scenario, "young_modulus = 1e4", "young_modulus = 0")).status == 2);
+  CHECK(says(small_scenario).status == 0);
+}
+
+TEST_CASE("A tool that never touches is a result, not an error") {
+  const TemporaryFolder folder;
+  const auto from = small_scenario.find("[tool.approach]");
+  const auto scenario = write_file(folder.path() / "case.toml",
+                                   small_scenario.substr(0, from) +
+                                       "path = [{time = 0, position = [0, 0, 0.05]}, {time = 1, position = [0.1, 0, "
+                                       "0.05]}]\n");
+  const auto out = folder.path() / "out";
+  const ProgramResult result = run_spherecut({"run", scenario, "--out", out});
+  INFO(result.err);
+  CHECK(result.status == 0);
+  CHECK_THAT(result.out, Contains("no contact"));
+  const auto summary = nlohmann::json::parse(read_file(out / "summary.json"));
+  CHECK(summary["touched"] == false);
+  CHECK(summary["peak_force"].is_null());
+  CHECK(lines_in(read_file(out / "forces.csv")) == 6);
+}
+
+TEST_CASE("An output folder that cannot be made exits with 2") {
+  const TemporaryFolder folder;
+  const auto scenario = write_file(folder.path() / "case.toml", small_scenario);
+  const auto file = write_file(folder.path() / "file", "mine");
+  for (const std::string& out : {file.string(), (file / "inside").string(), std::string("/proc/spherecut")}) {
+    const ProgramResult result = run_spherecut({"run", scenario, "--out", out});
+    INFO(result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Contains("output folder"));
+  }
+  CHECK(read_file(file) == "mine");
+}
+
+TEST_CASE("A run that may write no more exits with 2 and keeps the rows it had") {
+  const TemporaryFolder folder;
+  // A limit on the size of files stands for the full disk: the first frame does not fit, the rows do.
+  const auto scenario = write_file(folder.path() / "case.toml",
+                                   replaced(small_scenario, "figures = false", "vtp_every = 3\nfigures = false"));
+  const auto out = folder.path() / "out";
+  const ProgramResult result =
+      run_shell("trap '' XFSZ; ulimit -f 16; " + spherecut_command({"run", scenario, "--out", out}));
+  INFO(result.err);
+  CHECK(result.status == 2);
+  CHECK_THAT(result.err, Contains("cannot be written"));
+  CHECK(lines_in(read_file(out / "forces.csv")) >= 2);
+  CHECK_FALSE(std::filesystem::exists(out / "series.pvd"));
+}
+
+TEST_CASE("A full disk exits with 2 and keeps the rows it had") {
+  const TemporaryFolder folder;
+  const auto scenario = write_file(folder.path() / "case.toml", small_scenario);
+  const auto disk = folder.path() / "disk";
+  std::filesystem::create_directory(disk);
+  if (run_shell("mount -t tmpfs -o size=128k tmpfs '" + disk.string() + "'").status != 0)
+    return; // only root may mount; the limit on file sizes above covers the same path
+  const ProgramResult result = run_spherecut({"run", scenario, "--out", disk / "out"});
+  const std::string rows = read_file(disk / "out" / "forces.csv");
+  run_shell("umount '" + disk.string() + "'");
+  INFO(result.err);
+  CHECK(result.status == 2);
+  CHECK_THAT(result.err, Contains("No space left"));
+  CHECK(lines_in(rows) >= 2);
+}
+
+TEST_CASE("An interrupted run keeps its rows, says so in the summary and exits with 130") {
+  const TemporaryFolder folder;
+  // Far more steps than there is time for.
+  const auto scenario =
+      write_file(folder.path() / "case.toml", replaced(replaced(small_scenario, "step = 0.25", "step = 0.00001"),
+                                                       "figures = false", "vtp_every = 0\nfigures = false"));
+  for (const std::string signal : {"INT", "TERM"}) {
+    const auto out = folder.path() / signal;
+    const std::string rows = "'" + (out / "forces.csv").string() + "'";
+    const ProgramResult result = run_shell(
+        spherecut_command({"run", scenario, "--out", out}) + " & run=$!; until [ \"$(wc -l 2>/dev/null <" + rows +
+        " || echo 0)\" -gt 3 ]; do kill -0 $run || break; sleep 0.05; done; kill -" + signal + " $run; wait $run");
+    INFO(result.err);
+    CHECK(result.status == 130);
+    const auto summary = nlohmann::json::parse(read_file(out / "summary.json"));
+    CHECK(summary["interrupted"] == true);
+    CHECK(summary["status"] == "interrupted");
+    CHECK(lines_in(read_file(out / "forces.csv")) == summary["steps"]["done"].get<std::size_t>() + 1);
+    CHECK(summary["steps"]["done"].get<int>() < summary["steps"]["planned"].get<int>());
+  }
+}
+
+TEST_CASE("The shipped scenarios pass the check") {
+  for (const std::string name : {"block_punch", "hemisphere_palpation", "cylinder_slide"}) {
+    const ProgramResult result = run_spherecut({"check", source / "scenarios" / (name + ".toml")});
+    INFO(name << ": " << result.err);
+    CHECK(result.status == 0);
+    CHECK_THAT(result.out, Contains(": good"));
+  }
+}

@@ -1,0 +1,117 @@
+#include "src/output_file.hpp"
+#include "src/vtp.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "topology/errors.hpp"
+#include "topology/organs.hpp"
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <regex>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+using Catch::Contains;
+
+namespace {
+
+// Values of one appended array, found as a reader of the format would: by its offset behind the underscore.
+template <class T>
+std::vector<T> appended_array(const std::string& file, const std::string& name) {
+  std::smatch match;
+  const std::regex line("Name=\"" + name + "\"[^>]*offset=\"([0-9]+)\"");
+  if (!std::regex_search(file, match, line))
+    return {};
+  const std::string marker = "encoding=\"raw\">\n_";
+  const std::size_t start = file.find(marker) + marker.size() + std::stoul(match[1]);
+  std::uint64_t bytes = 0;
+  std::memcpy(&bytes, file.data() + start, sizeof(bytes));
+  std::vector<T> values(bytes / sizeof(T));
+  std::memcpy(values.data(), file.data() + start + sizeof(bytes), bytes);
+  return values;
+}
+
+} // namespace
+
+TEST_CASE("A VTP file gives back points, triangles and data, bit for bit") {
+  const TemporaryFolder folder;
+  const topology::SurfaceMesh mesh = topology::make_block(Vector3(0.1, 0.2, 0.3), 0.1);
+  std::vector<Vector3> displacement;
+  std::vector<double> stress;
+  for (const Vector3& x : mesh.vertices) {
+    displacement.emplace_back(std::sin(x.x()), 1 / 3.0, x.z() * 1e-7);
+    stress.push_back(x.norm());
+  }
+  const auto file = folder.path() / "a.vtp";
+  write_vtp(file, mesh.vertices, mesh.triangles, {vector_data("u", displacement), scalar_data("s", stress)});
+  const std::string text = read_file(file);
+  CHECK_THAT(text, Contains("NumberOfPoints=\"" + std::to_string(mesh.vertices.size()) + "\""));
+  CHECK_THAT(text, Contains("NumberOfPolys=\"" + std::to_string(mesh.triangles.size()) + "\""));
+  CHECK(appended_array<double>(text, "s") == stress);
+  const auto u = appended_array<double>(text, "u");
+  const auto points = appended_array<double>(text, "Points");
+  REQUIRE(u.size() == 3 * displacement.size());
+  REQUIRE(points.size() == u.size());
+  for (std::size_t i = 0; i < displacement.size(); ++i) {
+    CHECK(Vector3(u[3 * i], u[3 * i + 1], u[3 * i + 2]) == displacement[i]);
+    CHECK(Vector3(points[3 * i], points[3 * i + 1], points[3 * i + 2]) == mesh.vertices[i]);
+  }
+  const auto corners = appended_array<std::int64_t>(text, "connectivity");
+  const auto ends = appended_array<std::int64_t>(text, "offsets");
+  REQUIRE(corners.size() == 3 * mesh.triangles.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    CHECK(ends[t] == static_cast<std::int64_t>(3 * t + 3));
+    for (std::size_t k = 0; k < 3; ++k)
+      CHECK(corners[3 * t + k] == mesh.triangles[t][k]);
+  }
+  CHECK_THAT(text, Catch::EndsWith("\n</AppendedData>\n</VTKFile>\n"));
+}
+
+TEST_CASE("Points without triangles become vertex cells") {
+  const TemporaryFolder folder;
+  write_vtp(folder.path() / "p.vtp", {{1, 2, 3}, {4, 5, 6}}, {}, {});
+  const std::string text = read_file(folder.path() / "p.vtp");
+  CHECK_THAT(text, Contains("NumberOfVerts=\"2\"") && Contains("NumberOfPolys=\"0\""));
+  CHECK(appended_array<std::int64_t>(text, "connectivity") == std::vector<std::int64_t>{0, 1});
+}
+
+TEST_CASE("Point data of a wrong length is refused") {
+  const TemporaryFolder folder;
+  CHECK_THROWS_AS(write_vtp(folder.path() / "p.vtp", {{1, 2, 3}}, {}, {scalar_data("s", {1, 2})}), std::logic_error);
+}
+
+TEST_CASE("A full disk is an InputError that names the file and the reason") {
+  if (!std::filesystem::exists("/dev/full"))
+    return;
+  OutputFile file("/dev/full");
+  CHECK_THROWS_WITH(file.write("something"), Contains("/dev/full") && Contains("No space left"));
+}
+
+TEST_CASE("A file that cannot be replaced keeps its old contents") {
+  const TemporaryFolder folder;
+  const auto file = write_file(folder.path() / "kept", "old");
+  replace_file(file, "new");
+  CHECK(read_file(file) == "new");
+  std::filesystem::create_directory(file.string() + ".part"); // the place to write beside it is taken
+  CHECK_THROWS_AS(replace_file(file, "newer"), InputError);
+  CHECK(read_file(file) == "new");
+}
+
+TEST_CASE("A results folder is made, and refused when it holds results or is none") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "a" / "b";
+  claim_results_folder(out);
+  CHECK(std::filesystem::is_directory(out));
+  write_file(out / "notes.txt", "mine");
+  CHECK_NOTHROW(claim_results_folder(out));
+  for (const std::string name : {"forces.csv", "summary.json", "series.pvd", "frames"}) {
+    write_file(out / name, "old");
+    CHECK_THROWS_WITH(claim_results_folder(out), Contains("holds results already") && Contains(name));
+    CHECK(read_file(out / name) == "old");
+    std::filesystem::remove(out / name);
+  }
+  const auto file = write_file(folder.path() / "file", "");
+  CHECK_THROWS_WITH(claim_results_folder(file), Contains("file"));
+  CHECK_THROWS_WITH(claim_results_folder(file / "inside"), Contains("cannot be created"));
+}
