@@ -162,7 +162,8 @@ BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud
   return Octree(domain, nodes, options).build();
 }
 
-std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes) {
+std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes, double edge,
+                                             double centroid_below) {
   const topology::PointTree tree(nodes.positions);
   const topology::SurfaceMesh& surface = domain.surface();
   std::vector<SurfacePoint> points;
@@ -173,9 +174,9 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
       const std::array<Vector3, 3> t = pending.back();
       pending.pop_back();
       const Vector3 centre = (t[0] + t[1] + t[2]) / 3;
-      const double limit = 0.5 * nodes.spacings[tree.nearest(centre).index];
+      const double spacing = nodes.spacings[tree.nearest(centre).index];
       const double longest = std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
-      if (longest > limit) {
+      if (longest > edge * spacing) {
         const Vector3 a = 0.5 * (t[0] + t[1]), b = 0.5 * (t[1] + t[2]), c = 0.5 * (t[2] + t[0]);
         pending.push_back({t[0], a, c});
         pending.push_back({a, t[1], b});
@@ -185,7 +186,9 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
       }
       const Vector3 area = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]);
       const double size = area.norm();
-      if (size > 0)
+      if (size > 0 && longest < centroid_below * spacing)
+        points.push_back({centre, area / size, size});
+      else if (size > 0)
         for (const Vector3& corner : t)
           points.push_back({0.5 * (centre + corner), area / size, size / 3});
     }

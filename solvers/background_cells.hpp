@@ -26,13 +26,15 @@ struct BackgroundOptions {
 BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
                                  const BackgroundOptions& options = {});
 
-/// Points of a quadrature rule over the surface, exact for quadratic functions on each triangle of the tessellation,
-/// refined to edges of at most half the local spacing. `weight` is an area, m2.
+/// Points of a quadrature rule over the surface, `weight` is an area, m2. Triangles of the tessellation are divided to
+/// edges of at most `edge` local spacings; each carries three points, exact for quadratic functions, or its centroid
+/// alone where it is less than 0.6 of that size anyway.
 struct SurfacePoint {
   Vector3 position;
   Vector3 normal;
   double weight;
 };
-std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes);
+std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes, double edge = 0.5,
+                                             double centroid_below = 0);
 
 } // namespace spherecut::solvers

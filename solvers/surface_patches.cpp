@@ -10,28 +10,45 @@ namespace spherecut::solvers {
 
 namespace {
 
+/// Edge of the surface quadrature's triangles in spacings: a mean over a share needs less than a traction does.
+constexpr double share_edge = 0.75, share_centroid_below = 0.45;
+
 DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::vector<int>& chosen,
                            const Spheres& spheres) {
   DisplacementMean mean;
-  std::vector<std::pair<int, double>> terms;
+  thread_local std::vector<int> place; // of a node in the mean, -1 outside
+  place.resize(std::max(place.size(), static_cast<std::size_t>(spheres.size())), -1);
   ShapeFunctions shape;
   for (int p : chosen) {
-    if (!evaluate(spheres, points[p].position, shape))
+    if (!evaluate(spheres, points[p].position, shape)) {
+      for (int node : mean.nodes)
+        place[node] = -1;
       throw NumericalError(fmt::format("no sound support covers the surface point ({:.6g}, {:.6g}, {:.6g}) m",
                                        points[p].position.x(), points[p].position.y(), points[p].position.z()));
+    }
     mean.area += points[p].weight;
     mean.centroid += points[p].weight * points[p].position;
-    for (int k = 0; k < shape.size(); ++k)
-      terms.emplace_back(shape.nodes[k], points[p].weight * shape.value[k]);
+    for (int k = 0; k < shape.size(); ++k) {
+      int& at = place[shape.nodes[k]];
+      if (at < 0) {
+        at = static_cast<int>(mean.nodes.size());
+        mean.nodes.push_back(shape.nodes[k]);
+        mean.weights.push_back(0);
+      }
+      mean.weights[at] += points[p].weight * shape.value[k];
+    }
   }
   mean.centroid /= mean.area;
-  std::stable_sort(terms.begin(), terms.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (const auto& [node, weight] : terms) {
-    if (mean.nodes.empty() || mean.nodes.back() != node) {
-      mean.nodes.push_back(node);
-      mean.weights.push_back(0);
-    }
-    mean.weights.back() += weight / mean.area;
+  std::vector<std::pair<int, double>> terms;
+  terms.reserve(mean.nodes.size());
+  for (std::size_t k = 0; k < mean.nodes.size(); ++k) {
+    terms.emplace_back(mean.nodes[k], mean.weights[k] / mean.area);
+    place[mean.nodes[k]] = -1;
+  }
+  std::sort(terms.begin(), terms.end());
+  for (std::size_t k = 0; k < terms.size(); ++k) {
+    mean.nodes[k] = terms[k].first;
+    mean.weights[k] = terms[k].second;
   }
   return mean;
 }
@@ -54,7 +71,8 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
 }
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes)
-    : nodes_(nodes), points_(surface_quadrature(domain, nodes)), points_of_node_(nodes.size()) {
+    : nodes_(nodes), points_(surface_quadrature(domain, nodes, share_edge, share_centroid_below)),
+      points_of_node_(nodes.size()) {
   std::vector<Vector3> positions;
   std::vector<int> ids;
   for (int i = 0; i < nodes.size(); ++i)
