@@ -52,7 +52,7 @@ while IFS=$'\t' read -r unit closure; do
   fi
   checked=$((checked + 1))
   # shellcheck disable=SC2086
-  key=$({ printf '%s\n' "$tool"; cat .clang-tidy cmake/*.cmake $closure 2>/dev/null; } | sha256sum | cut -c 1-32)
+  key=$({ printf '%s\n' "$tool"; cat .clang-tidy cmake/*.cmake $closure 2>/dev/null || true; } | sha256sum | cut -c 1-32)
   [ -e "$cache/$key" ] || pending+=("$key $unit")
 done < <(dependencies)
 printf 'lint: clang-tidy on %d units, %d of them changed\n' "$checked" "${#pending[@]}"
