@@ -25,6 +25,7 @@ const std::vector<Experiment>& all_experiments() {
       {"hertz", "force, contact radius and surface of a sphere on a half-space", run_hertz},
       {"hemisphere_palpation", "the paper's Figure 3: surface displacement and force against finite elements",
        run_hemisphere_palpation},
+      {"liver_palpation", "the paper's Figure 4: a laparoscopic instrument on a liver", run_liver_palpation},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
   };
   return experiments;

@@ -72,3 +72,7 @@ TEST_CASE("Quick hemisphere palpation: the whole organ at 500 nodes against fini
 TEST_CASE("Quick method comparison: no node set goes astray with either method") {
   require_quick_run_passes("method_comparison");
 }
+
+TEST_CASE("Quick liver palpation: the force settles and both methods agree on it") {
+  require_quick_run_passes("liver_palpation");
+}
