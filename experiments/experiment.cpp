@@ -37,7 +37,7 @@ std::vector<Check> run_experiment(const std::string& name, const std::filesystem
     if (experiment.name != name)
       continue;
     std::filesystem::create_directories(out);
-    const std::vector<Check> checks = experiment.run({out, quick, say});
+    std::vector<Check> checks = experiment.run({out, quick, say});
     nlohmann::ordered_json summary;
     summary["experiment"] = name;
     summary["quick"] = quick;
