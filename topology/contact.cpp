@@ -93,9 +93,9 @@ class FclSurface {
   }
 
   /// Internal indices of the triangles that touch the shape.
-  [[nodiscard]] std::vector<int> touching(std::shared_ptr<fcl::CollisionGeometryd> shape,
+  [[nodiscard]] std::vector<int> touching(const std::shared_ptr<fcl::CollisionGeometryd>& shape,
                                           const fcl::Transform3d& pose) const {
-    const fcl::CollisionObjectd tool(std::move(shape), pose);
+    const fcl::CollisionObjectd tool(shape, pose);
     const fcl::CollisionRequestd request(static_cast<std::size_t>(model_->num_tris), true);
     fcl::CollisionResultd result;
     fcl::collide(&organ_, &tool, request, result);

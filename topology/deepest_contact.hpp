@@ -122,8 +122,15 @@ Deepest deepest_of_laparoscope(const Surface& surface, const Laparoscope& scope,
 }
 
 template <class Surface>
-Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const ToolPose& pose, int hint) {
-  const NearestPoint at_centre = surface.nearest(pose.point, punch.radius, hint, 0.0);
+Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const ToolPose& pose,
+                         const SurfaceContact& last) {
+  // The last contact is a hint for the point of the end that it belongs to, and none for the others.
+  const auto hint = [&](const Vector3& x) {
+    return (x - last.tool_point).squaredNorm() < 0.04 * punch.radius * punch.radius
+               ? surface.walk.internal(last.triangle)
+               : -1;
+  };
+  const NearestPoint at_centre = surface.nearest(pose.point, punch.radius, hint(pose.point), 0.0);
   Deepest best{at_centre, pose.point, -at_centre.signed_distance};
 
   // Down the slope within the flat end; any direction when the end is parallel to the surface.
@@ -137,27 +144,31 @@ Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const T
   down.normalize();
   const Vector3 across = pose.axis.cross(down);
 
-  const double margin = 1e-7 * punch.radius; // differences below it are rounding
-  int last = at_centre.triangle;
-  const auto probe = [&](double along_down, double along_across) {
-    const Vector3 x = pose.point + punch.radius * (along_down * down + along_across * across);
+  constexpr double d = 1 / std::numbers::sqrt2;
+  constexpr std::array<std::array<double, 2>, 9> probes{
+      {{1, 0}, {0.5, 0}, {d, d}, {d, -d}, {0, 1}, {0, -1}, {-d, d}, {-d, -d}, {-1, 0}}}; // down, across
+  const auto position = [&](int i) {
+    return Vector3(pose.point + punch.radius * (probes[i][0] * down + probes[i][1] * across));
+  };
+  // The probe that was deepest last time comes first: it is likely to refute the others at once. The outcome does not
+  // depend on the order but for differences below the margin, which are rounding.
+  int first = 0;
+  for (int i = 1; i < std::ssize(probes); ++i)
+    if ((position(i) - last.tool_point).squaredNorm() < (position(first) - last.tool_point).squaredNorm())
+      first = i;
+  const double margin = 1e-7 * punch.radius;
+  const auto probe = [&](int i) {
+    const Vector3 x = position(i);
     // Nearer to the surface than the depth to beat: not deeper, whichever side it is on.
     const double enough = std::max(0.0, best.depth + margin);
-    const NearestPoint nearest = surface.nearest(x, punch.radius, last, enough);
-    last = nearest.triangle;
+    const NearestPoint nearest = surface.nearest(x, punch.radius, hint(x), enough);
     if (-nearest.signed_distance > best.depth + margin)
       best = {nearest, x, -nearest.signed_distance};
   };
-  constexpr double half = 0.5, diagonal = 1 / std::numbers::sqrt2;
-  probe(1, 0);
-  probe(half, 0);
-  for (const double side : {1.0, -1.0})
-    probe(diagonal, side * diagonal);
-  for (const double side : {1.0, -1.0})
-    probe(0, side);
-  for (const double side : {1.0, -1.0})
-    probe(-diagonal, side * diagonal);
-  probe(-1, 0);
+  probe(first);
+  for (int i = 0; i < std::ssize(probes); ++i)
+    if (i != first)
+      probe(i);
   return best;
 }
 
@@ -170,7 +181,7 @@ SurfaceContact deepest_contact(const Surface& surface, const ToolShape& tool, co
   if (const auto* scope = std::get_if<Laparoscope>(&tool))
     deepest = deepest_of_laparoscope(surface, *scope, pose, last);
   else if (const auto* punch = std::get_if<FlatPunch>(&tool))
-    deepest = deepest_of_punch(surface, *punch, pose, hint);
+    deepest = deepest_of_punch(surface, *punch, pose, last);
   else if (const auto* tip = std::get_if<SphereTip>(&tool))
     deepest = deepest_of_sphere(surface, *tip, pose, hint);
   return {deepest.surface.point, deepest.surface.normal, deepest.depth, surface.walk.original(deepest.surface.triangle),
