@@ -16,15 +16,16 @@ namespace spherecut::topology {
 /// surface point nearest to it, and
 ///   depth = radius - signed distance of tool_point from the organ (negative inside the organ),
 /// so that depth goes on growing when the skeleton itself has entered the organ.
-///   SphereTip    skeleton: the centre.
-///   Laparoscope  skeleton: the tip centre with the tip's radius and the shaft's axis with the shaft's; the deeper of
-///   the
-///                two, the tip when equal. Exact along the axis, sunk or not.
-///   FlatPunch    skeleton: the flat end itself, radius 0, judged at ten points: its centre, and, with the first
-///                direction pointing down the slope of the organ (smooth normal at the point nearest to the centre),
-///                half way and all the way out in that direction and at every further 45 degrees of the rim. Exact
-///                where the surface under the punch is plane; where it curves with radius K, short by at most about r^2
-///                / 32 K. Equal depths count for the innermost point. The punch's side is not looked at.
+/// Skeletons:
+/// - SphereTip: the centre.
+/// - Laparoscope: the tip centre with the tip's radius, and the shaft's axis with the shaft's radius; the deeper of the
+///   two, the tip when equal. Exact along the axis, sunk or not.
+/// - FlatPunch: the flat end itself, radius 0, judged at ten points: its centre; half way and all the way out to the
+/// rim
+///   down the slope of the organ (smooth normal at the point nearest to the centre); and every further 45 degrees of
+///   the rim. Exact where the surface under the punch is plane; on bumps no wider than the punch short by up to a fifth
+///   of its radius. Equal depths count for the centre. The punch's side is not looked at.
+///
 /// Signed distance is global: a tool deeper than half of a lobe's thickness is nearer to the lobe's other side and
 /// reports that side.
 struct SurfaceContact {

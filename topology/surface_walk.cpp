@@ -11,7 +11,7 @@ namespace spherecut::topology {
 namespace {
 
 constexpr int leaf_size = 4;        // the lanes of a leaf
-constexpr int longest_walk = 2;     // steps before the tree takes over: a step over a vertex tries its whole fan
+constexpr int longest_walk = 8;     // steps; over a longer way the tree is faster
 constexpr double same_place = 1e-9; // fraction of a segment
 
 void check_mesh(const SurfaceMesh& mesh) {
@@ -327,9 +327,10 @@ inline NearestPoint SurfaceWalk::finish(const Vector3& x, const Candidate& best)
 
 NearestPoint SurfaceWalk::nearest(const Vector3& x, int hint, double enough) const noexcept {
   Candidate best;
-  best.triangle = hint >= 0 && hint < std::ssize(corners_) ? hint : 0;
-  try_triangle(x, best.triangle, best);
-  descend(x, best);
+  if (hint >= 0 && hint < std::ssize(corners_)) {
+    try_triangle(x, hint, best);
+    descend(x, best);
+  }
 
   const Eigen::Vector3f relative = (x - centre_).cast<float>();
   VisitStack<float> stack;

@@ -41,8 +41,8 @@ class SurfaceWalk {
   /// Throws InputError on an empty mesh, an index out of range or a coordinate that is not finite.
   explicit SurfaceWalk(const SurfaceMesh& mesh);
 
-  /// Nearest surface point to x, globally. The search starts at the triangle `hint` (any value is fine). It may stop
-  /// early once the distance is known to be below `enough`, and then gives some surface point nearer than that.
+  /// Nearest surface point to x, globally. The search walks from the triangle `hint` (-1: none is known nearby). It may
+  /// stop early once the distance is known to be below `enough`, and then gives some surface point nearer than that.
   [[nodiscard]] NearestPoint nearest(const Vector3& x, int hint, double enough = 0) const noexcept;
 
   /// Nearest surface point to the segment among those nearer than `within`.

@@ -359,6 +359,30 @@ TEST_CASE("The walk neither allocates nor depends on where it starts") {
   CHECK(tests::allocations() > before); // the counter counts
 }
 
+TEST_CASE("The walk is exact on small surfaces, far from the origin, and from far away") {
+  std::mt19937 random(13);
+  std::uniform_real_distribution<double> log_reach(-3, 1);
+  for (const Vector3& centre : {Vector3(0, 0, 0), Vector3(30, -20, 50)})
+    for (int n : {1, 2, 3, 5, 9}) {
+      INFO(n << " at " << centre.transpose());
+      const ContactQuery query(tests::bumpy_sphere(n, 0.05, 0.08, centre));
+      const SphereTip tip{0.003};
+      for (int i = 0; i < 200; ++i) {
+        const Vector3 axis = random_direction(random);
+        const Vector3 x = centre + std::pow(10, log_reach(random)) * random_direction(random);
+        const SurfaceContact walked = query.walk(tip, {x - tip.radius * axis, axis}, {});
+        CHECK(walked.depth == Approx(tip.radius + query.closest_point(x).depth).margin(1e-12));
+      }
+      const Laparoscope scope{0.004, 0.0025, 0.08, Vector3(0.01, 0.02, 0.4) + centre};
+      for (int i = 0; i < 100; ++i) {
+        const ToolPose pose = pose_at(scope, centre + 0.06 * random_direction(random));
+        const SurfaceContact walked = query.walk(scope, pose, {});
+        CHECK(walked.depth == Approx(query.first_touch(scope, pose).depth).margin(1e-9));
+        CHECK(walked.depth >= sampled_depth(query, scope, pose) - 1e-9);
+      }
+    }
+}
+
 TEST_CASE("Contact queries refuse broken surfaces and poses") {
   CHECK_THROWS_AS(ContactQuery(SurfaceMesh{}), InputError);
   const std::vector<Vector3> corners{{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}};
