@@ -191,7 +191,6 @@ std::string_view name_of(KeyKind kind) {
   case boolean:
     return "boolean";
   case text:
-    return "string";
   case choice:
     return "string";
   case vector:

@@ -57,7 +57,7 @@ FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain) {
 // peaks.
 std::vector<solvers::SeedNode> contact_seeds(const Scenario& scenario, const topology::Domain& domain,
                                              const topology::SurfaceContact& contact, double spacing) {
-  const std::vector<solvers::SeedNode> tip{{contact.point, solvers::NodeKind::surface}};
+  std::vector<solvers::SeedNode> tip{{contact.point, solvers::NodeKind::surface}};
   const auto* punch = std::get_if<topology::FlatPunch>(&scenario.tool.shape);
   if (punch == nullptr || punch->radius < 2 * spacing)
     return tip;
@@ -246,7 +246,7 @@ void Session::build() {
       };
     if (scenario_.gravity) {
       const Vector3 weight = scenario_.material.density * *scenario_.gravity;
-      problem.loads.body_force = [weight](const Vector3&) { return weight; };
+      problem.loads.body_force = [weight](const Vector3&) -> const Vector3& { return weight; };
     }
     say_(fmt::format("{} nodes, {} of them on the surface, {} fixed", problem.nodes.size(),
                      sprinkling_.report.surface_nodes + sprinkling_.report.edge_nodes, problem.prescribed.size()));
