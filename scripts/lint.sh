@@ -46,6 +46,8 @@ heavy='#include [<"](CGAL|openvdb|fcl)/'
 pending=()
 checked=0
 while IFS=$'\t' read -r unit closure; do
+  # Tests are formatted and compiled with warnings as errors; clang-tidy reads what ships.
+  [[ $unit == tests/* ]] && continue
   # shellcheck disable=SC2086
   if grep -qE "$heavy" $closure 2>/dev/null || ! grep -qF "/$unit\"" "$build/compile_commands.json"; then
     continue
