@@ -11,7 +11,7 @@ namespace spherecut::solvers {
 namespace {
 
 /// Edge of the surface quadrature's triangles in spacings: a mean over a share needs less than a traction does.
-constexpr double share_edge = 0.75, share_centroid_below = 0.45;
+constexpr double share_edge = 0.6, share_centroid_below = 0.36;
 
 DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::vector<int>& chosen,
                            const Spheres& spheres) {
