@@ -137,7 +137,7 @@ std::vector<Check> run_liver_palpation(const ExperimentContext& context) {
   const int steps = context.quick ? 4 : 10, triangles = context.quick ? 5000 : 20000;
   std::vector<Check> checks;
   app::Table forces({"press", "method", "fine_spacing_m", "nodes", "way_m", "force_x_n", "force_y_n", "force_z_n",
-                     "force_n", "contact_radius_m", "active_nodes", "converged"});
+                     "force_n", "contact_radius_m", "active_nodes", "rotation_degrees", "converged"});
   app::Table convergence({"press", "method", "fine_spacing_m", "nodes", "force_n", "change_from_coarser"});
   for (const Press& press : presses(context.quick)) {
     app::Figure figure{
@@ -162,7 +162,8 @@ std::vector<Check> run_liver_palpation(const ExperimentContext& context) {
                       fmt::format("{:.5f}", 1e-3 * way), fmt::format("{:.5f}", step.force.x()),
                       fmt::format("{:.5f}", step.force.y()), fmt::format("{:.5f}", step.force.z()),
                       fmt::format("{:.5f}", step.force.norm()), fmt::format("{:.5f}", step.contact_radius),
-                      fmt::format("{}", step.active_nodes), step.converged ? "1" : "0"});
+                      fmt::format("{}", step.active_nodes), fmt::format("{:.1f}", step.rotation_degrees),
+                      step.converged ? "1" : "0"});
         }
         change = std::abs(curve.force() / coarser - 1);
         convergence.add({press.name, name, fmt::format("{}", fine), fmt::format("{}", nodes),
