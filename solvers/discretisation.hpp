@@ -31,11 +31,25 @@ struct Prescribed {
 struct Loads {
   std::function<Vector3(const Vector3& x)> body_force;                      // N/m3
   std::function<Vector3(const Vector3& x, const Vector3& normal)> traction; // Pa on the surface
+  /// Pa on the faces of the incision; the normal points out of the material, into the cut.
+  std::function<Vector3(const Vector3& x, const Vector3& normal)> lip_traction;
+  Matrix3 initial_strain = Matrix3::Zero(); // stress-free strain, subtracted from the strain (pre-tension: negative)
 };
+
+/// How a sphere reaches around a cut.
+enum class SightRule {
+  visibility,  // a sphere ends where the incision hides its node
+  diffraction, // it bends around the front: the distance is that of the shortest way around
+  enriched,    // diffraction, and the basis gains sqrt(r) {cos t/2, sin t/2, sin t/2 sin t, cos t/2 sin t} at the front
+};
+std::string_view to_string(SightRule rule);
+/// Throws InputError naming the value and the three allowed names.
+SightRule sight_rule_from_string(std::string_view name);
 
 /// A boundary value problem on a node cloud. Surface that is neither prescribed nor loaded is free.
 struct Problem {
   std::shared_ptr<const topology::Domain> domain;
+  std::shared_ptr<const topology::Incision> incision; // null: uncut
   NodeCloud nodes;
   Material material;
   std::vector<Prescribed> prescribed;
@@ -49,11 +63,12 @@ struct Problem {
 
 struct DiscretisationOptions {
   Method method = Method::galerkin;
-  double support_radius = 0;      // rho, support radius / h; 0: the method's default for this Poisson ratio
-  int quadrature = 2;             // Gauss points per direction in a background cell (galerkin)
-  double cell_size = 0.75;        // edge of a background cell in units of h (galerkin)
-  int tip_node = -1;              // the tool-tip node of `published`
-  bool estimate_condition = true; // a dozen more solves; leave out where every rebuild counts
+  double support_radius = 0;             // rho, support radius / h; 0: the method's default for this Poisson ratio
+  int quadrature = 2;                    // Gauss points per direction in a background cell (galerkin)
+  double cell_size = 0.75;               // edge of a background cell in units of h (galerkin)
+  int tip_node = -1;                     // the tool-tip node of `published`
+  SightRule sight = SightRule::enriched; // only where there is an incision
+  bool estimate_condition = true;        // a dozen more solves; leave out where every rebuild counts
 };
 
 /// Diagnostics of assembly and factorisation. Times are wall clock, s.

@@ -137,6 +137,10 @@ SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOpt
       ++report.edge_nodes;
       share = inside_share(domain, x, h);
       break;
+    case NodeKind::lip:
+      ++report.lip_nodes;
+      share = 0.5;
+      break;
     }
     zone.density += share / zone.expected;
   }

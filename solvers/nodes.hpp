@@ -1,7 +1,7 @@
 // Nodes of the method of finite spheres and their sprinkling.
 #pragma once
 
-#include "topology/domain.hpp"
+#include "topology/incision.hpp"
 
 #include <cstdint>
 #include <string>
@@ -12,14 +12,20 @@ enum class NodeKind : std::uint8_t {
   interior,
   surface, // on a smooth part of the surface
   edge,    // on a sharp edge or corner of the surface
+  lip,     // on a face of an incision, see lip_offset
 };
+
+/// A lip node sits this far from the sheet, in units of its spacing, on the side of the material it belongs to; its
+/// partner sits as far on the other side. Far below any length of the mechanics and far above rounding, so that sight
+/// lines, nearest nodes and Voronoi cells tell the two faces apart without being told a side.
+constexpr double lip_offset = 1e-4;
 
 /// Structure of arrays; all vectors have the same length N.
 struct NodeCloud {
   std::vector<Vector3> positions; // m, rest frame
   std::vector<double> spacings;   // local node spacing h, m; support radius = rho * h
   std::vector<NodeKind> kinds;
-  std::vector<Vector3> normals; // unit outward normal of surface and edge nodes, zero inside
+  std::vector<Vector3> normals; // unit outward normal of surface and edge nodes and, out of its face, of a lip node
   [[nodiscard]] int size() const { return static_cast<int>(positions.size()); }
   int add(const Vector3& position, double spacing, NodeKind kind, const Vector3& normal = Vector3::Zero());
 };
@@ -50,6 +56,9 @@ struct SprinkleOptions {
   double wall_clearance = 0.45;   // in units of h: interior nodes stay this far from the surface
   int maximum_nodes = 200000;     // refused above, InputError
   double minimum_density = 0.8;   // a zone below is under-filled, NumericalError
+  /// The cut of the body: lip nodes in pairs on both faces, a ring of pairs behind the front and a ring of single nodes
+  /// ahead of it. Null: uncut.
+  std::shared_ptr<const topology::Incision> incision;
 };
 
 /// What was checked about a sprinkled cloud, per zone of distance from the fine zone. Every node counts with the share
@@ -65,7 +74,7 @@ struct SprinkleZone {
 };
 struct SprinkleReport {
   std::vector<SprinkleZone> zones;
-  int surface_nodes = 0, edge_nodes = 0, interior_nodes = 0;
+  int surface_nodes = 0, edge_nodes = 0, interior_nodes = 0, lip_nodes = 0;
 };
 
 struct Sprinkling {
