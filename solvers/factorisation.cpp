@@ -44,7 +44,7 @@ cholmod_sparse view(const SparseMatrix& matrix, int symmetry) {
   return sparse;
 }
 
-class CholeskyFactorisation final : public Factorisation {
+class CholeskyFactorisation final : public OrderedCholesky {
  public:
   CholeskyFactorisation(const SparseMatrix& lower, bool ordered) {
     cholmod_sparse matrix = view(lower, -1);
@@ -76,7 +76,33 @@ class CholeskyFactorisation final : public Factorisation {
   CholeskyFactorisation(const CholeskyFactorisation&) = delete;
   CholeskyFactorisation& operator=(const CholeskyFactorisation&) = delete;
 
-  MatrixX solve(const MatrixX& right_hand_sides) const override {
+  MatrixX solve(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_A, right_hand_sides); }
+  MatrixX forward(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_L, right_hand_sides); }
+  MatrixX backward(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_Lt, right_hand_sides); }
+  MatrixX trailing(int count) const override {
+    // A supernode is a run of columns that share their rows: px points to its dense panel, pi to its row indices.
+    const int first = static_cast<int>(factor_->n) - count;
+    MatrixX block = MatrixX::Zero(count, count);
+    const int* super = static_cast<const int*>(factor_->super);
+    const int* rows = static_cast<const int*>(factor_->pi);
+    const int* panel = static_cast<const int*>(factor_->px);
+    const int* row_index = static_cast<const int*>(factor_->s);
+    const double* value = static_cast<const double*>(factor_->x);
+    for (std::size_t s = 0; s < factor_->nsuper; ++s) {
+      const int height = rows[s + 1] - rows[s];
+      for (int column = std::max(super[s], first); column < super[s + 1]; ++column) {
+        const double* entries = value + panel[s] + static_cast<long>(column - super[s]) * height;
+        for (int k = column - super[s]; k < height; ++k)
+          block(row_index[rows[s] + k] - first, column - first) = entries[k];
+      }
+    }
+    return block;
+  }
+  MatrixX solve_transposed(const MatrixX& right_hand_sides) const override { return solve(right_hand_sides); }
+  long nonzeros() const override { return nonzeros_; }
+
+ private:
+  [[nodiscard]] MatrixX solve_with(int system, const MatrixX& right_hand_sides) const {
     cholmod_dense dense{};
     dense.nrow = static_cast<std::size_t>(right_hand_sides.rows());
     dense.ncol = static_cast<std::size_t>(right_hand_sides.cols());
@@ -85,7 +111,7 @@ class CholeskyFactorisation final : public Factorisation {
     dense.x = const_cast<double*>(right_hand_sides.data());
     dense.xtype = CHOLMOD_REAL;
     dense.dtype = CHOLMOD_DOUBLE;
-    cholmod_dense* solution = cholmod_solve(CHOLMOD_A, factor_, &dense, &workspace_.common);
+    cholmod_dense* solution = cholmod_solve(system, factor_, &dense, &workspace_.common);
     if (solution == nullptr)
       throw NumericalError("Cholesky solve ran out of memory");
     MatrixX result = Eigen::Map<const MatrixX>(static_cast<const double*>(solution->x), right_hand_sides.rows(),
@@ -93,10 +119,7 @@ class CholeskyFactorisation final : public Factorisation {
     cholmod_free_dense(&solution, &workspace_.common);
     return result;
   }
-  MatrixX solve_transposed(const MatrixX& right_hand_sides) const override { return solve(right_hand_sides); }
-  long nonzeros() const override { return nonzeros_; }
 
- private:
   mutable CholmodCommon workspace_;
   cholmod_factor* factor_ = nullptr;
   long nonzeros_ = 0;
@@ -278,7 +301,7 @@ std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower) {
   return std::make_unique<CholeskyFactorisation>(lower, false);
 }
 
-std::unique_ptr<Factorisation> factor_ordered(const SparseMatrix& lower) {
+std::unique_ptr<OrderedCholesky> factor_ordered(const SparseMatrix& lower) {
   return std::make_unique<CholeskyFactorisation>(lower, true);
 }
 

@@ -22,6 +22,17 @@ class Factorisation {
   [[nodiscard]] virtual long nonzeros() const = 0;
 };
 
+/// L L^T of a symmetric positive definite matrix in the order it was given: the parts of it that a Schur complement
+/// needs.
+class OrderedCholesky : public Factorisation {
+ public:
+  /// L^-1 B and L^-T B.
+  [[nodiscard]] virtual MatrixX forward(const MatrixX& right_hand_sides) const = 0;
+  [[nodiscard]] virtual MatrixX backward(const MatrixX& right_hand_sides) const = 0;
+  /// The last `count` rows and columns of L, dense; zeros above the diagonal.
+  [[nodiscard]] virtual MatrixX trailing(int count) const = 0;
+};
+
 /// Fill-reducing ordering of a symmetric graph given in compressed rows (nested dissection or minimum degree, whichever
 /// CHOLMOD finds better). Returns the permutation: entry k is the vertex eliminated k-th.
 std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours);
@@ -33,7 +44,7 @@ std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower);
 
 /// The same for a matrix that already stands in its elimination order (postordered, as fill_reducing_ordering gives
 /// it): nothing is permuted.
-std::unique_ptr<Factorisation> factor_ordered(const SparseMatrix& lower);
+std::unique_ptr<OrderedCholesky> factor_ordered(const SparseMatrix& lower);
 
 /// L U with partial pivoting and iterative refinement. Throws NumericalError when the matrix is singular.
 std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering = {});

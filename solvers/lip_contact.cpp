@@ -1,0 +1,315 @@
+// Notation: o opening of the pairs, l their forces, f forces on the tool's candidates with displacement u,
+//
+//   o = o0 + A l + T f,   u = u0 + C f + D l.
+//
+// For a given set of closed pairs (index a) o_a = 0 gives l_a = -A_aa^-1 (o0 + T f)_a, and the tool meets the body with
+//
+//   u = [u0 - D_a A_aa^-1 o0_a] + [C - D_a A_aa^-1 T_a] f.
+#include "solvers/lip_contact.hpp"
+
+#include "topology/errors.hpp"
+#include "topology/point_tree.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <fmt/format.h>
+#include <limits>
+#include <numeric>
+
+namespace spherecut::solvers {
+
+namespace {
+
+constexpr int most_rounds = 200; // of tool and lips in turn
+
+std::array<Vector3, 3> mode_axes(const Vector3& normal) {
+  const Vector3 first = normal.unitOrthogonal();
+  return {normal, first, normal.cross(first)};
+}
+
+/// Openings of the pairs in the entries of the patch, one column per field.
+MatrixX openings(const Discretisation& body, const std::vector<LipPair>& pairs, int modes,
+                 const std::vector<Field>& fields) {
+  std::vector<int> plus, minus;
+  for (const LipPair& pair : pairs) {
+    plus.push_back(pair.plus);
+    minus.push_back(pair.minus);
+  }
+  const MatrixX apart = body.contact_displacements(plus, fields) - body.contact_displacements(minus, fields);
+  MatrixX result(modes * std::ssize(pairs), std::ssize(fields));
+  for (Eigen::Index p = 0; p < std::ssize(pairs); ++p) {
+    const std::array<Vector3, 3> axes = mode_axes(pairs[p].normal);
+    for (int m = 0; m < modes; ++m)
+      result.row(modes * p + m) = axes[m].transpose() * apart.middleRows<3>(3 * p);
+  }
+  return result;
+}
+
+Field scaled(const Field& field, double factor) {
+  return {factor * field.coefficients, factor * field.pressure, factor * field.load_factor, factor * field.prescribed};
+}
+
+std::vector<int> closed_entries(const std::vector<char>& closed, int modes) {
+  std::vector<int> entries;
+  for (int p = 0; p < std::ssize(closed); ++p)
+    if (closed[p] != 0)
+      for (int m = 0; m < modes; ++m)
+        entries.push_back(modes * p + m);
+  return entries;
+}
+
+VectorX gathered(const VectorX& vector, const std::vector<int>& entries) {
+  VectorX result(std::ssize(entries));
+  for (Eigen::Index k = 0; k < result.size(); ++k)
+    result[k] = vector[entries[k]];
+  return result;
+}
+
+MatrixX gathered(const MatrixX& matrix, const std::vector<int>& rows, const std::vector<int>& columns) {
+  MatrixX result(std::ssize(rows), std::ssize(columns));
+  for (Eigen::Index k = 0; k < result.cols(); ++k)
+    for (Eigen::Index i = 0; i < result.rows(); ++i)
+      result(i, k) = matrix(rows[i], columns[k]);
+  return result;
+}
+
+std::vector<int> all_of_size(Eigen::Index size) {
+  std::vector<int> entries(size);
+  std::iota(entries.begin(), entries.end(), 0);
+  return entries;
+}
+
+/// The set that the forces and openings of a guess ask for; returns how many pairs differ from it.
+int wanted_set(const LipPatch& lips, const LipState& state, double tolerance, std::vector<char>& wanted) {
+  int changes = 0;
+  wanted = state.closed;
+  for (int p = 0; p < std::ssize(state.closed); ++p) {
+    const bool close =
+        state.closed[p] != 0 ? state.forces[lips.modes * p] >= 0 : state.openings[lips.modes * p] < -tolerance;
+    changes += close != (state.closed[p] != 0) ? 1 : 0;
+    wanted[p] = close ? 1 : 0;
+  }
+  return changes;
+}
+
+/// Forces of the closed pairs that bring their openings to zero.
+void hold_closed(const LipPatch& lips, const VectorX& free_opening, LipState& state) {
+  const std::vector<int> a = closed_entries(state.closed, lips.modes);
+  state.forces = VectorX::Zero(free_opening.size());
+  if (!a.empty()) {
+    const VectorX held = gathered(lips.compliance, a, a).partialPivLu().solve(-gathered(free_opening, a));
+    for (std::size_t k = 0; k < a.size(); ++k)
+      state.forces[a[k]] = held[static_cast<Eigen::Index>(k)];
+  }
+  state.openings = free_opening + lips.compliance * state.forces;
+  for (int entry : a)
+    state.openings[entry] = 0;
+}
+
+/// Moves to the wanted set as a block while that brings the number of wrong pairs down, else by one pair at a time
+/// (the last wrong one), which cannot cycle for a P-matrix [Judice and Pires 1994].
+class SetSearch {
+ public:
+  void advance(std::vector<char>& closed, const std::vector<char>& wanted, int changes) {
+    if (changes < fewest_) {
+      fewest_ = changes;
+      patience_ = 8;
+    } else if (patience_ > 0) {
+      --patience_;
+    }
+    if (patience_ > 0) {
+      closed = wanted;
+      return;
+    }
+    for (std::size_t p = closed.size(); p-- > 0;)
+      if (closed[p] != wanted[p]) {
+        closed[p] = wanted[p];
+        return;
+      }
+  }
+
+ private:
+  int fewest_ = std::numeric_limits<int>::max();
+  int patience_ = 8;
+};
+
+/// The tool's patch on the body whose closed pairs are held together.
+ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const std::vector<char>& closed) {
+  ContactPatch held;
+  held.nodes = patch.nodes;
+  held.rest = patch.rest;
+  held.spacings = patch.spacings;
+  held.normals = patch.normals;
+  held.compliance = patch.compliance;
+  held.base_displacement = patch.base_displacement;
+  const std::vector<int> a = closed_entries(closed, lips.modes);
+  if (a.empty())
+    return held;
+  const Eigen::PartialPivLU<MatrixX> lu(gathered(lips.compliance, a, a));
+  const MatrixX reach = gathered(lips.tool_of_lips, all_of_size(lips.tool_of_lips.rows()), a);
+  held.compliance -= reach * lu.solve(gathered(lips.lips_of_tool, a, all_of_size(lips.lips_of_tool.cols())));
+  held.base_displacement -= reach * lu.solve(gathered(lips.base_opening, a));
+  return held;
+}
+
+VectorX stacked(const std::vector<Vector3>& forces) {
+  VectorX result(3 * std::ssize(forces));
+  for (Eigen::Index c = 0; c < std::ssize(forces); ++c)
+    result.segment<3>(3 * c) = forces[c];
+  return result;
+}
+
+/// Alternates between the tool on a held body and the lips under the tool's forces.
+template <typename Tool>
+CutContactState settle(const ContactPatch& patch, const LipPatch& lips, double tolerance, std::vector<char> closed,
+                       Tool&& tool_on) {
+  CutContactState state;
+  if (closed.size() != lips.pairs.size())
+    closed.assign(lips.pairs.size(), 0);
+  SetSearch search;
+  std::vector<char> wanted;
+  for (int round = 1; round <= most_rounds; ++round) {
+    state.tool = tool_on(held_patch(patch, lips, closed));
+    state.lips.closed = closed;
+    state.lips.rounds = round;
+    hold_closed(lips, lips.base_opening + lips.lips_of_tool * stacked(state.tool.nodal_forces), state.lips);
+    const int changes = wanted_set(lips, state.lips, tolerance, wanted);
+    state.lips.converged = changes == 0;
+    if (state.lips.converged)
+      break;
+    search.advance(closed, wanted, changes);
+  }
+  return state;
+}
+
+} // namespace
+
+std::string_view to_string(LipCondition condition) {
+  switch (condition) {
+  case LipCondition::open:
+    return "open";
+  case LipCondition::frictionless:
+    return "frictionless";
+  case LipCondition::sticking:
+    return "sticking";
+  }
+  return "unknown";
+}
+
+LipCondition lip_condition_from_string(std::string_view name) {
+  for (LipCondition condition : {LipCondition::open, LipCondition::frictionless, LipCondition::sticking})
+    if (name == to_string(condition))
+      return condition;
+  throw InputError(fmt::format("lip contact '{}' does not exist; there are: open, frictionless, sticking", name));
+}
+
+std::vector<LipPair> lip_pairs(const NodeCloud& nodes) {
+  std::vector<int> lips;
+  std::vector<Vector3> positions;
+  for (int i = 0; i < nodes.size(); ++i)
+    if (nodes.kinds[i] == NodeKind::lip) {
+      lips.push_back(i);
+      positions.push_back(nodes.positions[i]);
+    }
+  std::vector<LipPair> pairs;
+  if (lips.empty())
+    return pairs;
+  const topology::PointTree tree(positions);
+  std::vector<topology::PointTree::Found> near;
+  for (int k = 0; k < std::ssize(lips); ++k) {
+    const int i = lips[k];
+    near.clear();
+    tree.within(positions[k], 4 * lip_offset * nodes.spacings[i], near);
+    for (const topology::PointTree::Found& other : near) {
+      const int j = lips[other.index];
+      // Each node's normal points out of its material, so from `plus` it points to `minus`.
+      if (j > i && nodes.normals[i].dot(nodes.normals[j]) < 0)
+        pairs.push_back({i, j, (nodes.normals[j] - nodes.normals[i]).normalized()});
+    }
+  }
+  return pairs;
+}
+
+LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& pairs, LipCondition condition,
+                       const ContactPatch* tool) {
+  if (condition == LipCondition::open)
+    throw InputError("lips that are left open have no contact to condense");
+  LipPatch lips;
+  lips.pairs = pairs;
+  lips.modes = condition == LipCondition::sticking ? 3 : 1;
+  // Unit forces on all plus nodes, then on all minus nodes, combined into pair forces.
+  std::vector<int> plus, minus;
+  for (const LipPair& pair : pairs) {
+    plus.push_back(pair.plus);
+    minus.push_back(pair.minus);
+  }
+  if (!pairs.empty()) {
+    const std::vector<Field> on_plus = body.force_responses(plus);
+    const std::vector<Field> on_minus = body.force_responses(minus);
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+      const std::array<Vector3, 3> axes = mode_axes(pairs[p].normal);
+      for (int m = 0; m < lips.modes; ++m) {
+        Field response = scaled(on_plus[3 * p], axes[m].x());
+        for (int axis = 1; axis < 3; ++axis)
+          response.add(axes[m][axis], on_plus[3 * p + axis]);
+        for (int axis = 0; axis < 3; ++axis)
+          response.add(-axes[m][axis], on_minus[3 * p + axis]);
+        lips.responses.push_back(std::move(response));
+      }
+    }
+  }
+  lips.compliance = openings(body, pairs, lips.modes, lips.responses);
+  lips.base_opening = openings(body, pairs, lips.modes, {tool != nullptr ? tool->base : body.solve()}).col(0);
+  if (tool != nullptr) {
+    lips.tool_of_lips = body.contact_displacements(tool->nodes, lips.responses);
+    lips.lips_of_tool = openings(body, pairs, lips.modes, tool->responses);
+  }
+  if (!lips.compliance.allFinite())
+    throw NumericalError(fmt::format("the compliance of {} lip pairs is not finite", pairs.size()));
+  return lips;
+}
+
+LipState close_lips(const LipPatch& lips, const VectorX& free_opening, double tolerance,
+                    const std::vector<char>& closed) {
+  LipState state;
+  state.closed = closed.size() == lips.pairs.size() ? closed : std::vector<char>(lips.pairs.size(), 0);
+  SetSearch search;
+  std::vector<char> wanted;
+  const int limit = most_rounds + 4 * static_cast<int>(std::ssize(lips.pairs));
+  for (state.rounds = 1; state.rounds <= limit; ++state.rounds) {
+    hold_closed(lips, free_opening, state);
+    const int changes = wanted_set(lips, state, tolerance, wanted);
+    state.converged = changes == 0;
+    if (state.converged)
+      break;
+    search.advance(state.closed, wanted, changes);
+  }
+  return state;
+}
+
+CutContactState press(const ContactPatch& patch, const LipPatch& lips, const topology::ToolShape& tool,
+                      const topology::ToolPose& pose, const ContactOptions& options, const CutContactState* previous) {
+  return settle(patch, lips, options.gap_tolerance, previous != nullptr ? previous->lips.closed : std::vector<char>{},
+                [&](const ContactPatch& held) {
+                  return press(held, tool, pose, options, previous != nullptr ? &previous->tool : nullptr);
+                });
+}
+
+CutContactState prescribe(const ContactPatch& patch, const LipPatch& lips, const std::vector<Vector3>& displacements,
+                          double tolerance) {
+  return settle(patch, lips, tolerance, {}, [&](const ContactPatch& held) { return prescribe(held, displacements); });
+}
+
+Field deform(const Field& base, const LipPatch& lips, const LipState& state) {
+  Field field = base;
+  for (Eigen::Index k = 0; k < state.forces.size(); ++k)
+    if (state.forces[k] != 0)
+      field.add(state.forces[k], lips.responses[k]);
+  return field;
+}
+
+Field deform(const ContactPatch& patch, const LipPatch& lips, const CutContactState& state) {
+  return deform(deform(patch, state.tool), lips, state.lips);
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,114 @@
+#include "solvers/schur_window.hpp"
+#include "topology/errors.hpp"
+
+#include <Eigen/Dense>
+#include <catch2/catch.hpp>
+#include <random>
+
+using namespace spherecut;
+using namespace spherecut::solvers;
+
+namespace {
+
+/// Springs between random neighbours on a line plus a weak foundation: sparse, positive definite.
+MatrixX spring_matrix(int n, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0.5, 1.5);
+  MatrixX k = 0.1 * MatrixX::Identity(n, n);
+  for (int i = 0; i < n; ++i)
+    for (int step : {1, 2, 7})
+      if (i + step < n) {
+        const double stiffness = uniform(random);
+        k(i, i) += stiffness;
+        k(i + step, i + step) += stiffness;
+        k(i, i + step) -= stiffness;
+        k(i + step, i) -= stiffness;
+      }
+  return k;
+}
+
+SparseMatrix lower_of(const MatrixX& k) {
+  return MatrixX(k.triangularView<Eigen::Lower>()).sparseView();
+}
+
+VectorX random_vector(int n, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  return VectorX::NullaryExpr(n, [&] { return normal(random); });
+}
+
+} // namespace
+
+TEST_CASE("A window solves the system it was taken from", "[schur_window]") {
+  const int n = 90, changing = 20, contact = 12;
+  const MatrixX k = spring_matrix(n, 1);
+  SchurWindow window(lower_of(k), changing, 6, contact);
+  window.factor();
+  const MatrixX right = random_vector(n, 2);
+  const MatrixX exact = k.llt().solve(right);
+  const MatrixX found = window.recover(window.solve(window.reduce(right)), right);
+  CHECK((found - exact).norm() < 1e-12 * exact.norm());
+  CHECK(window.far() == n - changing - contact);
+  CHECK(window.slot_of(n - 1) == window.slots() - 1);
+  CHECK(window.slot_of(0) == -1);
+}
+
+TEST_CASE("Changed, added and removed unknowns give what a system built from scratch gives", "[schur_window]") {
+  const int n = 90, changing = 20, room = 5, contact = 12, far = n - changing - contact;
+  const MatrixX k = spring_matrix(n, 3);
+  SchurWindow window(lower_of(k), changing, room, contact);
+  // From scratch: unknown `gone` leaves with its springs, two new ones come, coupled to each other and the window.
+  MatrixX larger = MatrixX::Zero(n + 2, n + 2);
+  larger.topLeftCorner(n, n) = k;
+  const auto spring = [&](int a, int b, double stiffness) {
+    for (const auto& [i, j, s] :
+         {std::tuple{a, a, 1.0}, std::tuple{b, b, 1.0}, std::tuple{a, b, -1.0}, std::tuple{b, a, -1.0}})
+      larger(i, j) += s * stiffness;
+    const auto slot = [&](int i) { return i < n ? window.slot_of(i) : changing + i - n; };
+    const int low = std::min(slot(a), slot(b)), high = std::max(slot(a), slot(b));
+    window.column(low)[low] += stiffness;
+    window.column(high)[high] += stiffness;
+    window.column(low)[high] -= stiffness;
+  };
+  window.activate(changing);
+  window.activate(changing + 1);
+  spring(n, far + 4, 0.7);
+  spring(n, n + 1, 0.4);
+  spring(n + 1, n - 1, 0.9); // a contact unknown
+  spring(far + 1, far + 9, 2.0);
+  const int gone = far + 10; // beyond the reach of springs into the far part
+  for (int other = far; other < n; ++other)
+    if (other != gone && larger(other, gone) != 0)
+      spring(other, gone, larger(other, gone));
+  window.deactivate(window.slot_of(gone));
+  larger.row(gone).setZero();
+  larger.col(gone).setZero();
+  larger(gone, gone) = 1;
+  window.factor();
+
+  VectorX right = random_vector(n + 2, 4);
+  right[gone] = 0;
+  const VectorX exact = larger.llt().solve(right);
+  MatrixX seen = window.reduce(right.head(n));
+  seen(changing, 0) = right[n];
+  seen(changing + 1, 0) = right[n + 1];
+  seen(window.slot_of(gone), 0) = 0;
+  const MatrixX by_slot = window.solve(seen);
+  const MatrixX found = window.recover(by_slot, right.head(n));
+  CHECK((found.col(0) - exact.head(n)).norm() < 1e-11 * exact.norm());
+  CHECK(by_slot(changing, 0) == Approx(exact[n]));
+  CHECK(by_slot(changing + 1, 0) == Approx(exact[n + 1]));
+
+  const MatrixX unit = MatrixX::Identity(contact, contact);
+  const MatrixX compliance = window.solve_contact(unit);
+  const MatrixX inverse = larger.inverse();
+  CHECK((compliance - inverse.block(n - contact, n - contact, contact, contact)).norm() < 1e-11 * compliance.norm());
+}
+
+TEST_CASE("A window without hold is said, not solved", "[schur_window]") {
+  const int n = 40;
+  SchurWindow window(lower_of(spring_matrix(n, 5)), 10, 2, 4);
+  window.activate(10); // a new unknown that nothing holds
+  CHECK_THROWS_AS(window.factor(), NumericalError);
+  CHECK_THROWS_AS(SchurWindow(lower_of(spring_matrix(n, 5)), 30, 0, 20), InputError);
+}
