@@ -1,0 +1,116 @@
+#include "topology/box_tree.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace spherecut::topology {
+
+namespace {
+constexpr int leaf_size = 2;
+} // namespace
+
+BoxTree::BoxTree(const std::vector<BoundingBox>& boxes) : order_(boxes.size()) {
+  if (boxes.empty())
+    return;
+  bounds_ = boxes.front();
+  std::vector<Vector3> centres;
+  centres.reserve(boxes.size());
+  for (const BoundingBox& box : boxes) {
+    bounds_.lower = bounds_.lower.cwiseMin(box.lower);
+    bounds_.upper = bounds_.upper.cwiseMax(box.upper);
+    centres.push_back(box.centre());
+  }
+  origin_ = bounds_.centre();
+  rounding_ = 3e-7F * static_cast<float>(bounds_.extent().maxCoeff());
+  std::iota(order_.begin(), order_.end(), 0);
+  nodes_.reserve(boxes.size() / 2 + 1);
+  build(boxes, centres, 0, static_cast<int>(boxes.size()));
+}
+
+/// Halves order_[first, last) by the median along the longest side of the centres' box; the place between.
+int BoxTree::halve(const std::vector<Vector3>& centres, int first, int last) {
+  Vector3 lower = centres[order_[first]], upper = lower;
+  for (int i = first + 1; i < last; ++i) {
+    lower = lower.cwiseMin(centres[order_[i]]);
+    upper = upper.cwiseMax(centres[order_[i]]);
+  }
+  Eigen::Index axis = 0;
+  (upper - lower).maxCoeff(&axis);
+  const int middle = (first + last) / 2;
+  // Ties are broken by the index, so that the tree does not depend on the library's algorithm.
+  std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + last,
+                   [&](int a, int b) { return std::pair(centres[a][axis], a) < std::pair(centres[b][axis], b); });
+  return middle;
+}
+
+/// Node over order_[first, last), depth first; its index.
+int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<Vector3>& centres, int first, int last) {
+  const int self = static_cast<int>(nodes_.size());
+  nodes_.emplace_back();
+  std::array<int, 5> cut{first, last, last, last, last};
+  int parts = 1;
+  while (parts < 4) { // halve the largest part
+    int largest = 0;
+    for (int p = 1; p < parts; ++p)
+      if (cut[p + 1] - cut[p] > cut[largest + 1] - cut[largest])
+        largest = p;
+    if (cut[largest + 1] - cut[largest] <= leaf_size)
+      break;
+    const int middle = halve(centres, cut[largest], cut[largest + 1]);
+    for (int p = ++parts; p > largest + 1; --p)
+      cut[p] = cut[p - 1];
+    cut[largest + 1] = middle;
+  }
+  Node node;
+  for (int d = 0; d < 3; ++d) {
+    node.boxes.centre[d].setZero();
+    node.boxes.half[d].setZero();
+  }
+  node.first.fill(0);
+  node.count.fill(0);
+  node.children = parts;
+  for (int p = 0; p < parts; ++p) {
+    Vector3 lower = boxes[order_[cut[p]]].lower, upper = boxes[order_[cut[p]]].upper;
+    for (int i = cut[p] + 1; i < cut[p + 1]; ++i) {
+      lower = lower.cwiseMin(boxes[order_[i]].lower);
+      upper = upper.cwiseMax(boxes[order_[i]].upper);
+    }
+    for (int d = 0; d < 3; ++d) {
+      node.boxes.centre[d][p] = static_cast<float>(0.5 * (lower[d] + upper[d]) - origin_[d]);
+      node.boxes.half[d][p] = static_cast<float>(0.5 * (upper[d] - lower[d])) + rounding_;
+    }
+    const bool leaf = cut[p + 1] - cut[p] <= leaf_size;
+    node.first[p] = leaf ? cut[p] : build(boxes, centres, cut[p], cut[p + 1]);
+    node.count[p] = leaf ? cut[p + 1] - cut[p] : 0;
+  }
+  nodes_[self] = node;
+  return self;
+}
+
+bool BoxTree::any_within(const Vector3& x, double radius) const {
+  if (empty())
+    return false;
+  const Vector3 outside = (bounds_.lower - x).cwiseMax(x - bounds_.upper).cwiseMax(0.0);
+  if (!(outside.squaredNorm() <= radius * radius))
+    return false;
+  const Eigen::Vector3f at = (x - origin_).cast<float>();
+  const float reach = static_cast<float>(radius) * (1 + 1e-6F) + 3e-7F * at.cwiseAbs().maxCoeff();
+  std::array<int, stack_size> stack;
+  int height = 0;
+  stack[height++] = 0;
+  while (height > 0) {
+    const Node& node = nodes_[stack[--height]];
+    const Four squared = node.boxes.squared_distance(at);
+    for (int child = 0; child < node.children; ++child) {
+      if (squared[child] > reach * reach)
+        continue;
+      if (node.count[child] > 0)
+        return true;
+      stack[height++] = node.first[child];
+    }
+  }
+  return false;
+}
+
+} // namespace spherecut::topology

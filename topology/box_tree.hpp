@@ -1,0 +1,142 @@
+// A tree of boxes, four children a node, over the boxes of any primitives: segments against boxes and nearest-first
+// search. Single precision with an allowance for rounding, so that no query ever misses a box; the exact tests are the
+// caller's. Queries do not allocate. Used by the incision alone.
+#pragma once
+
+#include "topology/types.hpp"
+
+#include <Eigen/Geometry>
+#include <array>
+#include <vector>
+
+namespace spherecut::topology {
+
+class BoxTree {
+ public:
+  BoxTree() = default;
+  /// One box per primitive, m, all finite.
+  explicit BoxTree(const std::vector<BoundingBox>& boxes);
+
+  /// The primitive at each place of the tree: primitives that lie close together have places close together.
+  [[nodiscard]] const std::vector<int>& order() const { return order_; }
+  [[nodiscard]] bool empty() const { return order_.empty(); }
+  [[nodiscard]] const BoundingBox& bounds() const { return bounds_; }
+
+  /// Calls hit(place) for every primitive whose box may meet the segment a b until it returns true; whether it did.
+  template <class Hit>
+  [[nodiscard]] bool any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const;
+
+  /// Visits primitives in about the order of bound(boxes), lower bounds of the cost of anything in each of four boxes,
+  /// and skips the boxes whose bound is above the best cost so far.
+  /// `visit(place, best)` returns the cost of a primitive if it is below `best`, else `best`. Returns the least cost.
+  template <class Bound, class Visit>
+  double least(double best, const Bound& bound, const Visit& visit) const;
+
+  /// Whether the box of some primitive comes within `radius` m of x.
+  [[nodiscard]] bool any_within(const Vector3& x, double radius) const;
+
+  using Four = Eigen::Array4f;
+  /// Four boxes by centre (relative to origin()) and half extent.
+  struct Boxes {
+    std::array<Four, 3> centre, half;
+    /// Lower bounds of the squared distances of the four boxes from x, relative to origin().
+    [[nodiscard]] Four squared_distance(const Eigen::Vector3f& x) const {
+      const float margin = 3e-7F * x.cwiseAbs().maxCoeff();
+      const Four u = ((centre[0] - x[0]).abs() - half[0] - margin).max(0.0F);
+      const Four v = ((centre[1] - x[1]).abs() - half[1] - margin).max(0.0F);
+      const Four w = ((centre[2] - x[2]).abs() - half[2] - margin).max(0.0F);
+      return (u * u + v * v + w * w) * (1 - 1e-6F);
+    }
+  };
+  [[nodiscard]] const Vector3& origin() const { return origin_; }
+
+ private:
+  struct Node {
+    Boxes boxes;
+    std::array<int, 4> first; // leaf: its first place; inner node: its index
+    std::array<int, 4> count; // primitives of a leaf, 0 for an inner node
+    int children;
+  };
+  static constexpr int stack_size = 96; // three postponed children a level, 32 levels hold any number of primitives
+
+  int build(const std::vector<BoundingBox>& boxes, const std::vector<Vector3>& centres, int first, int last);
+  int halve(const std::vector<Vector3>& centres, int first, int last);
+
+  std::vector<Node> nodes_;
+  std::vector<int> order_;
+  BoundingBox bounds_;
+  Vector3 origin_ = Vector3::Zero();
+  float rounding_ = 0; // m, by which every half extent is enlarged
+};
+
+template <class Hit>
+bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const {
+  if (empty() || (a.cwiseMin(b).array() > bounds_.upper.array()).any() ||
+      (a.cwiseMax(b).array() < bounds_.lower.array()).any())
+    return false;
+  // Separating axes of a segment (middle m, half vector e) and a box: three of the box, three cross products.
+  const Eigen::Vector3f m = (0.5 * (a + b) - origin_).cast<float>(), e = (0.5 * (b - a)).cast<float>();
+  const Eigen::Vector3f reach = e.cwiseAbs();
+  const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
+  const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
+  std::array<int, stack_size> stack;
+  int height = 0;
+  stack[height++] = 0;
+  while (height > 0) {
+    const Node& node = nodes_[stack[--height]];
+    const auto& [centre, half] = node.boxes;
+    const Four x = centre[0] - m[0], y = centre[1] - m[1], z = centre[2] - m[2];
+    Four apart = (x.abs() - half[0] - (reach[0] + margin)).max(y.abs() - half[1] - (reach[1] + margin));
+    apart = apart.max(z.abs() - half[2] - (reach[2] + margin));
+    apart = apart.max((y * e[2] - z * e[1]).abs() - half[1] * reach[2] - half[2] * reach[1] - cross_margin);
+    apart = apart.max((z * e[0] - x * e[2]).abs() - half[2] * reach[0] - half[0] * reach[2] - cross_margin);
+    apart = apart.max((x * e[1] - y * e[0]).abs() - half[0] * reach[1] - half[1] * reach[0] - cross_margin);
+    for (int child = 0; child < node.children; ++child) {
+      if (apart[child] > 0)
+        continue;
+      if (node.count[child] == 0)
+        stack[height++] = node.first[child];
+      for (int place = node.first[child]; place < node.first[child] + node.count[child]; ++place)
+        if (hit(place))
+          return true;
+    }
+  }
+  return false;
+}
+
+template <class Bound, class Visit>
+double BoxTree::least(double best, const Bound& bound, const Visit& visit) const {
+  if (empty())
+    return best;
+  struct Postponed {
+    int first, count;
+    float bound;
+  };
+  std::array<Postponed, stack_size> stack;
+  int height = 0;
+  stack[height++] = {0, 0, 0.0F};
+  while (height > 0) {
+    const Postponed top = stack[--height];
+    if (top.bound > best)
+      continue;
+    for (int place = top.first; place < top.first + top.count; ++place)
+      best = visit(place, best);
+    if (top.count > 0)
+      continue;
+    const Node& node = nodes_[top.first];
+    const Four bounds = bound(node.boxes);
+    // Nearest last, so that it is taken first.
+    const int base = height;
+    for (int child = 0; child < node.children; ++child) {
+      if (!(bounds[child] <= best))
+        continue;
+      int at = height++;
+      for (; at > base && stack[at - 1].bound < bounds[child]; --at)
+        stack[at] = stack[at - 1];
+      stack[at] = {node.first[child], node.count[child], bounds[child]};
+    }
+  }
+  return best;
+}
+
+} // namespace spherecut::topology

@@ -1,0 +1,323 @@
+#include "topology/incision.hpp"
+
+#include "topology/box_tree.hpp"
+#include "topology/errors.hpp"
+#include "topology/proximity.hpp"
+#include "topology/sheet_front.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <mutex>
+#include <utility>
+
+namespace spherecut::topology {
+
+namespace {
+
+/// A triangle as a plane and two barycentric coordinates, affine functions of the position relative to the tree's
+/// origin. What a sight line is tested against.
+struct Wall {
+  Vector3 normal;                    // unit
+  Vector3 along_u, along_v;          // gradients of the barycentric coordinates u and v, 1/m
+  double height, u_offset, v_offset; // at the origin, with the sign turned
+  double steepest;                   // 1/m, largest gradient of u, v and 1 - u - v
+
+  Wall(const Vector3& a, const Vector3& b, const Vector3& c) {
+    const Vector3 ab = b - a, ac = c - a, area_vector = ab.cross(ac);
+    const double squared = area_vector.squaredNorm();
+    normal = area_vector / std::sqrt(squared);
+    along_u = ac.cross(area_vector) / squared;
+    along_v = area_vector.cross(ab) / squared;
+    height = normal.dot(a);
+    u_offset = along_u.dot(a);
+    v_offset = along_v.dot(a);
+    steepest = std::max({along_u.norm(), along_v.norm(), (along_u + along_v).norm()});
+  }
+
+  /// Whether the segment p q meets the triangle. Heights within `flat` m count as on the plane.
+  [[nodiscard]] bool meets(const Vector3& p, const Vector3& q, double flat) const {
+    const double at_p = normal.dot(p) - height, at_q = normal.dot(q) - height;
+    if (std::min(at_p, at_q) > flat || std::max(at_p, at_q) < -flat)
+      return false;
+    // Neighbours overlap by this share of a triangle, and by what rounding of the heights moves the crossing.
+    constexpr double overlap = 1e-9;
+    if (std::abs(at_p) <= flat && std::abs(at_q) <= flat)
+      return meets_in_plane(p, q, overlap + flat * steepest);
+    const double rise = at_p - at_q;
+    const Vector3 crossing = p + std::clamp(at_p / rise, 0.0, 1.0) * (q - p);
+    const double slack = overlap + 1e-3 * flat * steepest * (q - p).norm() / std::abs(rise);
+    const double u = along_u.dot(crossing) - u_offset, v = along_v.dot(crossing) - v_offset;
+    return u >= -slack && v >= -slack && u + v <= 1 + slack;
+  }
+
+  [[nodiscard]] bool meets_in_plane(const Vector3& p, const Vector3& q, double slack) const {
+    const double u_p = along_u.dot(p) - u_offset, v_p = along_v.dot(p) - v_offset;
+    const double u_q = along_u.dot(q) - u_offset, v_q = along_v.dot(q) - v_offset;
+    double from = 0, to = 1; // part of the segment inside the edges looked at so far
+    for (const auto& [start, end] :
+         {std::pair(u_p, u_q), std::pair(v_p, v_q), std::pair(1 - u_p - v_p, 1 - u_q - v_q)}) {
+      if (start < -slack && end < -slack)
+        return false;
+      if (start < -slack)
+        from = std::max(from, (-slack - start) / (end - start));
+      else if (end < -slack)
+        to = std::min(to, (start + slack) / (start - end));
+    }
+    return from <= to;
+  }
+};
+
+BoundingBox box_of(const std::array<Vector3, 3>& p, double margin) {
+  return {p[0].cwiseMin(p[1]).cwiseMin(p[2]).array() - margin, p[0].cwiseMax(p[1]).cwiseMax(p[2]).array() + margin};
+}
+
+Eigen::Vector3f single(const Vector3& x) {
+  return x.cast<float>();
+}
+
+} // namespace
+
+struct Incision::Data {
+  Data(std::vector<SurfaceMesh> sheets_in, std::shared_ptr<const Domain> domain_in, int revision_in)
+      : sheets(std::move(sheets_in)), domain(std::move(domain_in)), revision(revision_in) {
+    if (!domain)
+      throw InputError("an incision needs a body, none is given");
+    for (int s = 0; s < std::ssize(sheets); ++s) {
+      const std::string name = fmt::format("sheet {} of the incision", s);
+      check_sheet(sheets[s], name);
+      if (!reaches_inside(sheets[s], *domain))
+        throw InputError(fmt::format("{} lies outside the body: no point of its {} triangles is inside", name,
+                                     sheets[s].triangles.size()));
+    }
+    build_triangles();
+    build_front();
+  }
+
+  void build_triangles() {
+    const double size = domain->bounds().extent().norm();
+    flat = 1e-12 * size;
+    std::vector<SheetTriangle> in_sheets;
+    std::vector<BoundingBox> boxes;
+    for (int s = 0; s < std::ssize(sheets); ++s)
+      for (int t = 0; t < std::ssize(sheets[s].triangles); ++t) {
+        in_sheets.push_back({s, t});
+        boxes.push_back(box_of(corners_of(s, t), abutting * size));
+      }
+    tree = BoxTree(boxes);
+    pieces = find_front(sheets, in_sheets, tree, *domain);
+    std::vector<std::vector<std::array<int, 3>>> neighbours;
+    std::vector<std::vector<bool>> at_border;
+    for (const SurfaceMesh& sheet : sheets) {
+      neighbours.push_back(triangle_neighbours(sheet));
+      std::vector<bool>& border = at_border.emplace_back(sheet.vertices.size(), false);
+      for (int t = 0; t < std::ssize(sheet.triangles); ++t)
+        for (int e = 0; e < 3; ++e)
+          if (neighbours.back()[t][e] < 0)
+            border[sheet.triangles[t][e]] = border[sheet.triangles[t][(e + 1) % 3]] = true;
+    }
+    for (const int i : tree.order()) {
+      const auto [s, t] = in_sheets[i];
+      triangles.push_back(in_sheets[i]);
+      corners.push_back(corners_of(s, t));
+      const auto& [a, b, c] = corners.back();
+      walls.emplace_back(a - tree.origin(), b - tree.origin(), c - tree.origin());
+      BorderFlags& flags = border_flags.emplace_back();
+      for (int e = 0; e < 3; ++e) {
+        flags[e] = neighbours[s][t][e] < 0;
+        flags[3 + e] = at_border[s][sheets[s].triangles[t][e]];
+      }
+    }
+  }
+
+  void build_front() {
+    std::vector<BoundingBox> boxes;
+    for (const FrontPiece& piece : pieces) {
+      const auto& [from, to, sheet] = piece.segment;
+      front.push_back(piece.segment);
+      front_length += (to - from).norm();
+      boxes.push_back({from.cwiseMin(to), from.cwiseMax(to)});
+    }
+    front_tree = BoxTree(boxes);
+  }
+
+  [[nodiscard]] std::array<Vector3, 3> corners_of(int sheet, int triangle) const {
+    const SurfaceMesh& mesh = sheets[sheet];
+    const Triangle& t = mesh.triangles[triangle];
+    return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+  }
+
+  [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b) const {
+    const Vector3 p = a - tree.origin(), q = b - tree.origin();
+    return tree.any_on_segment(a, b, [&](int place) { return walls[place].meets(p, q, flat); });
+  }
+
+  /// Whether x sees the point f of the front, apart from the last thousandth of the way, where the border itself is.
+  [[nodiscard]] bool sees_front(const Vector3& x, const Vector3& f) const {
+    constexpr double pulled_in = 1e-3;
+    return !blocks(x, f + pulled_in * (x - f));
+  }
+
+  // Order as in TriangleFeature after `face`: edges ab, bc, ca, corners a, b, c.
+  using BorderFlags = std::array<bool, 6>;
+
+  std::vector<SurfaceMesh> sheets;
+  std::shared_ptr<const Domain> domain;
+  int revision;
+  double flat = 0; // m, height within which a point lies on a triangle
+  BoxTree tree;    // of all triangles; the next four in its order
+  std::vector<SheetTriangle> triangles;
+  std::vector<std::array<Vector3, 3>> corners;
+  std::vector<Wall> walls;
+  std::vector<BorderFlags> border_flags;
+  std::vector<FrontPiece> pieces;
+  std::vector<FrontSegment> front;
+  BoxTree front_tree;
+  double front_length = 0; // m
+  mutable std::once_flag area_known;
+  mutable double area = 0; // m2
+};
+
+Incision::Incision(std::vector<SurfaceMesh> sheets, std::shared_ptr<const Domain> domain, int revision)
+    : data_(std::make_unique<const Data>(std::move(sheets), std::move(domain), revision)) {}
+Incision::~Incision() = default;
+
+const std::vector<SurfaceMesh>& Incision::sheets() const {
+  return data_->sheets;
+}
+const std::shared_ptr<const Domain>& Incision::domain() const {
+  return data_->domain;
+}
+int Incision::revision() const {
+  return data_->revision;
+}
+const std::vector<FrontSegment>& Incision::front() const {
+  return data_->front;
+}
+double Incision::front_length() const {
+  return data_->front_length;
+}
+
+double Incision::area() const {
+  std::call_once(data_->area_known, [this] {
+    for (const SurfaceMesh& sheet : data_->sheets)
+      data_->area += area_inside(sheet, *data_->domain);
+  });
+  return data_->area;
+}
+
+bool Incision::blocks(const Vector3& a, const Vector3& b) const {
+  return data_->blocks(a, b);
+}
+
+bool Incision::near(const Vector3& x, double radius) const {
+  return data_->tree.any_within(x, radius);
+}
+
+std::optional<SheetPoint> Incision::closest(const Vector3& x, double reach) const {
+  const Data& data = *data_;
+  SheetPoint nearest;
+  int nearest_place = -1;
+  double head_on = 0; // height of x over the plane of the nearest triangle, m
+  TriangleFeature feature = TriangleFeature::face;
+  const Eigen::Vector3f at = single(x - data.tree.origin());
+  // Among triangles that share the nearest edge or vertex the one that x is highest above tells the side.
+  constexpr double tie = 1e-12;
+  const double squared = data.tree.least(
+      std::nextafter(reach * reach, std::numeric_limits<double>::infinity()),
+      [&](const BoxTree::Boxes& boxes) { return boxes.squared_distance(at); },
+      [&](int place, double best) {
+        const auto& [a, b, c] = data.corners[place];
+        const TrianglePoint candidate = closest_on_triangle(x, a, b, c);
+        const double candidate_squared = (x - candidate.point).squaredNorm();
+        const double height = std::abs(data.walls[place].normal.dot(x - a));
+        const bool tied = nearest_place >= 0 && std::abs(candidate_squared - best) <= tie * best;
+        if (tied ? height <= head_on : candidate_squared >= best)
+          return best;
+        nearest_place = place;
+        nearest.point = candidate.point;
+        feature = candidate.feature;
+        head_on = height;
+        return std::min(candidate_squared, best);
+      });
+  if (nearest_place < 0)
+    return std::nullopt;
+  nearest.normal = data.walls[nearest_place].normal;
+  nearest.distance = std::sqrt(squared);
+  nearest.sheet = data.triangles[nearest_place].sheet;
+  nearest.triangle = data.triangles[nearest_place].triangle;
+  nearest.on_border =
+      feature != TriangleFeature::face && data.border_flags[nearest_place][static_cast<std::size_t>(feature) - 1];
+  return nearest;
+}
+
+std::optional<FrontFrame> Incision::front_frame(const Vector3& x, double reach) const {
+  const Data& data = *data_;
+  FrontFrame frame;
+  double share = 0; // place on the segment, 0 to 1
+  const Eigen::Vector3f at = single(x - data.front_tree.origin());
+  const double squared = data.front_tree.least(
+      std::nextafter(reach * reach, std::numeric_limits<double>::infinity()),
+      [&](const BoxTree::Boxes& boxes) { return boxes.squared_distance(at); },
+      [&](int place, double best) {
+        const int segment = data.front_tree.order()[place];
+        const auto& [from, to, sheet] = data.front[segment];
+        const double s = std::clamp((x - from).dot(to - from) / (to - from).squaredNorm(), 0.0, 1.0);
+        const Vector3 point = from + s * (to - from);
+        const double candidate = (x - point).squaredNorm();
+        if (candidate >= best)
+          return best;
+        frame.segment = segment;
+        frame.point = point;
+        share = s;
+        return candidate;
+      });
+  if (frame.segment < 0)
+    return std::nullopt;
+  const auto& [segment, from, to] = data.pieces[frame.segment];
+  frame.distance = std::sqrt(squared);
+  frame.normal = ((1 - share) * from.normal + share * to.normal).normalized();
+  Vector3 ahead = (1 - share) * from.ahead + share * to.ahead;
+  // Around a corner of the sheet the way ahead turns with x, from that of one side to that of the other.
+  if ((share == 0 && from.corner) || (share == 1 && to.corner)) {
+    const Vector3 away = x - frame.point, in_plane = away - away.dot(frame.normal) * frame.normal;
+    if (in_plane.norm() > 1e-6 * frame.distance)
+      ahead = in_plane;
+  }
+  frame.ahead = (ahead - ahead.dot(frame.normal) * frame.normal).normalized();
+  frame.tangent = frame.normal.cross(frame.ahead);
+  return frame;
+}
+
+std::optional<Detour> Incision::detour(const Vector3& x, const Vector3& y, double reach) const {
+  const Data& data = *data_;
+  Detour shortest;
+  bool found = false;
+  const Eigen::Vector3f at_x = single(x - data.front_tree.origin()), at_y = single(y - data.front_tree.origin());
+  shortest.length = data.front_tree.least(
+      std::nextafter(reach, std::numeric_limits<double>::infinity()),
+      [&](const BoxTree::Boxes& boxes) -> BoxTree::Four {
+        return boxes.squared_distance(at_x).sqrt() + boxes.squared_distance(at_y).sqrt();
+      },
+      [&](int place, double best) {
+        const auto& [from, to, sheet] = data.front[data.front_tree.order()[place]];
+        // Unfolded about the segment's line x and y lie on either side of it; the way crosses it on a straight line.
+        const double length = (to - from).norm();
+        const Vector3 direction = (to - from) / length;
+        const double along_x = direction.dot(x - from), along_y = direction.dot(y - from);
+        const double off_x = (x - from - along_x * direction).norm(), off_y = (y - from - along_y * direction).norm();
+        const double crossing = off_x + off_y > 0 ? (along_x * off_y + along_y * off_x) / (off_x + off_y) : along_x;
+        const Vector3 over = from + std::clamp(crossing, 0.0, length) * direction;
+        const double way = (x - over).norm() + (over - y).norm();
+        if (way >= best || !data.sees_front(x, over) || !data.sees_front(y, over))
+          return best;
+        shortest.over = over;
+        found = true;
+        return way;
+      });
+  if (!found)
+    return std::nullopt;
+  return shortest;
+}
+
+} // namespace spherecut::topology
