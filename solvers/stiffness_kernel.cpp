@@ -2,44 +2,58 @@
 
 namespace spherecut::solvers {
 
+namespace {
+
+/// Eight rows at once, wherever they lie in memory; narrower machines take them in parts.
+using Lanes = double __attribute__((vector_size(64), aligned(8), may_alias));
+constexpr int lane_count = 8;
+
+} // namespace
+
 // One function, compiled for the baseline and for the vector widths of the machine; the loader picks once.
 __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
 stiffness_column(const double* gradients, int points, int stride, int first, int count, int column, double lambda,
                  double mu, StiffnessColumn& out) {
-  const int begin = first & ~7;
+  // A point that the column's sphere does not reach adds nothing, whatever the row.
+  const double* reached[stiffness_kernel_points];
+  int reached_count = 0;
+  for (int q = 0; q < points; ++q) {
+    const double* point = gradients + static_cast<long>(3 * q) * stride;
+    const double* own = point + column;
+    if (own[0] != 0 || own[stride] != 0 || own[2 * stride] != 0)
+      reached[reached_count++] = point;
+  }
   const double both = lambda + mu;
-  for (int block = begin; block < count; block += 8) {
-    double m[9][8] = {};
-    for (int q = 0; q < points; ++q) {
-      const double* x = gradients + static_cast<long>(3 * q) * stride;
-      const double* y = x + stride;
-      const double* z = y + stride;
-      const double jx = x[column], jy = y[column], jz = z[column];
-      for (int l = 0; l < 8; ++l) {
-        const double a = x[block + l], b = y[block + l], c = z[block + l];
-        m[0][l] += a * jx;
-        m[1][l] += a * jy;
-        m[2][l] += a * jz;
-        m[3][l] += b * jx;
-        m[4][l] += b * jy;
-        m[5][l] += b * jz;
-        m[6][l] += c * jx;
-        m[7][l] += c * jy;
-        m[8][l] += c * jz;
-      }
+  for (int block = first & ~(lane_count - 1); block < count; block += lane_count) {
+    Lanes xx{}, xy{}, xz{}, yx{}, yy{}, yz{}, zx{}, zy{}, zz{};
+    for (int k = 0; k < reached_count; ++k) {
+      const double* point = reached[k];
+      const double* own = point + column;
+      const double jx = own[0], jy = own[stride], jz = own[2 * stride];
+      const Lanes x = *reinterpret_cast<const Lanes*>(point + block);
+      const Lanes y = *reinterpret_cast<const Lanes*>(point + stride + block);
+      const Lanes z = *reinterpret_cast<const Lanes*>(point + 2 * stride + block);
+      xx += x * jx;
+      xy += x * jy;
+      xz += x * jz;
+      yx += y * jx;
+      yy += y * jy;
+      yz += y * jz;
+      zx += z * jx;
+      zy += z * jy;
+      zz += z * jz;
     }
-    for (int l = 0; l < 8; ++l) {
-      const double trace = mu * (m[0][l] + m[4][l] + m[8][l]);
-      out.plane[0][block + l] = both * m[0][l] + trace;
-      out.plane[1][block + l] = lambda * m[1][l] + mu * m[3][l];
-      out.plane[2][block + l] = lambda * m[2][l] + mu * m[6][l];
-      out.plane[3][block + l] = lambda * m[3][l] + mu * m[1][l];
-      out.plane[4][block + l] = both * m[4][l] + trace;
-      out.plane[5][block + l] = lambda * m[5][l] + mu * m[7][l];
-      out.plane[6][block + l] = lambda * m[6][l] + mu * m[2][l];
-      out.plane[7][block + l] = lambda * m[7][l] + mu * m[5][l];
-      out.plane[8][block + l] = both * m[8][l] + trace;
-    }
+    const Lanes trace = mu * (xx + yy + zz);
+    const auto plane = [&](int p) -> Lanes& { return *reinterpret_cast<Lanes*>(out.plane[p] + block); };
+    plane(0) = both * xx + trace;
+    plane(1) = lambda * xy + mu * yx;
+    plane(2) = lambda * xz + mu * zx;
+    plane(3) = lambda * yx + mu * xy;
+    plane(4) = both * yy + trace;
+    plane(5) = lambda * yz + mu * zy;
+    plane(6) = lambda * zx + mu * xz;
+    plane(7) = lambda * zy + mu * yz;
+    plane(8) = both * zz + trace;
   }
 }
 

@@ -5,6 +5,8 @@ namespace spherecut::solvers {
 
 /// Longest column the kernel takes (a multiple of 8); supports of one background cell stay well below.
 inline constexpr int stiffness_kernel_rows = 512;
+/// Most points of one cell: 3 x 3 x 3.
+inline constexpr int stiffness_kernel_points = 27;
 
 /// Nine planes of `rows` values: plane 3 a + b holds entry (a, b) of the block of each row node.
 struct StiffnessColumn {
