@@ -45,7 +45,8 @@ using Block = Eigen::Matrix4d;
 class Collocation final : public ElasticBody {
  public:
   Collocation(Problem problem, const DiscretisationOptions& options)
-      : ElasticBody(std::move(problem), options.support_radius > 0 ? options.support_radius : default_support_radius),
+      : ElasticBody(std::move(problem), options.support_radius > 0 ? options.support_radius : default_support_radius,
+                    options.sight),
         mixed_(problem_.material.poisson_ratio > mixed_above), stride_(mixed_ ? 4 : 3) {
     const Stopwatch assembly;
     const NodeCloud& nodes = problem_.nodes;

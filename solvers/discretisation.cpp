@@ -27,25 +27,6 @@ Method method_from_string(std::string_view name) {
   throw InputError(fmt::format("method '{}' does not exist; there are: published, collocation, galerkin", name));
 }
 
-std::string_view to_string(SightRule rule) {
-  switch (rule) {
-  case SightRule::visibility:
-    return "visibility";
-  case SightRule::diffraction:
-    return "diffraction";
-  case SightRule::enriched:
-    return "enriched";
-  }
-  return "unknown";
-}
-
-SightRule sight_rule_from_string(std::string_view name) {
-  for (SightRule rule : {SightRule::visibility, SightRule::diffraction, SightRule::enriched})
-    if (name == to_string(rule))
-      return rule;
-  throw InputError(fmt::format("sight rule '{}' does not exist; there are: visibility, diffraction, enriched", name));
-}
-
 void Field::add(double factor, const Field& other) {
   coefficients += factor * other.coefficients;
   if (pressure.size() > 0)

@@ -4,6 +4,7 @@
 
 #include "solvers/material.hpp"
 #include "solvers/nodes.hpp"
+#include "solvers/sight.hpp"
 
 #include <functional>
 #include <memory>
@@ -35,16 +36,6 @@ struct Loads {
   std::function<Vector3(const Vector3& x, const Vector3& normal)> lip_traction;
   Matrix3 initial_strain = Matrix3::Zero(); // stress-free strain, subtracted from the strain (pre-tension: negative)
 };
-
-/// How a sphere reaches around a cut.
-enum class SightRule {
-  visibility,  // a sphere ends where the incision hides its node
-  diffraction, // it bends around the front: the distance is that of the shortest way around
-  enriched,    // diffraction, and the basis gains sqrt(r) {cos t/2, sin t/2, sin t/2 sin t, cos t/2 sin t} at the front
-};
-std::string_view to_string(SightRule rule);
-/// Throws InputError naming the value and the three allowed names.
-SightRule sight_rule_from_string(std::string_view name);
 
 /// A boundary value problem on a node cloud. Surface that is neither prescribed nor loaded is free.
 struct Problem {

@@ -10,6 +10,8 @@ namespace spherecut::solvers {
 
 namespace {
 
+constexpr double worst_moment_condition = 1e9;
+
 Problem checked(Problem problem) {
   check_problem(problem);
   return problem;
@@ -82,8 +84,10 @@ Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient) 
          material.shear_modulus() * (gradient + gradient.transpose());
 }
 
-ElasticBody::ElasticBody(Problem problem, double rho)
-    : problem_(checked(std::move(problem))), spheres_(problem_.nodes.positions, problem_.nodes.spacings, rho) {
+ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule)
+    : problem_(checked(std::move(problem))),
+      spheres_(problem_.nodes.positions, problem_.nodes.spacings, rho, Basis::linear, worst_moment_condition,
+               {problem_.incision, rule}) {
   const Stopwatch watch;
   supports_ = nodal_supports(spheres_);
   report_.nodes = problem_.nodes.size();

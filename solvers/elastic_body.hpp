@@ -41,7 +41,7 @@ class ElasticBody : public Discretisation {
                                               const std::vector<Field>& fields) const override;
 
  protected:
-  ElasticBody(Problem problem, double rho);
+  ElasticBody(Problem problem, double rho, SightRule rule);
   Problem problem_;
   AssemblyReport report_;
   Spheres spheres_;

@@ -41,9 +41,10 @@ struct CellShapes {
 class Galerkin final : public ElasticBody {
  public:
   Galerkin(Problem problem, const DiscretisationOptions& options)
-      : ElasticBody(std::move(problem), options.support_radius > 0
-                                            ? options.support_radius
-                                            : default_support_radius(problem.material.poisson_ratio)) {
+      : ElasticBody(std::move(problem),
+                    options.support_radius > 0 ? options.support_radius
+                                               : default_support_radius(problem.material.poisson_ratio),
+                    options.sight) {
     const Stopwatch assembly;
     BackgroundOptions background;
     background.gauss = options.quadrature;

@@ -1,5 +1,6 @@
 #include "solvers/shape_functions.hpp"
 
+#include "solvers/cut_sight.hpp"
 #include "solvers/shape_derivatives.hpp"
 #include "solvers/shape_kernel.hpp"
 #include "topology/errors.hpp"
@@ -20,6 +21,7 @@ namespace {
 constexpr double growth = 1.25;
 constexpr int growth_steps_at_node = 6;
 constexpr int growth_steps_at_point = 4;
+constexpr int growth_steps_for_enrichment = 2;
 
 // Memory of one support: on the stack unless it is unusually large.
 class SupportMemory {
@@ -80,31 +82,72 @@ void resize(ShapeFunctions& out, int n, bool second) {
     array->resize(second ? n : 0);
 }
 
-// Tries the support of x with all radii grown step by step. Rare: every sphere is looked at.
-bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
-  SupportMemory memory(spheres.size());
-  Support& support = memory.support;
-  double factor = 1;
-  for (int step = 0; step < growth_steps_at_point; ++step) {
-    factor *= growth;
-    support.count = 0;
-    for (int j = 0; j < spheres.size(); ++j)
-      append(support, j, spheres.centres()[j] - x, factor * spheres.radii()[j]);
-    pad(support);
-    if (evaluate_support(kernel, support, spheres.basis(), second, spheres.worst_condition(), out))
-      return true;
-  }
+// The nodes whose spheres, grown by `factor`, hold x. Rare: every sphere is looked at.
+void collect_grown(const Spheres& spheres, const Vector3& x, double factor, Support& support) {
+  support.count = 0;
+  for (int j = 0; j < spheres.size(); ++j)
+    append(support, j, spheres.centres()[j] - x, factor * spheres.radii()[j]);
+  pad(support);
+}
+
+bool nothing(ShapeFunctions& out) {
   out.nodes.clear();
   resize(out, 0, false);
   return false;
+}
+
+// Tries the support of x with all radii grown step by step.
+bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
+  SupportMemory memory(spheres.size());
+  double factor = 1;
+  for (int step = 0; step < growth_steps_at_point; ++step) {
+    collect_grown(spheres, x, factor *= growth, memory.support);
+    if (evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out))
+      return true;
+  }
+  return nothing(out);
+}
+
+// The same near the cut, first with the enriched basis where it is due, then without.
+bool evaluate_grown_near_cut(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second,
+                             ShapeFunctions& out) {
+  SupportMemory memory(spheres.size());
+  for (const CutSight::Enrich enrich : {CutSight::Enrich::where_near, CutSight::Enrich::never}) {
+    double factor = enrich == CutSight::Enrich::never ? 1 / growth : 1;
+    const int steps = enrich == CutSight::Enrich::never ? growth_steps_at_point + 1 : growth_steps_at_point;
+    for (int step = 0; step < steps; ++step) {
+      collect_grown(spheres, x, factor *= growth, memory.support);
+      if (spheres.cut()->evaluate(kernel, x, memory.support, true, second, 0, spheres.worst_condition(), enrich, out))
+        return true;
+    }
+  }
+  return nothing(out);
+}
+
+bool evaluate_near_cut(const Kernel& kernel, const Spheres& spheres, const Vector3& point, bool second,
+                       ShapeFunctions& out) {
+  const CutSight& cut = *spheres.cut();
+  if (second && cut.sight().rule != SightRule::visibility)
+    throw InputError(fmt::format("second derivatives near a cut: the rule '{}' has none, take 'visibility'",
+                                 to_string(cut.sight().rule)));
+  const Vector3 x = cut.off_the_sheet(point);
+  const SphereGrid::Cell cell = spheres.grid().find(x);
+  SupportMemory memory(cell.padded);
+  kernel.collect(cell, x.data(), memory.support);
+  return cut.evaluate(kernel, x, memory.support, false, second, 0, spheres.worst_condition(),
+                      CutSight::Enrich::where_near, out) ||
+         evaluate_grown_near_cut(kernel, spheres, x, second, out);
 }
 
 bool evaluate_point(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
   const SphereGrid::Cell cell = spheres.grid().find(x);
   SupportMemory memory(cell.padded);
   kernel.collect(cell, x.data(), memory.support);
+  if (spheres.cut() != nullptr && spheres.cut()->concerns(memory.support))
+    return evaluate_near_cut(kernel, spheres, x, second, out);
   return evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out) ||
-         evaluate_grown(kernel, spheres, x, second, out);
+         (spheres.cut() == nullptr ? evaluate_grown(kernel, spheres, x, second, out)
+                                   : evaluate_grown_near_cut(kernel, spheres, x, second, out));
 }
 
 void check(const std::vector<Vector3>& centres, const std::vector<double>& spacings, double rho, Basis basis,
@@ -163,7 +206,7 @@ double quartic_spline(double s) {
 }
 
 Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis,
-                 double worst_condition)
+                 double worst_condition, const Sight& sight)
     : centres_(std::move(centres)), basis_(basis), worst_condition_(worst_condition) {
   check(centres_, spacings, rho, basis, worst_condition);
   const int n = size(), needed = basis_size(basis) + 2;
@@ -172,12 +215,24 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
     base[i] = rho * spacings[i];
   radii_ = base;
   grid_ = SphereGrid(centres_, radii_);
+  if (sight.incision != nullptr) {
+    if (basis != Basis::linear)
+      throw InputError("shape functions: spheres around a cut have the linear basis alone");
+    cut_ = std::make_shared<CutSight>(sight, centres_, spacings, radii_);
+  }
 
   // A node whose support is not sound asks for one more step of growth of every sphere that would then hold it; the
   // steps are counted per sphere so that the outcome does not depend on the order of the nodes.
   const Kernel& kernel = shape_kernel::dispatched();
   ShapeFunctions shape;
-  const auto is_sound = [&](const Support& support) {
+  // Near a front the nodes may be too few for the enriched basis: a support that stays so is left to the linear one.
+  std::vector<int> wanted(n, 0), level(n, 0), everyone(n);
+  std::iota(everyone.begin(), everyone.end(), 0);
+  const auto is_sound = [&](int i, Support& support, bool grown) {
+    if (cut_ != nullptr && (grown || cut_->concerns(support)))
+      return cut_->evaluate(
+          kernel, centres_[i], support, grown, false, 2, worst_condition,
+          wanted[i] < growth_steps_for_enrichment ? CutSight::Enrich::where_near : CutSight::Enrich::never, shape);
     return support.count >= needed && evaluate_support(kernel, support, basis, false, worst_condition, shape);
   };
   const auto unsound_nodes = [&] {
@@ -186,13 +241,11 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
       const SphereGrid::Cell cell = grid_.find(centres_[i]);
       SupportMemory memory(cell.padded);
       kernel.collect(cell, centres_[i].data(), memory.support);
-      if (!is_sound(memory.support))
+      if (!is_sound(i, memory.support, false))
         unsound.push_back(i);
     }
     return unsound;
   };
-  std::vector<int> wanted(n, 0), level(n, 0), everyone(n);
-  std::iota(everyone.begin(), everyone.end(), 0);
   std::vector<int> unsound = unsound_nodes();
   int round = 0;
   while (!unsound.empty()) {
@@ -227,12 +280,14 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
         for (int j : candidates)
           append(memory.support, j, centres_[j] - centres_[i], radii_[j]);
         pad(memory.support);
-        if (!is_sound(memory.support))
+        if (!is_sound(i, memory.support, true))
           still.push_back(i);
       }
       unsound = std::move(still);
     }
     grid_ = SphereGrid(centres_, radii_);
+    if (cut_ != nullptr)
+      cut_->update_radii(centres_, radii_);
     unsound = unsound_nodes();
   }
   grown_ = static_cast<int>(std::count_if(level.begin(), level.end(), [](int l) { return l > 0; }));

@@ -2,8 +2,10 @@
 #pragma once
 
 #include "solvers/nodes.hpp"
+#include "solvers/sight.hpp"
 #include "solvers/sphere_grid.hpp"
 
+#include <memory>
 #include <span>
 
 namespace spherecut::solvers {
@@ -13,15 +15,21 @@ enum class Basis { linear, quadratic }; // P = {1, x, y, z} or all monomials up 
 /// Quartic spline weight, 1 - 6 s^2 + 8 s^3 - 3 s^4 for s = r / R < 1, else 0.
 double quartic_spline(double s);
 
-/// The spheres of a node cloud with a search grid. Immutable once built; queries are thread safe.
+class CutSight;
+
+/// The spheres of a node cloud with a search grid. Immutable once built; queries are thread safe. Where there is an
+/// incision no sphere reaches through it: a node that is hidden from a point does not support it, or, by the rules that
+/// bend around the front, supports it by the length of the shortest way. Points and nodes are plain geometry: those on
+/// a face stand a little off it (lip_offset).
 class Spheres {
  public:
   /// Radii rho * h. Where the support of a node (the nodes whose spheres hold it) has fewer than basis + 2 members or a
   /// moment matrix worse conditioned than `worst_condition`, the spheres around it grow by 1.25 until it is sound.
   /// Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than basis + 2
-  /// nodes, a centre is not finite, or a spacing, rho or worst_condition is not positive.
+  /// nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, or an incision is given with the
+  /// quadratic basis.
   Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis = Basis::linear,
-          double worst_condition = 1e9);
+          double worst_condition = 1e9, const Sight& sight = {});
 
   [[nodiscard]] int size() const { return static_cast<int>(centres_.size()); }
   [[nodiscard]] const std::vector<Vector3>& centres() const { return centres_; }
@@ -32,6 +40,8 @@ class Spheres {
   /// Ids of every sphere that may hold x, ascending; a superset of those that do, about 2 to 3 times as many.
   [[nodiscard]] std::span<const int> candidates(const Vector3& x) const { return grid_.find(x).ids; }
   [[nodiscard]] const SphereGrid& grid() const { return grid_; }
+  /// What the spheres know of the cut; null when there is none.
+  [[nodiscard]] const CutSight* cut() const { return cut_.get(); }
 
  private:
   std::vector<Vector3> centres_;
@@ -40,6 +50,7 @@ class Spheres {
   double worst_condition_;
   int grown_ = 0;
   SphereGrid grid_;
+  std::shared_ptr<CutSight> cut_;
 };
 
 /// Shape functions at one point; arrays have one entry per supporting node. Reuse the object: it keeps its memory.
@@ -55,14 +66,16 @@ struct ShapeFunctions {
 
 /// Values and exact first derivatives at x. False when the support of x is not sound (fewer nodes than basis functions,
 /// or a moment matrix worse conditioned than the spheres allow), even after trying radii grown by 1.25 up to four times
-/// at this point. The support is in ascending order of nodes.
+/// at this point. The support is in ascending order of nodes. Where the enriched basis has no sound support the linear
+/// one takes its place.
 bool evaluate(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
 
 /// The same at many points; out[i] belongs to points[i]. False when any support is not sound; the first such point is
 /// then the first out[i] without nodes.
 bool evaluate(const Spheres& spheres, std::span<const Vector3> points, std::span<ShapeFunctions> out);
 
-/// Values, exact first and second derivatives at x.
+/// Values, exact first and second derivatives at x. Throws InputError where a cut is to be seen by another rule than
+/// `visibility`: those that bend around the front have no second derivatives.
 bool evaluate_second(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
 
 } // namespace spherecut::solvers

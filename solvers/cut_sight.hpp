@@ -1,0 +1,60 @@
+// Shape functions near a cut: which nodes a point sees, how far it is around the front to the others, and the basis
+// that is enriched there.
+#pragma once
+
+#include "solvers/shape_kernel.hpp"
+#include "solvers/sight.hpp"
+
+namespace spherecut::solvers {
+
+/// The four leading terms of the field at a crack front, sqrt(r) {cos t/2, sin t/2, sin t/2 sin t, cos t/2 sin t}, in
+/// sqrt(m), with their gradients. (r, t) are polar coordinates about the front; t passes beyond +-pi where the sheet
+/// curves away from the plane of the front, so that the jump lies on the sheet.
+struct Branch {
+  std::array<double, 4> value{};
+  std::array<Vector3, 4> gradient{}; // 1/sqrt(m); the turning of the frame along a curved front is left out
+};
+Branch branch_at(const topology::Incision& incision, const topology::FrontFrame& frame, const Vector3& x);
+
+/// What the spheres of a node cloud know of the cut. Immutable once built; queries are thread safe and do not allocate
+/// once warm.
+class CutSight {
+ public:
+  CutSight(const Sight& sight, const std::vector<Vector3>& centres, const std::vector<double>& spacings,
+           const std::vector<double>& radii);
+  /// After spheres have grown.
+  void update_radii(const std::vector<Vector3>& centres, const std::vector<double>& radii);
+
+  [[nodiscard]] const Sight& sight() const { return sight_; }
+
+  /// Whether the cut may matter to a point with these nodes in reach.
+  [[nodiscard]] bool concerns(const shape_kernel::Support& support) const {
+    unsigned any = 0;
+    for (int k = 0; k < support.count; ++k)
+      any |= concern_[support.ids[k]];
+    return any != 0;
+  }
+
+  /// x, or a point 1e-6 radii off the sheet on its + side where x lies on it.
+  [[nodiscard]] Vector3 off_the_sheet(const Vector3& x) const;
+
+  enum class Enrich { where_near, never };
+  /// Shape functions at x on the nodes of `support` (all whose spheres hold x, sizes included; it is overwritten). With
+  /// `grown` set the spheres are larger than the ones known here. False as shape_kernel::evaluate_support, or with
+  /// fewer nodes than basis functions + `spare`.
+  bool evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, shape_kernel::Support& support, bool grown,
+                bool second, int spare, double worst_condition, Enrich enrich, ShapeFunctions& out) const;
+
+ private:
+  enum : std::uint8_t { touches_sheet = 1, near_front = 2 };
+  Sight sight_;
+  std::vector<std::uint8_t> concern_;  // per node
+  std::vector<double> known_radii_;    // m, per node
+  std::vector<double> front_distance_; // m, per node; infinite when far
+  std::vector<Branch> branch_;         // per node; zero when far from the front
+  std::vector<double> front_spacing_;  // m, per segment of the front
+  double longest_reach_ = 0;           // m, of the enrichment
+  double smallest_radius_ = 0;         // m
+};
+
+} // namespace spherecut::solvers

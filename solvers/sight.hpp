@@ -1,0 +1,28 @@
+// How spheres of influence reach around a cut.
+#pragma once
+
+#include "topology/incision.hpp"
+
+#include <memory>
+#include <string_view>
+
+namespace spherecut::solvers {
+
+enum class SightRule {
+  visibility,  // a sphere ends where the incision hides its node
+  diffraction, // it bends around the front: the distance is that of the shortest way around
+  enriched,    // diffraction, and the basis gains sqrt(r) {cos t/2, sin t/2, sin t/2 sin t, cos t/2 sin t} at the front
+};
+std::string_view to_string(SightRule rule);
+/// Throws InputError naming the value and the three allowed names.
+SightRule sight_rule_from_string(std::string_view name);
+
+/// The cut that the spheres of a node cloud must not see through.
+struct Sight {
+  std::shared_ptr<const topology::Incision> incision; // null: uncut
+  SightRule rule = SightRule::enriched;
+  double reach = 4;   // enrichment ends this far from the front, in units of the node spacing there
+  double blend = 0.7; // and fades from this part of the reach on, so that the shape functions stay continuous
+};
+
+} // namespace spherecut::solvers
