@@ -70,7 +70,7 @@ check_unit() { # CACHE BUILD KEY UNIT
 }
 export -f check_unit
 if [ ${#pending[@]} -gt 0 ]; then
-  printf '%s\n' "${pending[@]}" | xargs -P "$(nproc)" -L 1 bash -c 'check_unit "$@"' lint "$cache" "$build" || status=1
+  printf '%s\n' "${pending[@]}" | xargs -P "${SPHERECUT_JOBS:-$(nproc)}" -L 1 bash -c 'check_unit "$@"' lint "$cache" "$build" || status=1
 fi
 if [ "$status" = 0 ]; then printf 'lint: clean\n'; else printf 'lint: see above\n' >&2; fi
 exit "$status"

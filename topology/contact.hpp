@@ -5,6 +5,7 @@
 #include "topology/surface_mesh.hpp"
 #include "topology/tool.hpp"
 
+#include <array>
 #include <memory>
 #include <optional>
 
@@ -20,11 +21,10 @@ namespace spherecut::topology {
 /// - SphereTip: the centre.
 /// - Laparoscope: the tip centre with the tip's radius, and the shaft's axis with the shaft's radius; the deeper of the
 ///   two, the tip when equal. Exact along the axis, sunk or not.
-/// - FlatPunch: the flat end itself, radius 0, judged at ten points: its centre; half way and all the way out to the
-/// rim
-///   down the slope of the organ (smooth normal at the point nearest to the centre); and every further 45 degrees of
-///   the rim. Exact where the surface under the punch is plane; on bumps no wider than the punch short by up to a fifth
-///   of its radius. Equal depths count for the centre. The punch's side is not looked at.
+/// - FlatPunch: the flat end itself, radius 0, judged at ten points: its centre; half way and all the way out to
+///   the rim down the slope of the organ (smooth normal at the point nearest to the centre); and every further 45
+///   degrees of the rim. Exact where the surface under the punch is plane; on bumps no wider than the punch short by up
+///   to a fifth of its radius. Equal depths count for the centre. The punch's side is not looked at.
 ///
 /// Signed distance is global: a tool deeper than half of a lobe's thickness is nearer to the lobe's other side and
 /// reports that side.
@@ -34,6 +34,8 @@ struct SurfaceContact {
   double depth = 0;                     // m, > 0: the tool penetrates; < 0: clearance
   int triangle = -1;                    // triangle that holds the point
   Vector3 tool_point = Vector3::Zero(); // m, point of the tool's skeleton that is deepest
+  /// Flat punch: triangles near the ten points of its end, where the next walk starts; else -1.
+  std::array<int, 10> end_triangles{-1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
 };
 
 /// Keeps the collision structures of one closed rest surface. Queries are const and thread safe; walk() neither

@@ -123,15 +123,11 @@ Deepest deepest_of_laparoscope(const Surface& surface, const Laparoscope& scope,
 
 template <class Surface>
 Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const ToolPose& pose,
-                         const SurfaceContact& last) {
-  // The last contact is a hint for the point of the end that it belongs to, and none for the others.
-  const auto hint = [&](const Vector3& x) {
-    return (x - last.tool_point).squaredNorm() < 0.04 * punch.radius * punch.radius
-               ? surface.walk.internal(last.triangle)
-               : -1;
-  };
-  const NearestPoint at_centre = surface.nearest(pose.point, punch.radius, hint(pose.point), 0.0);
+                         const SurfaceContact& last, std::array<int, 10>& end_triangles) {
+  const auto hint = [&](int i) { return surface.walk.internal(end_triangles[i]); };
+  const NearestPoint at_centre = surface.nearest(pose.point, punch.radius, hint(9), 0.0);
   Deepest best{at_centre, pose.point, -at_centre.signed_distance};
+  end_triangles[9] = surface.walk.original(at_centre.triangle);
 
   // Down the slope within the flat end; any direction when the end is parallel to the surface.
   const Vector3 normal = surface.walk.smooth_normal(at_centre);
@@ -161,7 +157,8 @@ Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const T
     const Vector3 x = position(i);
     // Nearer to the surface than the depth to beat: not deeper, whichever side it is on.
     const double enough = std::max(0.0, best.depth + margin);
-    const NearestPoint nearest = surface.nearest(x, punch.radius, hint(x), enough);
+    const NearestPoint nearest = surface.nearest(x, punch.radius, hint(i), enough);
+    end_triangles[i] = surface.walk.original(nearest.triangle);
     if (-nearest.signed_distance > best.depth + margin)
       best = {nearest, x, -nearest.signed_distance};
   };
@@ -177,15 +174,16 @@ template <class Surface>
 SurfaceContact deepest_contact(const Surface& surface, const ToolShape& tool, const ToolPose& pose,
                                const SurfaceContact& last) {
   const int hint = surface.walk.internal(last.triangle);
+  std::array<int, 10> end_triangles = last.end_triangles;
   Deepest deepest;
   if (const auto* scope = std::get_if<Laparoscope>(&tool))
     deepest = deepest_of_laparoscope(surface, *scope, pose, last);
   else if (const auto* punch = std::get_if<FlatPunch>(&tool))
-    deepest = deepest_of_punch(surface, *punch, pose, last);
+    deepest = deepest_of_punch(surface, *punch, pose, last, end_triangles);
   else if (const auto* tip = std::get_if<SphereTip>(&tool))
     deepest = deepest_of_sphere(surface, *tip, pose, hint);
   return {deepest.surface.point, deepest.surface.normal, deepest.depth, surface.walk.original(deepest.surface.triangle),
-          deepest.tool_point};
+          deepest.tool_point,    end_triangles};
 }
 
 } // namespace spherecut::topology
