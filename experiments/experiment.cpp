@@ -1,7 +1,7 @@
 #include "experiments/experiment.hpp"
 
 #include "experiments/registered.hpp"
-
+#include "src/output_file.hpp"
 #include "topology/errors.hpp"
 
 #include <cmath>
@@ -36,7 +36,7 @@ std::vector<Check> run_experiment(const std::string& name, const std::filesystem
   for (const Experiment& experiment : all_experiments()) {
     if (experiment.name != name)
       continue;
-    std::filesystem::create_directories(out);
+    app::claim_results_folder(out);
     std::vector<Check> checks = experiment.run({out, quick, say});
     nlohmann::ordered_json summary;
     summary["experiment"] = name;

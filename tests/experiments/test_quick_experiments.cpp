@@ -49,6 +49,17 @@ TEST_CASE("Experiments have distinct names and a purpose") {
   CHECK_THROWS_AS(run_experiment("no_such_experiment", "unused", true, [](const std::string&) {}), InputError);
 }
 
+TEST_CASE("An experiment refuses a folder that holds results and changes nothing in it") {
+  const TemporaryFolder folder;
+  const std::filesystem::path kept = folder.path() / "summary.json";
+  std::ofstream(kept) << "mine";
+  CHECK_THROWS_AS(run_experiment("patch_test", folder.path(), true, [](const std::string&) {}), InputError);
+  std::string text;
+  std::ifstream(kept) >> text;
+  CHECK(text == "mine");
+  CHECK(std::distance(std::filesystem::directory_iterator(folder.path()), {}) == 1);
+}
+
 TEST_CASE("Quick patch test: linear fields are reproduced") {
   require_quick_run_passes("patch_test");
 }

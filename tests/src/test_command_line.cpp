@@ -215,6 +215,46 @@ TEST_CASE("Bad scenarios and surface files exit with 2, a clear line, and leave 
   CHECK(says(small_scenario).status == 0);
 }
 
+TEST_CASE("Scenarios that cannot be run exit with 2, a line that says why, and leave nothing behind") {
+  const std::string region = "[[fixed]]\nname = \"base\"\nregion = \"box\"\nlower = [-1, -1, -0.001]\n"
+                             "upper = [1, 1, 0.001]\n";
+  const auto approach = small_scenario.find("[tool.approach]");
+  const auto output = small_scenario.find("[output]");
+  const std::string inside = small_scenario.substr(0, approach) +
+                             "[[tool.path]]\ntime = 0\nposition = [0, 0, 0.02]\n"
+                             "[[tool.path]]\ntime = 1\nposition = [0, 0, 0.01]\n" +
+                             small_scenario.substr(output);
+  struct Case {
+    std::string name, text, said;
+  };
+  const std::vector<Case> refused = {
+      {"nothing fixed", replaced(small_scenario, region, ""), "fixed is missing"},
+      {"empty region",
+       replaced(small_scenario, "lower = [-1, -1, -0.001]\nupper = [1, 1, 0.001]",
+                "lower = [-1, -1, -0.2]\nupper = [1, 1, -0.1]"),
+       "no surface node"},
+      {"too few nodes",
+       replaced(replaced(small_scenario, "fine_spacing = 0.004", "fine_spacing = 0.5"), "coarse_spacing = 0.012",
+                "coarse_spacing = 0.5"),
+       "nodes"},
+      {"inside the organ", inside, "starts inside"},
+      {"incompressible", replaced(small_scenario, "poisson_ratio = 0.3", "poisson_ratio = 0.5"), "poisson_ratio"},
+      {"without stiffness", replaced(small_scenario, "young_modulus = 1e4", "young_modulus = -1"), "young_modulus"},
+      {"not a scenario", "[organ\n", "case.toml"},
+  };
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  for (const Case& c : refused) {
+    const auto scenario = write_file(folder.path() / "case.toml", c.text);
+    const ProgramResult result = run_spherecut({"run", scenario, "--out", out});
+    INFO(c.name << ": " << result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: ") && Contains(c.said));
+    CHECK_FALSE(std::filesystem::exists(out));
+    CHECK(run_spherecut({"check", scenario}).status == 2);
+  }
+}
+
 TEST_CASE("A tool that never touches is a result, not an error") {
   const TemporaryFolder folder;
   const auto from = small_scenario.find("[tool.approach]");
