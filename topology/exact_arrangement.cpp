@@ -1,0 +1,535 @@
+#include "topology/exact_arrangement.hpp"
+
+#include "topology/errors.hpp"
+#include "topology/exact_points.hpp"
+#include "topology/overlap_tree.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdint>
+#include <fmt/format.h>
+#include <utility>
+
+namespace spherecut::topology {
+
+namespace {
+
+/// Where a facet lies. A sheet facet that coincides with one of the surface is `covering`; `reached` is passing: in the
+/// patch being placed.
+enum class Place : std::uint8_t { unknown, reached, surface, inside, outside, covering };
+
+struct Piece { // a facet and what is known of it
+  ExactArrangement::Facet facet;
+  Place place = Place::unknown;
+  bool alive = true, active = false;
+};
+
+/// What the other triangles leave on one.
+struct Marks {
+  std::vector<std::pair<int, int>> segments; // ascending ends
+  std::vector<int> points;
+};
+
+Triangle sorted(Triangle t) {
+  std::sort(t.begin(), t.end());
+  return t;
+}
+
+bool has(const Triangle& t, int point) {
+  return t[0] == point || t[1] == point || t[2] == point;
+}
+
+int third(const Triangle& t, int u, int v) {
+  for (const int point : t)
+    if (point != u && point != v)
+      return point;
+  return -1;
+}
+
+/// Whether the triangle runs from u to v.
+bool runs(const Triangle& t, int u, int v) {
+  return (t[0] == u && t[1] == v) || (t[1] == u && t[2] == v) || (t[2] == u && t[0] == v);
+}
+
+void keep_once(std::vector<int>& values) {
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+}
+
+} // namespace
+
+struct ExactArrangement::Data {
+  ExactPoints points;
+  std::vector<Triangle> sources; // point numbers
+  int surface_count = 0;
+  double size = 0; // m, diagonal of the surface's bounding box
+  std::vector<Marks> marks;
+  std::vector<std::vector<int>> facets_of; // alive facets by source
+  std::vector<Piece> pieces;
+  std::vector<std::vector<int>> star; // alive facets by point
+
+  OverlapTree surface_tree;
+  struct SheetTree {
+    int first; // source
+    OverlapTree tree;
+  };
+  std::vector<SheetTree> sheet_trees; // of falling size
+
+  // --- facets ---
+
+  int add_facet(const Facet& facet) {
+    const int number = static_cast<int>(pieces.size());
+    const bool surface = facet.source < surface_count;
+    pieces.push_back({facet, surface ? Place::surface : Place::unknown});
+    if (std::ssize(star) < points.count())
+      star.resize(points.count());
+    for (const int p : facet.points)
+      star[p].push_back(number);
+    facets_of[facet.source].push_back(number);
+    return number;
+  }
+
+  void remove_facet(int f) {
+    pieces[f].alive = false;
+    for (const int p : pieces[f].facet.points)
+      std::erase(star[p], f);
+  }
+
+  /// Alive facets with the edge; `surface` chooses those of the surface or of the sheets.
+  void at_edge(int u, int v, bool surface, std::vector<int>& found) const {
+    const std::vector<int>& shorter = star[u].size() <= star[v].size() ? star[u] : star[v];
+    const int other = &shorter == &star[u] ? v : u;
+    for (const int f : shorter)
+      if (has(pieces[f].facet.points, other) && (pieces[f].facet.source < surface_count) == surface)
+        found.push_back(f);
+  }
+
+  /// All alive facets with the same three corners, by source.
+  [[nodiscard]] std::vector<int> coinciding(const Triangle& t) const {
+    std::vector<int> found;
+    const Triangle key = sorted(t);
+    for (const int f : star[t[0]])
+      if (sorted(pieces[f].facet.points) == key)
+        found.push_back(f);
+    std::sort(found.begin(), found.end(),
+              [&](int a, int b) { return pieces[a].facet.source < pieces[b].facet.source; });
+    return found;
+  }
+
+  // --- intersection of two triangles ---
+
+  /// Whether a point of the triangle's plane lies in it, border included.
+  [[nodiscard]] bool within(int p, const Triangle& t, int axis) const {
+    bool left = false, right = false;
+    for (int e = 0; e < 3; ++e) {
+      const int turn = points.turn(t[e], t[(e + 1) % 3], p, axis);
+      left = left || turn > 0;
+      right = right || turn < 0;
+    }
+    return !(left && right);
+  }
+
+  /// Points where the corners and edges of `a`, not coplanar with `b`, meet it. `side`: of a's corners to b's plane.
+  void edges_through(const Triangle& a, const std::array<int, 3>& side, const Triangle& b, std::vector<int>& found) {
+    for (int e = 0; e < 3; ++e) {
+      const int p = a[e], q = a[(e + 1) % 3];
+      if (side[e] == 0 && within(p, b, points.widest_axis(b)))
+        found.push_back(p);
+      if (side[e] * side[(e + 1) % 3] >= 0)
+        continue;
+      bool left = false, right = false;
+      for (int k = 0; k < 3 && !(left && right); ++k) {
+        const int turn = points.orientation(p, q, b[k], b[(k + 1) % 3]);
+        left = left || turn > 0;
+        right = right || turn < 0;
+      }
+      if (!(left && right))
+        found.push_back(points.edge_plane(p, q, b));
+    }
+  }
+
+  [[nodiscard]] bool strictly_between(int x, int p, int q) const {
+    return x != p && x != q && points.compare(x, p) * points.compare(x, q) < 0;
+  }
+
+  /// Ends of the part of the segment p q that lies in the coplanar triangle.
+  [[nodiscard]] std::vector<int> clip(int p, int q, const Triangle& t, int axis) {
+    std::vector<int> ends;
+    for (const int end : {p, q})
+      if (within(end, t, axis))
+        ends.push_back(end);
+    for (int e = 0; e < 3; ++e) {
+      const int r = t[e], s = t[(e + 1) % 3];
+      const int to_r = points.turn(p, q, r, axis), to_s = points.turn(p, q, s, axis);
+      if (to_r == 0 && strictly_between(r, p, q))
+        ends.push_back(r);
+      if (to_r * to_s < 0 && points.turn(r, s, p, axis) * points.turn(r, s, q, axis) < 0)
+        ends.push_back(points.edge_edge(p, q, r, s, axis));
+    }
+    keep_once(ends);
+    return ends;
+  }
+
+  /// Adds what was found to the marks of a source, unless it lies in its corners and edges alone; true when it is new.
+  bool mark(int source, const std::vector<int>& found) {
+    const Triangle& t = sources[source];
+    std::vector<int> fresh;
+    for (const int p : found)
+      if (!has(t, p))
+        fresh.push_back(p);
+    if (found.size() == 2 && !(fresh.empty())) {
+      marks[source].segments.emplace_back(std::min(found[0], found[1]), std::max(found[0], found[1]));
+      return true;
+    }
+    if (fresh.empty())
+      return false;
+    marks[source].points.insert(marks[source].points.end(), fresh.begin(), fresh.end());
+    return true;
+  }
+
+  void intersect(int i, int j, std::vector<int>& dirty) {
+    const Triangle &a = sources[i], &b = sources[j];
+    std::array<int, 3> side_a{}, side_b{};
+    for (int c = 0; c < 3; ++c)
+      side_a[c] = has(b, a[c]) ? 0 : points.orientation(b[0], b[1], b[2], a[c]);
+    if (side_a[0] == side_a[1] && side_a[1] == side_a[2] && side_a[0] != 0)
+      return;
+    if (side_a == std::array<int, 3>{}) {
+      const int axis = points.widest_axis(b);
+      bool in_a = false, in_b = false;
+      for (int e = 0; e < 3; ++e) {
+        in_a = mark(i, clip(b[e], b[(e + 1) % 3], a, axis)) || in_a;
+        in_b = mark(j, clip(a[e], a[(e + 1) % 3], b, axis)) || in_b;
+      }
+      if (in_a)
+        dirty.push_back(i);
+      if (in_b)
+        dirty.push_back(j);
+      return;
+    }
+    for (int c = 0; c < 3; ++c)
+      side_b[c] = has(a, b[c]) ? 0 : points.orientation(a[0], a[1], a[2], b[c]);
+    if (side_b[0] == side_b[1] && side_b[1] == side_b[2] && side_b[0] != 0)
+      return;
+    std::vector<int> found;
+    edges_through(a, side_a, b, found);
+    edges_through(b, side_b, a, found);
+    keep_once(found);
+    if (mark(i, found))
+      dirty.push_back(i);
+    if (mark(j, found))
+      dirty.push_back(j);
+  }
+
+  // --- refinement ---
+
+  /// Facets of one source after its marks changed: replaces those that differ.
+  void refine(int source, std::vector<int>& removed, std::vector<int>& added) {
+    Marks& mine = marks[source];
+    std::sort(mine.segments.begin(), mine.segments.end());
+    mine.segments.erase(std::unique(mine.segments.begin(), mine.segments.end()), mine.segments.end());
+    keep_once(mine.points);
+    std::vector<Triangle> wanted = mine.segments.empty() && mine.points.empty()
+                                       ? std::vector<Triangle>{sources[source]}
+                                       : points.triangulate(sources[source], mine.segments, mine.points);
+    const auto by_corners = [](const Triangle& x, const Triangle& y) { return sorted(x) < sorted(y); };
+    std::sort(wanted.begin(), wanted.end(), by_corners);
+    std::vector<bool> present(wanted.size(), false);
+    std::vector<int> kept;
+    for (const int f : facets_of[source]) {
+      const Triangle& corners = pieces[f].facet.points;
+      const auto same = std::lower_bound(wanted.begin(), wanted.end(), corners, by_corners);
+      if (same != wanted.end() && sorted(*same) == sorted(corners)) {
+        present[same - wanted.begin()] = true;
+        kept.push_back(f);
+      } else {
+        remove_facet(f);
+        removed.push_back(f);
+      }
+    }
+    facets_of[source] = std::move(kept);
+    for (std::size_t k = 0; k < wanted.size(); ++k)
+      if (!present[k])
+        added.push_back(add_facet({wanted[k], source}));
+  }
+
+  // --- inside or outside ---
+
+  /// Angle class of w about u -> v counted from r: 0 along r, 1 within the half turn after it, 2 opposite, 3 beyond.
+  [[nodiscard]] int sector(int u, int v, int r, int w) const {
+    const int side = w == r ? 0 : points.orientation(u, v, r, w);
+    if (side != 0)
+      return side > 0 ? 1 : 3;
+    return w == r || points.same_side(u, v, r, w) > 0 ? 0 : 2;
+  }
+
+  /// Whether w1 comes strictly before w2 turning counter-clockwise about u -> v from r.
+  [[nodiscard]] bool before(int u, int v, int r, int w1, int w2) const {
+    const int s1 = sector(u, v, r, w1), s2 = sector(u, v, r, w2);
+    return s1 != s2 ? s1 < s2 : (s1 == 1 || s1 == 3) && w1 != w2 && points.orientation(u, v, w1, w2) > 0;
+  }
+
+  /// Place of a facet with an edge on the surface: between the facets of the surface there, through the solid or not.
+  [[nodiscard]] Place place_at_edge(int f, int u, int v, const std::vector<int>& surface) const {
+    int from = -1, to = -1; // the solid lies counter-clockwise from `from` to `to` about u -> v
+    for (const int s : surface)
+      (runs(pieces[s].facet.points, u, v) ? to : from) = third(pieces[s].facet.points, u, v);
+    if (from < 0 || to < 0)
+      throw NumericalError(fmt::format("the surface is not closed at the edge of points {} and {}", u, v));
+    return before(u, v, from, third(pieces[f].facet.points, u, v), to) ? Place::inside : Place::outside;
+  }
+
+  /// Place of a facet by the parity of a ray from its centroid.
+  Place place_by_ray(int f) {
+    const int from = points.centroid(pieces[f].facet.points);
+    const Vector3 start = points.position(from);
+    const Vector3 far_corner = points.position(sources[0][0]) - start;
+    const double reach = 2 * (size + far_corner.norm());
+    const std::array<Vector3, 6> directions = {Vector3(0.61, 0.37, 0.70),   Vector3(-0.43, 0.81, 0.39),
+                                               Vector3(0.29, -0.53, -0.79), Vector3(-0.83, -0.47, 0.31),
+                                               Vector3(0.13, 0.23, -0.97),  Vector3(0.97, -0.11, 0.19)};
+    for (const Vector3& direction : directions) {
+      const Vector3 end = start + reach * direction;
+      const int to = points.add(end);
+      std::vector<int> near;
+      surface_tree.along(start, end, near);
+      int crossings = 0;
+      bool grazes = false;
+      for (const int s : near) {
+        const Triangle& t = sources[s];
+        if (points.orientation(t[0], t[1], t[2], from) * points.orientation(t[0], t[1], t[2], to) > 0)
+          continue;
+        int left = 0, right = 0;
+        for (int e = 0; e < 3; ++e) {
+          const int turn = points.orientation(from, to, t[e], t[(e + 1) % 3]);
+          left += turn > 0;
+          right += turn < 0;
+        }
+        crossings += left == 3 || right == 3;
+        grazes = grazes || (left < 3 && right < 3 && !(left > 0 && right > 0));
+      }
+      if (!grazes)
+        return crossings % 2 == 1 ? Place::inside : Place::outside;
+    }
+    throw NumericalError(fmt::format("cannot tell whether the sheet is inside at ({:.6g}, {:.6g}, {:.6g}) m", start.x(),
+                                     start.y(), start.z()));
+  }
+
+  /// Places the new sheet facets: each patch bounded by the surface lies on one side of it.
+  void place(const std::vector<int>& added) {
+    for (const int f : added)
+      if (pieces[f].place == Place::unknown) {
+        const int first = coinciding(pieces[f].facet.points).front();
+        if (pieces[first].facet.source < surface_count)
+          pieces[f].place = Place::covering;
+      }
+    std::vector<int> surface, sheets;
+    for (const int start : added) {
+      if (pieces[start].place != Place::unknown)
+        continue;
+      std::vector<int> patch = {start};
+      pieces[start].place = Place::reached;
+      Place known = Place::unknown;
+      std::array<int, 3> rim{-1, -1, -1}; // facet and edge on the surface
+      for (std::size_t k = 0; k < patch.size(); ++k) {
+        const Triangle t = pieces[patch[k]].facet.points;
+        for (int e = 0; e < 3; ++e) {
+          const int u = t[e], v = t[(e + 1) % 3];
+          surface.clear();
+          at_edge(u, v, true, surface);
+          if (!surface.empty()) {
+            rim = {patch[k], u, v};
+            continue;
+          }
+          sheets.clear();
+          at_edge(u, v, false, sheets);
+          for (const int other : sheets) {
+            Place& there = pieces[other].place;
+            if (there == Place::unknown) {
+              there = Place::reached;
+              patch.push_back(other);
+            } else if (there != Place::reached) {
+              known = there;
+            }
+          }
+        }
+      }
+      if (known == Place::unknown && rim[0] >= 0) {
+        surface.clear();
+        at_edge(rim[1], rim[2], true, surface);
+        known = place_at_edge(rim[0], rim[1], rim[2], surface);
+      }
+      if (known == Place::unknown)
+        known = place_by_ray(start);
+      for (const int f : patch)
+        pieces[f].place = known;
+    }
+  }
+
+  /// Settles which of the facets with these corners count.
+  void activate(const Triangle& corners, Change& change) {
+    bool first = true;
+    for (const int f : coinciding(corners)) {
+      Piece& piece = pieces[f];
+      const bool active = first && (piece.place == Place::surface || piece.place == Place::inside);
+      first = first && !active;
+      if (active != piece.active)
+        (active ? change.added : change.removed).push_back(f);
+      piece.active = active;
+    }
+  }
+
+  /// Intersects the sources from `first` on with those before them and with each other.
+  std::vector<int> intersect_from(int first, std::vector<BoundingBox> boxes) {
+    std::vector<int> dirty, near;
+    const OverlapTree fresh(boxes);
+    for (int i = first; i < std::ssize(sources); ++i) {
+      if (collinear(i))
+        continue;
+      near.clear();
+      surface_tree.meeting(boxes[i - first], 0, near);
+      for (const SheetTree& sheet : sheet_trees)
+        sheet.tree.meeting(boxes[i - first], sheet.first, near);
+      fresh.meeting(boxes[i - first], first, near);
+      for (const int j : near)
+        if (j < i && (j < surface_count || !collinear(j)))
+          intersect(i, j, dirty);
+    }
+    sheet_trees.push_back({first, fresh});
+    // Merging trees of like size keeps their number logarithmic.
+    while (sheet_trees.size() > 1 &&
+           sheet_trees[sheet_trees.size() - 2].tree.size() <= 2 * sheet_trees.back().tree.size()) {
+      sheet_trees.pop_back();
+      const int from = sheet_trees.back().first;
+      boxes.clear();
+      for (int s = from; s < std::ssize(sources); ++s)
+        boxes.push_back(box_of(s));
+      sheet_trees.back().tree = OverlapTree(boxes);
+    }
+    keep_once(dirty);
+    return dirty;
+  }
+
+  [[nodiscard]] bool collinear(int source) const {
+    const Triangle& t = sources[source];
+    return t[0] == t[1] || t[1] == t[2] || t[2] == t[0] || points.collinear(t[0], t[1], t[2]);
+  }
+
+  [[nodiscard]] BoundingBox box_of(int source) const {
+    const Triangle& t = sources[source];
+    return triangle_box(points.position(t[0]), points.position(t[1]), points.position(t[2]));
+  }
+};
+
+ExactArrangement::ExactArrangement(const SurfaceMesh& surface) : data_(std::make_unique<Data>()) {
+  Data& d = *data_;
+  std::vector<int> number;
+  number.reserve(surface.vertices.size());
+  for (const Vector3& x : surface.vertices)
+    number.push_back(d.points.add(x));
+  d.surface_count = static_cast<int>(surface.triangles.size());
+  d.size = bounds(surface).extent().norm();
+  d.marks.resize(surface.triangles.size());
+  d.facets_of.resize(surface.triangles.size());
+  std::vector<BoundingBox> boxes;
+  boxes.reserve(surface.triangles.size());
+  for (int s = 0; s < d.surface_count; ++s) {
+    const Triangle& t = surface.triangles[s];
+    d.sources.push_back({number[t[0]], number[t[1]], number[t[2]]});
+    boxes.push_back(d.box_of(s));
+    d.pieces[d.add_facet({d.sources.back(), s})].active = true;
+  }
+  d.surface_tree = OverlapTree(boxes);
+}
+
+ExactArrangement::~ExactArrangement() = default;
+
+ExactArrangement::Change ExactArrangement::add(const std::vector<std::array<Vector3, 3>>& triangles) {
+  Data& d = *data_;
+  Change change;
+  if (triangles.empty())
+    return change;
+  const int first = static_cast<int>(d.sources.size());
+  std::vector<BoundingBox> boxes;
+  for (const auto& [a, b, c] : triangles) {
+    const int p = d.points.add(a), q = d.points.add(b), r = d.points.add(c);
+    d.sources.push_back({p, q, r});
+    boxes.push_back(triangle_box(a, b, c));
+  }
+  d.marks.resize(d.sources.size());
+  d.facets_of.resize(d.sources.size());
+  const std::vector<int> dirty = d.intersect_from(first, std::move(boxes));
+  change.crossed = static_cast<int>(dirty.size());
+  std::vector<int> removed, added;
+  for (int s = first; s < std::ssize(d.sources); ++s)
+    if (!d.collinear(s) && !std::binary_search(dirty.begin(), dirty.end(), s))
+      added.push_back(d.add_facet({d.sources[s], s}));
+  for (const int s : dirty)
+    d.refine(s, removed, added);
+  d.place(added);
+  for (const int f : removed)
+    if (d.pieces[f].active) {
+      d.pieces[f].active = false;
+      change.removed.push_back(f);
+    }
+  for (const std::vector<int>* facets : {&removed, &added})
+    for (const int f : *facets)
+      d.activate(d.pieces[f].facet.points, change);
+  std::sort(change.removed.begin(), change.removed.end());
+  std::sort(change.added.begin(), change.added.end());
+  return change;
+}
+
+int ExactArrangement::facet_count() const {
+  return static_cast<int>(data_->pieces.size());
+}
+
+const ExactArrangement::Facet& ExactArrangement::facet(int facet) const {
+  return data_->pieces[facet].facet;
+}
+
+bool ExactArrangement::active(int facet) const {
+  return data_->pieces[facet].active;
+}
+
+bool ExactArrangement::on_surface(int facet) const {
+  return data_->pieces[facet].facet.source < data_->surface_count;
+}
+
+int ExactArrangement::point_count() const {
+  return data_->points.count();
+}
+
+const Vector3& ExactArrangement::position(int point) const {
+  return data_->points.position(point);
+}
+
+void ExactArrangement::facets_at(int point, std::vector<int>& found) const {
+  if (point < std::ssize(data_->star))
+    for (const int f : data_->star[point])
+      if (data_->pieces[f].active)
+        found.push_back(f);
+}
+
+void ExactArrangement::facets_at_edge(int from, int to, std::vector<int>& found) const {
+  const auto first = static_cast<std::ptrdiff_t>(found.size());
+  data_->at_edge(from, to, true, found);
+  data_->at_edge(from, to, false, found);
+  found.erase(std::remove_if(found.begin() + first, found.end(), [&](int f) { return !active(f); }), found.end());
+}
+
+void ExactArrangement::sort_about_edge(int from, int to, std::vector<int>& facets) const {
+  if (facets.size() < 3)
+    return;
+  const auto opposite = [&](int f) { return third(facet(f).points, from, to); };
+  const int start = opposite(facets.front());
+  std::sort(facets.begin() + 1, facets.end(),
+            [&](int f, int g) { return f != g && data_->before(from, to, start, opposite(f), opposite(g)); });
+}
+
+std::array<Vector3, 3> ExactArrangement::source_corners(int source) const {
+  const Triangle& t = data_->sources[source];
+  return {position(t[0]), position(t[1]), position(t[2])};
+}
+
+} // namespace spherecut::topology
