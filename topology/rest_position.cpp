@@ -1,0 +1,29 @@
+#include "topology/rest_position.hpp"
+
+#include "topology/errors.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::topology {
+
+Vector3 rest_position(const Vector3& x, const std::function<Vector3(const Vector3&)>& displacement, double tolerance,
+                      int most_steps) {
+  Vector3 rest = x, residual = rest + displacement(rest) - x;
+  Matrix3 inverse = Matrix3::Identity(); // of the derivative of the residual
+  for (int step = 0; step < most_steps && residual.norm() > tolerance; ++step) {
+    const Vector3 move = -inverse * residual;
+    rest += move;
+    const Vector3 next = rest + displacement(rest) - x, change = inverse * (next - residual);
+    // Broyden's update of the inverse [Broyden 1965, by Sherman and Morrison], unless it would be singular.
+    if (const double pivot = move.dot(change); std::abs(pivot) > 1e-3 * move.squaredNorm())
+      inverse += (move - change) * (move.transpose() * inverse) / pivot;
+    residual = next;
+  }
+  if (!(residual.norm() <= tolerance))
+    throw NumericalError(fmt::format("no rest position found for ({}, {}, {}): {} m left after {} steps, {} m wanted",
+                                     x.x(), x.y(), x.z(), residual.norm(), most_steps, tolerance));
+  return rest;
+}
+
+} // namespace spherecut::topology

@@ -1,0 +1,124 @@
+#include "topology/swept_sheets.hpp"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/intersections.h>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace spherecut::topology {
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+
+Kernel::Point_3 exact(const Vector3& x) {
+  return {x.x(), x.y(), x.z()};
+}
+
+BoundingBox box_of(const std::array<Vector3, 3>& p, double margin) {
+  return {p[0].cwiseMin(p[1]).cwiseMin(p[2]).array() - margin, p[0].cwiseMax(p[1]).cwiseMax(p[2]).array() + margin};
+}
+
+} // namespace
+
+template <class Visit>
+void SweptSheets::for_cells(const BoundingBox& box, const Visit& visit) const {
+  std::array<long, 3> from{}, to{};
+  for (int d = 0; d < 3; ++d) {
+    from[d] = static_cast<long>(std::floor(box.lower[d] / cell_));
+    to[d] = static_cast<long>(std::floor(box.upper[d] / cell_));
+  }
+  // 21 bits a coordinate: bodies of up to a million cells a side. Beyond, cells share a key, which costs time alone.
+  constexpr std::uint64_t bits = (1U << 21U) - 1;
+  for (long x = from[0]; x <= to[0]; ++x)
+    for (long y = from[1]; y <= to[1]; ++y)
+      for (long z = from[2]; z <= to[2]; ++z)
+        visit((static_cast<std::uint64_t>(x) & bits) | ((static_cast<std::uint64_t>(y) & bits) << 21U) |
+              ((static_cast<std::uint64_t>(z) & bits) << 42U));
+}
+
+std::array<Vector3, 3> SweptSheets::corners(const Place& place) const {
+  const SurfaceMesh& mesh = sheets_[place.sheet];
+  const Triangle& t = mesh.triangles[place.triangle];
+  return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
+}
+
+int SweptSheets::add_sheet() {
+  sheets_.emplace_back();
+  return static_cast<int>(sheets_.size()) - 1;
+}
+
+int SweptSheets::add_vertex(int sheet, const Vector3& x) {
+  sheets_[sheet].vertices.push_back(x);
+  return static_cast<int>(sheets_[sheet].vertices.size()) - 1;
+}
+
+void SweptSheets::add_triangle(int sheet, const Triangle& triangle) {
+  const int place = static_cast<int>(places_.size());
+  places_.push_back({sheet, static_cast<int>(sheets_[sheet].triangles.size())});
+  sheets_[sheet].triangles.push_back(triangle);
+  for_cells(box_of(corners(places_.back()), 1.01 * thickness_),
+            [&](std::uint64_t key) { cells_[key].push_back(place); });
+}
+
+std::optional<Vector3> SweptSheets::on_sheet(const Vector3& x) const {
+  std::optional<Vector3> nearest;
+  double nearest_height = thickness_;
+  for_cells({x, x}, [&](std::uint64_t key) {
+    const auto found = cells_.find(key);
+    if (found == cells_.end())
+      return;
+    for (const int place : found->second) {
+      const auto p = corners(places_[place]);
+      const Vector3 area_vector = (p[1] - p[0]).cross(p[2] - p[0]);
+      const double squared = area_vector.squaredNorm();
+      const double height = std::abs(area_vector.dot(x - p[0])) / std::sqrt(squared);
+      if (height > nearest_height || (nearest && height == nearest_height))
+        continue;
+      // Barycentric coordinates of the foot; neighbours overlap by a hair.
+      bool over = true;
+      for (int e = 0; e < 3 && over; ++e)
+        over = area_vector.dot((p[(e + 1) % 3] - p[e]).cross(x - p[e])) >= -1e-6 * squared;
+      if (!over)
+        continue;
+      nearest_height = height;
+      nearest = x - area_vector.dot(x - p[0]) / squared * area_vector;
+      for (const Vector3& corner : p)
+        if ((corner - *nearest).norm() <= thickness_)
+          nearest = corner;
+    }
+  });
+  return nearest;
+}
+
+bool SweptSheets::crosses(int sheet, const Triangle& indices, const std::array<Vector3, 3>& p) const {
+  const Kernel::Triangle_3 triangle(exact(p[0]), exact(p[1]), exact(p[2]));
+  const BoundingBox box = box_of(p, 0);
+  bool meets = false;
+  for_cells(box, [&](std::uint64_t key) {
+    const auto found = cells_.find(key);
+    if (meets || found == cells_.end())
+      return;
+    for (const int place : found->second) {
+      if (places_[place].sheet != sheet)
+        continue;
+      const Triangle& other = sheets_[sheet].triangles[places_[place].triangle];
+      if (std::any_of(other.begin(), other.end(),
+                      [&](int v) { return std::find(indices.begin(), indices.end(), v) != indices.end(); }))
+        continue;
+      const auto q = corners(places_[place]);
+      const BoundingBox other_box = box_of(q, 0);
+      if ((other_box.lower.array() > box.upper.array()).any() || (box.lower.array() > other_box.upper.array()).any())
+        continue;
+      if (CGAL::do_intersect(triangle, Kernel::Triangle_3(exact(q[0]), exact(q[1]), exact(q[2])))) {
+        meets = true;
+        return;
+      }
+    }
+  });
+  return meets;
+}
+
+} // namespace spherecut::topology
