@@ -2,6 +2,7 @@
 #include "solvers/node_features.hpp"
 #include "solvers/node_samples.hpp"
 #include "solvers/node_search.hpp"
+#include "solvers/node_sheets.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -21,14 +22,17 @@ constexpr double volume_density = 1.035;  // measured on fillings of 200 to 6000
 constexpr double surface_density = 1.033; // the same
 constexpr double smallest_expected = 30;  // zones that ask for fewer nodes are joined with a neighbour
 
-/// Share of a small ball about an edge node that lies in the body.
-double inside_share(const topology::Domain& domain, const Vector3& x, double h) {
+/// Share of a small ball about a node of an edge or a lip that lies in the body and, by a lip node's normal, on its
+/// side of the sheet.
+double inside_share(const topology::Domain& domain, const Vector3& x, double h, const Vector3* lip_normal = nullptr) {
   constexpr int directions = 48;
   int inside = 0;
   for (int k = 0; k < directions; ++k) {
     const double z = 1 - (2 * k + 1.0) / directions, angle = k * std::numbers::pi * (3 - std::sqrt(5.0));
     const double rho = std::sqrt(1 - z * z);
-    inside += domain.signed_distance(x + 0.25 * h * Vector3(rho * std::cos(angle), rho * std::sin(angle), z)) < 0;
+    const Vector3 direction(rho * std::cos(angle), rho * std::sin(angle), z);
+    if (lip_normal == nullptr || direction.dot(*lip_normal) < 0)
+      inside += domain.signed_distance(x + 0.25 * h * direction) < 0;
   }
   return static_cast<double>(inside) / directions;
 }
@@ -63,12 +67,16 @@ std::vector<double> band_limits(const std::vector<VolumeSample>& samples) {
   return limits;
 }
 
-double count(const topology::Domain& domain, const SharpFeatures& features, const SpacingField& spacing) {
+double count(const topology::Domain& domain, const SharpFeatures& features, const SpacingField& spacing,
+             const topology::Incision* incision) {
   constexpr int limit = 20'000'000;
   double volume = 0, area = 0, edges = 0; // in units of h^3, h^2, h
+  if (incision != nullptr)                // both faces of the sheets
+    for (const SheetSample& sample : lay_out_sheets(domain, features, spacing, *incision, domain.surface()).samples)
+      area += 2 * sample.expected;
   for (const VolumeSample& sample : sample_volume(domain, spacing, count_fraction, limit))
     volume += sample.expected;
-  for (const SurfaceSample& sample : sample_surface(domain, spacing, count_fraction, limit))
+  for (const SurfaceSample& sample : sample_surface(domain.surface(), spacing, count_fraction, limit))
     area += sample.expected;
   const topology::SurfaceMesh& mesh = domain.surface();
   for (const SharpCurve& curve : features.curves) {
@@ -123,7 +131,9 @@ SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOpt
     SprinkleZone& zone = report.zones[zone_of(h)];
     ++zone.nodes;
     if (i >= std::ssize(options.seeds))
-      nearest[zone_of(h)].push_back(grid.nearest_in_spacings(x, h, i));
+      // A partner across the sheet does not count.
+      nearest[zone_of(h)].push_back(
+          grid.nearest_in_spacings(x, h, i, nodes.kinds[i] == NodeKind::lip ? 20 * lip_offset * h : -1));
     double share = 1;
     switch (nodes.kinds[i]) {
     case NodeKind::interior:
@@ -139,7 +149,7 @@ SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOpt
       break;
     case NodeKind::lip:
       ++report.lip_nodes;
-      share = 0.5;
+      share = domain.signed_distance(x) < -0.25 * h ? 0.5 : inside_share(domain, x, h, &nodes.normals[i]);
       break;
     }
     zone.density += share / zone.expected;
@@ -166,8 +176,9 @@ void require_filled(const SprinkleReport& report, double minimum_density) {
   }
 }
 
-double expected_count(const topology::Domain& domain, const SpacingField& spacing, double sharp_edge_degrees) {
-  return count(domain, find_sharp_features(domain.surface(), sharp_edge_degrees), spacing);
+double expected_count(const topology::Domain& domain, const SpacingField& spacing, double sharp_edge_degrees,
+                      const topology::Incision* incision) {
+  return count(domain, find_sharp_features(domain.surface(), sharp_edge_degrees), spacing, incision);
 }
 
 SpacingField spacing_for_count(const topology::Domain& domain, const SpacingField& shape, int target,
@@ -185,7 +196,7 @@ SpacingField spacing_for_count(const topology::Domain& domain, const SpacingFiel
   const auto count_at = [&](double log_scale) {
     scaled.fine = std::exp(log_scale) * shape.fine;
     scaled.coarse = std::exp(log_scale) * shape.coarse;
-    return count(domain, features, scaled) + static_cast<double>(options.seeds.size());
+    return count(domain, features, scaled, options.incision.get()) + static_cast<double>(options.seeds.size());
   };
   // Newton's method in logarithms with the secant slope; the count falls no faster than scale^-3, so that starting from
   // too few nodes never overshoots by much.

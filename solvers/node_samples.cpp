@@ -21,12 +21,16 @@ void refuse_above(double expected, int maximum_nodes, const SpacingField& spacin
 
 class VolumeSampler {
  public:
-  VolumeSampler(const topology::Domain& domain, const SpacingField& spacing, double fraction, int maximum_nodes)
-      : domain_(domain), spacing_(spacing), fraction_(fraction), maximum_nodes_(maximum_nodes) {}
+  VolumeSampler(const topology::Domain& domain, const SpacingField& spacing, double fraction, int maximum_nodes,
+                const BoundingBox* region)
+      : domain_(domain), spacing_(spacing), fraction_(fraction), maximum_nodes_(maximum_nodes), region_(region) {}
 
   /// `inside`: the whole cell is known to lie in the body.
   void visit(const Vector3& centre, double size, bool inside) {
     double distance = 0;
+    if (region_ != nullptr &&
+        ((region_->lower - centre).maxCoeff() > 0.5 * size || (centre - region_->upper).maxCoeff() > 0.5 * size))
+      return;
     if (!inside) {
       distance = domain_.signed_distance(centre);
       const double half_diagonal = 0.5 * std::sqrt(3.0) * size;
@@ -57,6 +61,7 @@ class VolumeSampler {
   const SpacingField& spacing_;
   double fraction_;
   int maximum_nodes_;
+  const BoundingBox* region_;
   double expected_ = 0;
   std::vector<VolumeSample> samples_;
 };
@@ -64,14 +69,14 @@ class VolumeSampler {
 } // namespace
 
 std::vector<VolumeSample> sample_volume(const topology::Domain& domain, const SpacingField& spacing, double fraction,
-                                        int maximum_nodes) {
+                                        int maximum_nodes, const BoundingBox* region) {
   // Root cubes on a lattice such that halving them meets fraction h exactly where h is uniform. The lattice is centred
   // on the body: symmetric bodies get symmetric samples.
   const BoundingBox box = domain.bounds();
-  double root = fraction * (spacing.centres.empty() ? spacing.coarse : spacing.fine);
+  double root = fraction * spacing.finest();
   while (root < 0.25 * box.extent().maxCoeff())
     root *= 2;
-  VolumeSampler sampler(domain, spacing, fraction, maximum_nodes);
+  VolumeSampler sampler(domain, spacing, fraction, maximum_nodes, region);
   std::array<int, 3> count{};
   for (int d = 0; d < 3; ++d)
     count[d] = std::max(1, static_cast<int>(std::ceil(box.extent()[d] / root - 1e-9)));
@@ -83,9 +88,8 @@ std::vector<VolumeSample> sample_volume(const topology::Domain& domain, const Sp
   return sampler.take();
 }
 
-std::vector<SurfaceSample> sample_surface(const topology::Domain& domain, const SpacingField& spacing, double fraction,
-                                          int maximum_nodes) {
-  const topology::SurfaceMesh& mesh = domain.surface();
+std::vector<SurfaceSample> sample_surface(const topology::SurfaceMesh& mesh, const SpacingField& spacing,
+                                          double fraction, int maximum_nodes) {
   std::vector<SurfaceSample> samples;
   samples.reserve(mesh.triangles.size());
   double expected = 0;

@@ -19,14 +19,18 @@ struct SurfaceSample {
   double expected; // area of the piece / h^2
 };
 
-/// Cells no larger than `fraction` h, those outside the body left out. Relies on |signed_distance| being no larger than
-/// the true distance. Throws InputError when the body needs more than maximum_nodes.
+/// Cells no larger than `fraction` h, those outside the body left out, and those outside `region` if there is one.
+/// Relies on |signed_distance| being no larger than the true distance. Throws InputError when the body needs more than
+/// maximum_nodes.
 std::vector<VolumeSample> sample_volume(const topology::Domain& domain, const SpacingField& spacing, double fraction,
-                                        int maximum_nodes);
+                                        int maximum_nodes, const BoundingBox* region = nullptr);
 
-/// Pieces no longer than `fraction` h. Throws InputError when the surface needs more than maximum_nodes.
-std::vector<SurfaceSample> sample_surface(const topology::Domain& domain, const SpacingField& spacing, double fraction,
-                                          int maximum_nodes);
+/// Pieces of a surface no longer than `fraction` h. Throws InputError when it needs more than maximum_nodes.
+std::vector<SurfaceSample> sample_surface(const topology::SurfaceMesh& surface, const SpacingField& spacing,
+                                          double fraction, int maximum_nodes);
+
+/// Size, place and flatness of the pieces of a cut body, largest first.
+std::vector<SprinklePiece> inspect_pieces(const NodeCloud& nodes, const topology::Incision& incision);
 
 /// inspect_filling with the volume samples given (cells of half a spacing).
 SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& nodes,

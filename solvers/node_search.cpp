@@ -72,27 +72,27 @@ bool NodeGrid::crowded(const Vector3& x, double h, double factor) const {
   return false;
 }
 
-double NodeGrid::nearest_distance(const Vector3& x, double h, int except) const {
+double NodeGrid::nearest_distance(const Vector3& x, double h, int except, double beyond) const {
   double best = std::numeric_limits<double>::infinity();
-  if (size() - (except >= 0 && except < size() ? 1 : 0) == 0)
-    return best;
   for (double radius = 1.25 * h;; radius *= 2) {
+    int visited = 0;
     for_each_within(x, h, radius, [&](int j, double distance) {
-      if (j != except)
+      ++visited;
+      if (j != except && distance > beyond)
         best = std::min(best, distance);
     });
-    if (best <= radius)
+    if (best <= radius || visited == size())
       return best;
   }
 }
 
-double NodeGrid::nearest_in_spacings(const Vector3& x, double h, int except) const {
-  const double nearest = nearest_distance(x, h, except);
+double NodeGrid::nearest_in_spacings(const Vector3& x, double h, int except, double beyond) const {
+  const double nearest = nearest_distance(x, h, except, beyond);
   double best = std::numeric_limits<double>::infinity();
   if (!std::isfinite(nearest))
     return best;
   for_each_within(x, h, 2 * nearest, [&](int j, double distance) {
-    if (j != except)
+    if (j != except && distance > beyond)
       best = std::min(best, 2 * distance / (h + spacing(j)));
   });
   return best;

@@ -21,11 +21,12 @@ class NodeGrid {
   /// Whether some node j has |x - x_j| < factor (h + h_j) / 2.
   [[nodiscard]] bool crowded(const Vector3& x, double h, double factor) const;
 
-  /// Distance from x to the nearest node other than `except`, m; infinity when there is none. h is the spacing at x.
-  [[nodiscard]] double nearest_distance(const Vector3& x, double h, int except = -1) const;
+  /// Distance from x to the nearest node other than `except` that is farther than `beyond` m; infinity when there is
+  /// none. h is the spacing at x.
+  [[nodiscard]] double nearest_distance(const Vector3& x, double h, int except = -1, double beyond = -1) const;
 
-  /// Smallest 2 |x - x_j| / (h + h_j) over the nodes j other than `except` that are not farther than twice the nearest.
-  [[nodiscard]] double nearest_in_spacings(const Vector3& x, double h, int except = -1) const;
+  /// Smallest 2 |x - x_j| / (h + h_j) over those nodes j that are not farther than twice the nearest.
+  [[nodiscard]] double nearest_in_spacings(const Vector3& x, double h, int except = -1, double beyond = -1) const;
   [[nodiscard]] double spacing(int node) const { return entries_[node].spacing; }
 
   /// Calls visit(j, |x - x_j|) for every node within radius of x, in no particular but a reproducible order. A node may

@@ -1,418 +1,15 @@
-// Filling a body with nodes by an advancing front.
-// Notation: h(x) wanted spacing at x; a node "crowds" x when |x - x_j| < f (h(x) + h_j) / 2.
 #include "solvers/nodes.hpp"
 
-#include "solvers/node_features.hpp"
-#include "solvers/node_samples.hpp"
-#include "solvers/node_search.hpp"
+#include "solvers/node_filler.hpp"
 #include "topology/errors.hpp"
+#include "topology/point_tree.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
-#include <numbers>
-#include <random>
-#include <span>
-#include <utility>
 
 namespace spherecut::solvers {
-
-namespace {
-
-// Distances in units of the mean spacing of the two nodes. A front that steps by h and refuses below 0.93 h fills to a
-// density of 0.85 h^-3; these steps, 7 % shorter, fill to 1.03. Relaxing the nodes by repulsion afterwards was measured
-// and left out: it raised the mean nearest distance by 2 % and widened its spread.
-constexpr double front_step = 0.93;
-constexpr double front_crowding = 0.87; // below: a candidate is refused
-constexpr double sweep_crowding = 0.88; // above: a place that the front has missed
-constexpr double kept_crowding = 0.7;   // between corners and edge nodes, and between previous nodes
-constexpr double sweep_fraction = 0.5;
-constexpr int surface_candidates = 14;
-constexpr int interior_candidates = 20;
-constexpr double grown_crowding = 0.8; // between previous nodes where h has grown
-// resprinkle: the range of placed / wanted spacing in which a node is kept.
-constexpr double kept_finest = 0.75, kept_coarsest = 1.1;
-
-void check_options(const SprinkleOptions& options) {
-  const SpacingField& s = options.spacing;
-  const auto refuse = [](const char* name, double value, const char* limit) {
-    throw InputError(fmt::format("sprinkle: {} is {}; it must be {}", name, value, limit));
-  };
-  if (!(s.fine > 0) || !std::isfinite(s.fine))
-    refuse("spacing.fine", s.fine, "positive, in metres");
-  if (!(s.coarse >= s.fine) || !std::isfinite(s.coarse))
-    refuse("spacing.coarse", s.coarse, "at least spacing.fine, in metres");
-  if (!(s.slope >= 0 && s.slope <= 1))
-    refuse("spacing.slope", s.slope, "between 0 and 1");
-  if (!(s.radius >= 0) || !std::isfinite(s.radius))
-    refuse("spacing.radius", s.radius, "at least 0 m");
-  if (!(s.plateau >= 0) || !std::isfinite(s.plateau))
-    refuse("spacing.plateau", s.plateau, "at least 0");
-  if (!(options.sharp_edge_degrees > 0 && options.sharp_edge_degrees <= 180))
-    refuse("sharp_edge_degrees", options.sharp_edge_degrees, "in (0, 180]");
-  if (!(options.wall_clearance >= 0 && options.wall_clearance <= 0.9))
-    refuse("wall_clearance", options.wall_clearance, "between 0 and 0.9 h");
-  if (options.maximum_nodes < 4)
-    refuse("maximum_nodes", options.maximum_nodes, "at least 4");
-}
-
-/// Directions spread evenly over the sphere (golden-angle spiral).
-std::vector<Vector3> spiral_directions(int count) {
-  std::vector<Vector3> directions;
-  for (int k = 0; k < count; ++k) {
-    const double z = 1 - (2 * k + 1.0) / count, angle = k * std::numbers::pi * (3 - std::sqrt(5.0));
-    const double rho = std::sqrt(1 - z * z);
-    directions.emplace_back(rho * std::cos(angle), rho * std::sin(angle), z);
-  }
-  return directions;
-}
-
-class Filler {
- public:
-  Filler(const topology::Domain& domain, const SprinkleOptions& options)
-      : domain_(domain), options_(options), spacing_(options.spacing),
-        grid_(options.spacing.centres.empty() ? options.spacing.coarse : options.spacing.fine, options.spacing.slope),
-        random_(options.random_seed), directions_(spiral_directions(interior_candidates)),
-        features_(find_sharp_features(domain.surface(), options.sharp_edge_degrees)) {
-    volume_samples_ = sample_volume(domain, spacing_, sweep_fraction, options.maximum_nodes);
-  }
-
-  void place_seeds();
-  void keep(const NodeCloud& previous);
-  void place_edges();
-  /// Fronts start from all nodes present, after keep() from those alone around which something has changed.
-  void fill_surface();
-  void fill_interior();
-
-  [[nodiscard]] int size() const { return nodes_.size(); }
-  /// The nodes, where they were kept from, and the report; throws when they are too few or a zone is under-filled.
-  Sprinkling finish();
-
- private:
-  void add(const Vector3& x, double h, NodeKind kind, const Vector3& normal);
-  double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
-  Matrix3 random_rotation();
-  /// Mean of the normals of the body on both sides of sharp edges at x, with the given mesh triangles.
-  [[nodiscard]] Vector3 edge_normal(const Vector3& x, double h, std::span<const int> triangles) const;
-  [[nodiscard]] Vector3 normal_of_edge_seed(const Vector3& x, double h) const;
-  void place_along(const SharpCurve& curve);
-  /// The exact sharp curve near point x of a mesh edge.
-  [[nodiscard]] Vector3 onto_edge(const Vector3& x, const SharpCurve& curve, int segment) const;
-  [[nodiscard]] std::vector<int> front_starts() const;
-  void surface_front(std::vector<int> front);
-  void interior_front(std::vector<int> front);
-
-  const topology::Domain& domain_;
-  const SprinkleOptions& options_;
-  const SpacingField& spacing_;
-  NodeGrid grid_;
-  NodeCloud nodes_;
-  std::vector<int> kept_from_;
-  std::vector<bool> settled_; // kept nodes around which nothing has changed
-  std::vector<VolumeSample> volume_samples_;
-  std::mt19937_64 random_;
-  std::vector<Vector3> directions_;
-  SharpFeatures features_;
-};
-
-void Filler::add(const Vector3& x, double h, NodeKind kind, const Vector3& normal) {
-  if (size() >= options_.maximum_nodes)
-    throw InputError(fmt::format("sprinkle: more than maximum_nodes = {} nodes are needed at spacings of {} to {} m",
-                                 options_.maximum_nodes, spacing_.fine, spacing_.coarse));
-  nodes_.add(x, h, kind, normal);
-  grid_.add(x, h);
-}
-
-Matrix3 Filler::random_rotation() {
-  // Uniform on the rotations [Shoemake 1992].
-  const double u = uniform(), v = 2 * std::numbers::pi * uniform(), w = 2 * std::numbers::pi * uniform();
-  const double a = std::sqrt(1 - u), b = std::sqrt(u);
-  return Eigen::Quaterniond(a * std::sin(v), a * std::cos(v), b * std::sin(w), b * std::cos(w)).toRotationMatrix();
-}
-
-// ---- seeds and sharp edges
-
-Vector3 Filler::edge_normal(const Vector3& x, double h, std::span<const int> triangles) const {
-  const topology::SurfaceMesh& mesh = domain_.surface();
-  Vector3 sum = Vector3::Zero();
-  for (int t : triangles) {
-    const Triangle& v = mesh.triangles[t];
-    const Vector3 into_face = (mesh.vertices[v[0]] + mesh.vertices[v[1]] + mesh.vertices[v[2]]) / 3 - x;
-    const double length = into_face.norm();
-    const Vector3 beside = x + std::min(1e-3 * h / length, 0.5) * into_face;
-    sum += domain_.normal(domain_.closest_surface_point(beside));
-  }
-  return sum.norm() > 1e-6 ? Vector3(sum.normalized()) : domain_.normal(x);
-}
-
-Vector3 Filler::normal_of_edge_seed(const Vector3& x, double h) const {
-  const topology::SurfaceMesh& mesh = domain_.surface();
-  for (int k = 0; k < std::ssize(features_.corners); ++k)
-    if ((mesh.vertices[features_.corners[k]] - x).norm() < 1e-6 * h)
-      return edge_normal(x, h, features_.corner_triangles[k]);
-  double best = std::numeric_limits<double>::infinity();
-  const std::array<int, 2>* faces = nullptr;
-  for (const SharpCurve& curve : features_.curves)
-    for (int s = 0; s + 1 < std::ssize(curve.vertices); ++s) {
-      const Vector3& a = mesh.vertices[curve.vertices[s]];
-      const Vector3 ab = mesh.vertices[curve.vertices[s + 1]] - a;
-      const double distance = (a + std::clamp(ab.dot(x - a) / ab.squaredNorm(), 0.0, 1.0) * ab - x).norm();
-      if (distance < best) {
-        best = distance;
-        faces = &curve.faces[s];
-      }
-    }
-  return faces != nullptr && best < h ? edge_normal(x, h, *faces) : domain_.normal(x);
-}
-
-void Filler::place_seeds() {
-  const double tolerance = 1e-6 * domain_.bounds().extent().norm();
-  for (int k = 0; k < std::ssize(options_.seeds); ++k) {
-    const Vector3& x = options_.seeds[k].position;
-    const NodeKind kind = options_.seeds[k].kind;
-    const double outside = domain_.signed_distance(x), h = spacing_(x);
-    const auto place = [&] { return fmt::format("seed {} at ({}, {}, {}) m", k, x.x(), x.y(), x.z()); };
-    if (!x.allFinite() || !(outside <= tolerance))
-      throw InputError(
-          fmt::format("sprinkle: {} lies {} m outside the body; the limit is {} m", place(), outside, tolerance));
-    if (kind != NodeKind::interior && outside < -0.1 * h)
-      throw InputError(
-          fmt::format("sprinkle: {} is a surface seed but lies {} m inside the body; the limit is 0.1 h, {} "
-                      "m",
-                      place(), -outside, 0.1 * h));
-    if (const double nearest = grid_.nearest_distance(x, h); nearest < 1e-3 * h)
-      throw InputError(fmt::format("sprinkle: {} lies {} m from another seed; the limit is 0.001 h, {} m", place(),
-                                   nearest, 1e-3 * h));
-    const Vector3 normal = kind == NodeKind::interior ? Vector3(Vector3::Zero())
-                           : kind == NodeKind::edge   ? normal_of_edge_seed(x, h)
-                                                      : domain_.normal(x);
-    add(x, h, kind, normal);
-  }
-}
-
-void Filler::keep(const NodeCloud& previous) {
-  kept_from_.assign(nodes_.size(), -1);
-  std::vector<bool> is_seed(previous.size(), false);
-  for (int s = 0; s < std::ssize(options_.seeds); ++s)
-    for (int j = 0; j < previous.size(); ++j)
-      if (!is_seed[j] && previous.positions[j] == options_.seeds[s].position) {
-        kept_from_[s] = j;
-        is_seed[j] = true;
-        break;
-      }
-  for (int s = 0; s < size(); ++s)
-    settled_.push_back(kept_from_[s] >= 0 && previous.spacings[kept_from_[s]] == nodes_.spacings[s]);
-  std::vector<int> removed;
-  for (int j = 0; j < previous.size(); ++j) {
-    if (is_seed[j])
-      continue;
-    const Vector3& x = previous.positions[j];
-    const double h = spacing_(x), ratio = previous.spacings[j] / h;
-    const bool grown = ratio < 1;
-    if (ratio < kept_finest || ratio > kept_coarsest || grid_.crowded(x, h, grown ? grown_crowding : kept_crowding) ||
-        (grown && previous.kinds[j] == NodeKind::interior &&
-         domain_.signed_distance(x) > -options_.wall_clearance * h)) {
-      removed.push_back(j);
-      continue;
-    }
-    add(x, h, previous.kinds[j], previous.normals[j]);
-    kept_from_.push_back(j);
-    settled_.push_back(ratio == 1);
-  }
-  for (int j : removed) {
-    const Vector3& x = previous.positions[j];
-    const double h = spacing_(x);
-    grid_.for_each_within(x, h, 2 * h, [&](int i, double) { settled_[i] = false; });
-  }
-}
-
-std::vector<int> Filler::front_starts() const {
-  std::vector<int> starts;
-  for (int i = 0; i < size(); ++i)
-    if (i >= std::ssize(settled_) || !settled_[i])
-      starts.push_back(i);
-  return starts;
-}
-
-Vector3 Filler::onto_edge(const Vector3& x, const SharpCurve& curve, int segment) const {
-  // Points in the normal cone of a sharp edge have their closest surface point on the edge itself. The cone is entered
-  // along the mean normal of the two triangles, outwards at a convex edge, inwards at a concave one.
-  const topology::SurfaceMesh& mesh = domain_.surface();
-  const auto& [left, right] = curve.faces[segment];
-  const Vector3 mean = topology::triangle_normal(mesh, left) + topology::triangle_normal(mesh, right);
-  const Vector3 chord = mesh.vertices[curve.vertices[segment + 1]] - mesh.vertices[curve.vertices[segment]];
-  const double length = chord.norm();
-  if (mean.norm() < 1e-6)
-    return domain_.closest_surface_point(x);
-  const Vector3 step = (curve.convex[segment] ? 0.25 : -0.25) * length * mean.normalized(), along = chord / length;
-  Vector3 on_edge = domain_.closest_surface_point(x + step), start = x;
-  for (int correction = 0; correction < 2; ++correction) { // of the drift along the edge
-    start -= along * along.dot(on_edge - x);
-    on_edge = domain_.closest_surface_point(start + step);
-  }
-  return (on_edge - x).norm() < 0.3 * length ? on_edge : domain_.closest_surface_point(x);
-}
-
-void Filler::place_along(const SharpCurve& curve) {
-  // Length in units of h along the polyline: samples (segment, parameter, measure so far).
-  const topology::SurfaceMesh& mesh = domain_.surface();
-  struct Station {
-    int segment;
-    double parameter, measure;
-  };
-  std::vector<Station> stations{{0, 0, 0}};
-  const auto point = [&](int segment, double t) -> Vector3 {
-    return (1 - t) * mesh.vertices[curve.vertices[segment]] + t * mesh.vertices[curve.vertices[segment + 1]];
-  };
-  double measure = 0;
-  for (int s = 0; s < std::ssize(curve.faces); ++s) {
-    const double length = (point(s, 1) - point(s, 0)).norm();
-    for (double t = 0; t < 1;) {
-      const double step = std::min(1 - t, 0.1 * spacing_(point(s, t)) / length);
-      measure += step * length / spacing_(point(s, t + 0.5 * step));
-      t = t + step > 1 - 1e-9 ? 1 : t + step;
-      stations.push_back({s, t, measure});
-    }
-  }
-  const int intervals = std::max(curve.closed ? 3 : 1, static_cast<int>(std::lround(measure)));
-  for (int k = curve.closed ? 0 : 1; k < intervals; ++k) {
-    const double wanted = measure * k / intervals;
-    const auto above = std::upper_bound(stations.begin() + 1, stations.end() - 1, wanted,
-                                        [](double m, const Station& station) { return m < station.measure; });
-    const auto& below = *(above - 1);
-    const double from = below.segment == above->segment ? below.parameter : 0;
-    const double t = from + (above->parameter - from) * (wanted - below.measure) / (above->measure - below.measure);
-    const bool at_vertex = k == 0;
-    const Vector3 x = at_vertex ? point(0, 0) : onto_edge(point(above->segment, t), curve, above->segment);
-    const double h = spacing_(x);
-    if (!grid_.crowded(x, h, kept_crowding))
-      add(x, h, NodeKind::edge, edge_normal(x, h, curve.faces[above->segment]));
-  }
-}
-
-void Filler::place_edges() {
-  const topology::SurfaceMesh& mesh = domain_.surface();
-  // Creases shorter than two spacings in all are below the resolution: the smooth front covers them.
-  std::vector<double> length(features_.components, 0); // in units of h
-  for (const SharpCurve& curve : features_.curves)
-    for (int s = 0; s + 1 < std::ssize(curve.vertices); ++s) {
-      const Vector3 &a = mesh.vertices[curve.vertices[s]], &b = mesh.vertices[curve.vertices[s + 1]];
-      length[curve.component] += (b - a).norm() / spacing_(0.5 * (a + b));
-    }
-  for (int k = 0; k < std::ssize(features_.corners); ++k) {
-    const Vector3& x = mesh.vertices[features_.corners[k]];
-    const double h = spacing_(x);
-    if (length[features_.corner_component[k]] >= 2 && !grid_.crowded(x, h, kept_crowding))
-      add(x, h, NodeKind::edge, edge_normal(x, h, features_.corner_triangles[k]));
-  }
-  for (const SharpCurve& curve : features_.curves)
-    if (length[curve.component] >= 2)
-      place_along(curve);
-}
-
-// ---- fronts
-
-void Filler::surface_front(std::vector<int> front) {
-  for (std::size_t next = 0; next < front.size(); ++next) {
-    const int i = front[next];
-    if (nodes_.kinds[i] == NodeKind::interior)
-      continue;
-    const Vector3 centre = nodes_.positions[i], n = nodes_.normals[i];
-    const Vector3 u = n.unitOrthogonal(), v = n.cross(u);
-    const double turn = uniform();
-    for (int k = 0; k < surface_candidates; ++k) {
-      const double angle = 2 * std::numbers::pi * (k + turn) / surface_candidates;
-      const Vector3 direction = std::cos(angle) * u + std::sin(angle) * v;
-      double step = front_step * nodes_.spacings[i];
-      Vector3 x = centre + step * direction;
-      if (grid_.crowded(x, spacing_(x), 0.6)) // no projection can free it
-        continue;
-      // The distance wanted is the mean spacing of both ends; it is approached by scaling the step.
-      for (int attempt = 0; attempt < 4; ++attempt) {
-        x = domain_.closest_surface_point(centre + step * direction);
-        const double distance = (x - centre).norm(), wanted = 0.5 * front_step * (nodes_.spacings[i] + spacing_(x));
-        if (std::abs(distance - wanted) <= 0.02 * wanted || distance < 0.2 * wanted)
-          break;
-        step *= wanted / distance;
-      }
-      const double h = spacing_(x), distance = (x - centre).norm();
-      if (distance > 1.1 * std::max(h, nodes_.spacings[i]) || grid_.crowded(x, h, front_crowding))
-        continue;
-      add(x, h, NodeKind::surface, domain_.normal(x));
-      front.push_back(size() - 1);
-    }
-  }
-}
-
-void Filler::fill_surface() {
-  surface_front(front_starts());
-  for (const SurfaceSample& sample : sample_surface(domain_, spacing_, sweep_fraction, options_.maximum_nodes)) {
-    if (grid_.crowded(sample.point, sample.spacing, sweep_crowding))
-      continue;
-    const Vector3 x = domain_.closest_surface_point(sample.point);
-    const double h = spacing_(x);
-    if (grid_.crowded(x, h, sweep_crowding))
-      continue;
-    add(x, h, NodeKind::surface, domain_.normal(x));
-    surface_front({size() - 1});
-  }
-}
-
-void Filler::interior_front(std::vector<int> front) {
-  for (std::size_t next = 0; next < front.size(); ++next) {
-    const int i = front[next];
-    const Vector3 centre = nodes_.positions[i], n = nodes_.normals[i];
-    const Matrix3 rotation = random_rotation();
-    for (const Vector3& fixed : directions_) {
-      const Vector3 direction = rotation * fixed;
-      if (direction.dot(n) > 0) // out of the body, or along its surface
-        continue;
-      double step = front_step * nodes_.spacings[i], h = step;
-      Vector3 x;
-      for (int attempt = 0; attempt < 4; ++attempt) {
-        x = centre + step * direction;
-        h = spacing_(x);
-        const double wanted = 0.5 * front_step * (nodes_.spacings[i] + h);
-        if (std::abs(wanted - step) <= 0.02 * step)
-          break;
-        step = wanted;
-      }
-      if (grid_.crowded(x, h, front_crowding) || domain_.signed_distance(x) > -options_.wall_clearance * h)
-        continue;
-      add(x, h, NodeKind::interior, Vector3::Zero());
-      front.push_back(size() - 1);
-    }
-  }
-}
-
-void Filler::fill_interior() {
-  interior_front(front_starts());
-  for (const auto& [x, h, expected] : volume_samples_) {
-    if (grid_.crowded(x, h, sweep_crowding) || domain_.signed_distance(x) > -options_.wall_clearance * h)
-      continue;
-    add(x, h, NodeKind::interior, Vector3::Zero());
-    interior_front({size() - 1});
-  }
-}
-
-Sprinkling Filler::finish() {
-  if (size() < 4)
-    throw InputError(fmt::format("sprinkle: only {} nodes fit into the body at spacings of {} to {} m; at least 4 are "
-                                 "needed",
-                                 size(), spacing_.fine, spacing_.coarse));
-  Sprinkling result;
-  result.report = inspect_filling(domain_, options_, nodes_, volume_samples_);
-  require_filled(result.report, options_.minimum_density);
-  if (!kept_from_.empty())
-    kept_from_.resize(nodes_.size(), -1);
-  result.nodes = std::move(nodes_);
-  result.kept_from = std::move(kept_from_);
-  return result;
-}
-
-} // namespace
 
 int NodeCloud::add(const Vector3& position, double spacing, NodeKind kind, const Vector3& normal) {
   positions.push_back(position);
@@ -423,22 +20,70 @@ int NodeCloud::add(const Vector3& position, double spacing, NodeKind kind, const
 }
 
 double SpacingField::operator()(const Vector3& x) const {
-  if (centres.empty())
+  if (centres.empty() && segments.empty())
     return coarse;
   double squared = std::numeric_limits<double>::infinity();
   for (const Vector3& centre : centres)
     squared = std::min(squared, (x - centre).squaredNorm());
-  const double beyond = std::sqrt(squared) - radius - plateau * fine;
-  return std::clamp(fine + slope * beyond, fine, coarse);
+  double distance = std::sqrt(squared) - radius;
+  if (!segments.empty())
+    distance = std::min(distance, distance_to_segments(x, segments));
+  return std::clamp(fine + slope * (distance - plateau * fine), fine, coarse);
+}
+
+std::vector<std::array<Vector3, 2>> front_segments(const topology::Incision& incision, double length) {
+  if (!(length > 0))
+    throw InputError(fmt::format("front_segments: pieces of {} m are asked for; the length must be positive", length));
+  // A run is cut short where it turns by 20 degrees or doubles the length: the chord stays within a tenth of it.
+  std::vector<std::array<Vector3, 2>> result;
+  const topology::FrontSegment* last = nullptr;
+  Vector3 start = Vector3::Zero();
+  for (const topology::FrontSegment& piece : incision.front()) {
+    const Vector3 direction = (piece.to - piece.from).normalized();
+    const bool joined = last != nullptr && last->to == piece.from && last->sheet == piece.sheet &&
+                        direction.dot(start) > 0.94 && (piece.to - result.back()[0]).norm() <= length;
+    if (joined)
+      result.back()[1] = piece.to;
+    else {
+      result.push_back({piece.from, piece.to});
+      start = direction;
+    }
+    last = &piece;
+  }
+  return result;
+}
+
+std::vector<int> lip_partners(const NodeCloud& nodes) {
+  std::vector<int> lips, partners(nodes.size(), -1);
+  std::vector<Vector3> places;
+  for (int i = 0; i < nodes.size(); ++i)
+    if (nodes.kinds[i] == NodeKind::lip) {
+      lips.push_back(i);
+      places.push_back(nodes.positions[i]);
+    }
+  const topology::PointTree tree(places);
+  std::vector<topology::PointTree::Found> found;
+  for (int k = 0; k < std::ssize(lips); ++k) {
+    const int i = lips[k];
+    found.clear();
+    tree.within(places[k], 20 * lip_offset * nodes.spacings[i], found);
+    std::sort(found.begin(), found.end());
+    for (const auto& [squared, other] : found)
+      if (nodes.normals[lips[other]].dot(nodes.normals[i]) < 0 && partners[i] < 0)
+        partners[i] = lips[other];
+  }
+  return partners;
 }
 
 Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& options) {
   check_options(options);
   Filler filler(domain, options);
   filler.place_seeds();
+  filler.place_cut();
   filler.place_edges();
   filler.fill_surface();
   filler.fill_interior();
+  filler.thicken_pieces();
   return filler.finish();
 }
 
@@ -447,9 +92,11 @@ Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& opt
   Filler filler(domain, options);
   filler.place_seeds();
   filler.keep(previous);
+  filler.place_cut();
   filler.place_edges();
   filler.fill_surface();
   filler.fill_interior();
+  filler.thicken_pieces();
   return filler.finish();
 }
 

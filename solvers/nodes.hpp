@@ -30,17 +30,27 @@ struct NodeCloud {
   int add(const Vector3& position, double spacing, NodeKind kind, const Vector3& normal = Vector3::Zero());
 };
 
+/// Index of each lip node's partner across the sheet, -1 where there is none and for nodes of other kinds.
+std::vector<int> lip_partners(const NodeCloud& nodes);
+
 /// Spacing that grows linearly with the distance from a fine zone, h(x) = clamp(fine + slope (distance - plateau)).
-/// The distance is to the nearest of `centres` less `radius`.
+/// The distance is to the nearest of `centres` less `radius`, or to the nearest of `segments`: whichever is smaller.
 struct SpacingField {
   double fine = 0.01;             // m
   double coarse = 0.01;           // m
   double slope = 0.3;             // m per m
   double radius = 0;              // m, radius of the fine zone about each centre
   double plateau = 1.5;           // in units of fine: extra width of constant spacing around the zone
-  std::vector<Vector3> centres{}; // empty: `coarse` everywhere
+  std::vector<Vector3> centres{}; // of balls, a tool's contact; with no segments either: `coarse` everywhere
+  std::vector<std::array<Vector3, 2>> segments{}; // m, ends of straight pieces: the front of a cut, the way ahead of it
   [[nodiscard]] double operator()(const Vector3& x) const;
+  /// m, nothing asks for less
+  [[nodiscard]] double finest() const { return centres.empty() && segments.empty() ? coarse : fine; }
 };
+
+/// The front of an incision as segments of a SpacingField: runs that turn by little are joined to pieces of at most
+/// `length` m, so that the field stays cheap.
+std::vector<std::array<Vector3, 2>> front_segments(const topology::Incision& incision, double length);
 
 /// A node that must be where it is put (tool tip, contact rings, lips), with its kind and normal.
 struct SeedNode {
@@ -72,9 +82,16 @@ struct SprinkleZone {
   double expected = 0; // integral over the zone of dV / h^3
   double density = 0;  // sum of the nodes' shares / expected (about 1 to 1.2 when full)
 };
+/// Nodes of a cut body that are connected by sight.
+struct SprinklePiece {
+  int nodes = 0;
+  Vector3 centroid = Vector3::Zero(); // m, of its nodes
+  bool flat = false; // fewer than 4 nodes, or within 0.05 h (root mean square) of a plane: no linear field fits
+};
 struct SprinkleReport {
   std::vector<SprinkleZone> zones;
   int surface_nodes = 0, edge_nodes = 0, interior_nodes = 0, lip_nodes = 0;
+  std::vector<SprinklePiece> pieces; // largest first; empty without an incision
 };
 
 struct Sprinkling {
@@ -99,6 +116,10 @@ Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& optio
 /// Throws as sprinkle does.
 Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& previous);
 
+/// Piece of each node: nodes closer than twice the mean of their spacings that see each other belong together. Pieces
+/// are numbered by falling number of nodes, then by their first node.
+std::vector<int> node_pieces(const NodeCloud& nodes, const topology::Incision& incision);
+
 /// Nearest-neighbour distance and density of a cloud per zone of h; options.seeds are its first nodes.
 SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& nodes);
 
@@ -107,9 +128,10 @@ SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOpt
 /// seeds) was 0.805, where 8 nodes are expected.
 void require_filled(const SprinkleReport& report, double minimum_density);
 
-/// Number of nodes to expect of sprinkle: integrals of dV/h^3, dA/2h^2 and, along sharp edges, ds/4h, scaled to what
-/// the filling was measured to give. Within about 10 % above 100 nodes.
-double expected_count(const topology::Domain& domain, const SpacingField& spacing, double sharp_edge_degrees = 40);
+/// Number of nodes to expect of sprinkle: integrals of dV/h^3, dA/2h^2 (over both faces of sheets too) and, along sharp
+/// edges, ds/4h, scaled to what the filling was measured to give. Within about 10 % above 100 nodes.
+double expected_count(const topology::Domain& domain, const SpacingField& spacing, double sharp_edge_degrees = 40,
+                      const topology::Incision* incision = nullptr);
 
 /// `shape` with fine and coarse scaled by one factor such that a sprinkling has about `target` nodes (options.spacing
 /// is not used, the seeds are). Throws InputError when target is below 4 or no factor gives it.

@@ -1,0 +1,84 @@
+// The filling of a body with nodes, step by step. Used by sprinkle, resprinkle and extend_sprinkling.
+#pragma once
+
+#include "solvers/node_cut.hpp"
+#include "solvers/node_samples.hpp"
+
+#include <random>
+#include <span>
+
+namespace spherecut::solvers {
+
+/// Throws InputError naming the option that is out of range.
+void check_options(const SprinkleOptions& options);
+
+class Filler {
+ public:
+  /// With a region (m) only places inside it get new nodes; options and domain must outlive the filler.
+  Filler(const topology::Domain& domain, const SprinkleOptions& options, const BoundingBox* region = nullptr);
+
+  // In this order; keep() and, without an incision, place_cut() may be left out.
+  void place_seeds();
+  void keep(const NodeCloud& previous);
+  void place_cut();
+  void place_edges();
+  /// Fronts start from all nodes present, after keep() from those alone around which something has changed.
+  void fill_surface();
+  void fill_interior();
+  /// Severed pieces too thin for nodes beside those of their sheets get nodes on their outer surface all the same.
+  void thicken_pieces();
+
+  [[nodiscard]] int size() const { return nodes_.size(); }
+  /// The nodes, where they were kept from, and the report; throws when they are too few or a zone is under-filled.
+  Sprinkling finish();
+
+ private:
+  void add(const Vector3& x, double h, NodeKind kind, const Vector3& normal);
+  double uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
+  Matrix3 random_rotation();
+  /// Whether x keeps `distance` m from every sheet of the incision.
+  [[nodiscard]] bool clear_of_sheets(const Vector3& x, double distance) const {
+    return !incision_ || !incision_->near(x, distance) || !incision_->closest(x, distance);
+  }
+  /// Whether a node may be put at x: in the region, and no other nearer than `crowding` of their mean spacing.
+  [[nodiscard]] bool has_room(const Vector3& x, double h, double crowding) const {
+    return (region_ == nullptr || region_->contains(x)) && !grid_.crowded(x, h, crowding);
+  }
+  [[nodiscard]] bool fits_inside(const Vector3& x, double h, double crowding) const {
+    return has_room(x, h, crowding) && domain_.signed_distance(x) <= -options_.wall_clearance * h &&
+           clear_of_sheets(x, options_.wall_clearance * h);
+  }
+  /// Mean of the normals of the body on both sides of sharp edges at x, with the given mesh triangles.
+  [[nodiscard]] Vector3 edge_normal(const Vector3& x, double h, std::span<const int> triangles) const;
+  [[nodiscard]] Vector3 normal_of_edge_seed(const Vector3& x, double h) const;
+  void place_along(int curve);
+  [[nodiscard]] std::vector<int> front_starts() const;
+  void surface_front(std::vector<int> front);
+  void interior_front(std::vector<int> front);
+  /// Lip nodes of `previous` that still lie on a sheet, both of the pair.
+  [[nodiscard]] std::vector<int> lips_to_keep(const NodeCloud& previous) const;
+  /// Whether previous node j, no lip node, may stay where h is wanted; ratio: its spacing / h.
+  [[nodiscard]] bool still_fits(const NodeCloud& previous, int j, double h, double ratio) const;
+  void choose_cut(const NodeCloud* previous);
+
+  const topology::Domain& domain_;
+  const SprinkleOptions& options_;
+  const SpacingField& spacing_;
+  const topology::Incision* incision_; // null: uncut
+  const BoundingBox* region_;
+  topology::SurfaceMesh local_surface_; // triangles in the region
+  const topology::SurfaceMesh& surface_;
+  NodeGrid grid_;
+  NodeCloud nodes_;
+  std::vector<int> kept_from_;
+  std::vector<bool> settled_; // kept nodes around which nothing has changed
+  std::vector<VolumeSample> volume_samples_;
+  std::mt19937_64 random_;
+  std::vector<Vector3> directions_;
+  SharpFeatures features_;
+  SheetLayout layout_;
+  std::vector<int> kept_lips_;     // of the previous nodes
+  std::vector<CutNode> cut_nodes_; // chosen, not yet placed
+};
+
+} // namespace spherecut::solvers
