@@ -3,6 +3,7 @@
 #include "topology/errors.hpp"
 #include "topology/exact_points.hpp"
 #include "topology/overlap_tree.hpp"
+#include "topology/triangle_meeting.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -118,106 +119,29 @@ struct ExactArrangement::Data {
 
   // --- intersection of two triangles ---
 
-  /// Whether a point of the triangle's plane lies in it, border included.
-  [[nodiscard]] bool within(int p, const Triangle& t, int axis) const {
-    bool left = false, right = false;
-    for (int e = 0; e < 3; ++e) {
-      const int turn = points.turn(t[e], t[(e + 1) % 3], p, axis);
-      left = left || turn > 0;
-      right = right || turn < 0;
-    }
-    return !(left && right);
-  }
-
-  /// Points where the corners and edges of `a`, not coplanar with `b`, meet it. `side`: of a's corners to b's plane.
-  void edges_through(const Triangle& a, const std::array<int, 3>& side, const Triangle& b, std::vector<int>& found) {
-    for (int e = 0; e < 3; ++e) {
-      const int p = a[e], q = a[(e + 1) % 3];
-      if (side[e] == 0 && within(p, b, points.widest_axis(b)))
-        found.push_back(p);
-      if (side[e] * side[(e + 1) % 3] >= 0)
-        continue;
-      bool left = false, right = false;
-      for (int k = 0; k < 3 && !(left && right); ++k) {
-        const int turn = points.orientation(p, q, b[k], b[(k + 1) % 3]);
-        left = left || turn > 0;
-        right = right || turn < 0;
-      }
-      if (!(left && right))
-        found.push_back(points.edge_plane(p, q, b));
-    }
-  }
-
-  [[nodiscard]] bool strictly_between(int x, int p, int q) const {
-    return x != p && x != q && points.compare(x, p) * points.compare(x, q) < 0;
-  }
-
-  /// Ends of the part of the segment p q that lies in the coplanar triangle.
-  [[nodiscard]] std::vector<int> clip(int p, int q, const Triangle& t, int axis) {
-    std::vector<int> ends;
-    for (const int end : {p, q})
-      if (within(end, t, axis))
-        ends.push_back(end);
-    for (int e = 0; e < 3; ++e) {
-      const int r = t[e], s = t[(e + 1) % 3];
-      const int to_r = points.turn(p, q, r, axis), to_s = points.turn(p, q, s, axis);
-      if (to_r == 0 && strictly_between(r, p, q))
-        ends.push_back(r);
-      if (to_r * to_s < 0 && points.turn(r, s, p, axis) * points.turn(r, s, q, axis) < 0)
-        ends.push_back(points.edge_edge(p, q, r, s, axis));
-    }
-    keep_once(ends);
-    return ends;
-  }
-
-  /// Adds what was found to the marks of a source, unless it lies in its corners and edges alone; true when it is new.
-  bool mark(int source, const std::vector<int>& found) {
+  /// Adds to the marks of a source what another leaves on it, unless that is corners and edges alone; true when added.
+  bool mark(int source, const std::vector<std::vector<int>>& found) {
     const Triangle& t = sources[source];
-    std::vector<int> fresh;
-    for (const int p : found)
-      if (!has(t, p))
-        fresh.push_back(p);
-    if (found.size() == 2 && !(fresh.empty())) {
-      marks[source].segments.emplace_back(std::min(found[0], found[1]), std::max(found[0], found[1]));
-      return true;
+    bool any = false;
+    for (const std::vector<int>& ends : found) {
+      if (std::all_of(ends.begin(), ends.end(), [&](int p) { return has(t, p); }))
+        continue;
+      any = true;
+      if (ends.size() == 2)
+        marks[source].segments.emplace_back(ends[0], ends[1]);
+      else
+        marks[source].points.push_back(ends[0]);
     }
-    if (fresh.empty())
-      return false;
-    marks[source].points.insert(marks[source].points.end(), fresh.begin(), fresh.end());
-    return true;
+    return any;
   }
 
   void intersect(int i, int j, std::vector<int>& dirty) {
-    const Triangle &a = sources[i], &b = sources[j];
-    std::array<int, 3> side_a{}, side_b{};
-    for (int c = 0; c < 3; ++c)
-      side_a[c] = has(b, a[c]) ? 0 : points.orientation(b[0], b[1], b[2], a[c]);
-    if (side_a[0] == side_a[1] && side_a[1] == side_a[2] && side_a[0] != 0)
+    if (surely_apart(points, sources[i], sources[j]))
       return;
-    if (side_a == std::array<int, 3>{}) {
-      const int axis = points.widest_axis(b);
-      bool in_a = false, in_b = false;
-      for (int e = 0; e < 3; ++e) {
-        in_a = mark(i, clip(b[e], b[(e + 1) % 3], a, axis)) || in_a;
-        in_b = mark(j, clip(a[e], a[(e + 1) % 3], b, axis)) || in_b;
-      }
-      if (in_a)
-        dirty.push_back(i);
-      if (in_b)
-        dirty.push_back(j);
-      return;
-    }
-    for (int c = 0; c < 3; ++c)
-      side_b[c] = has(a, b[c]) ? 0 : points.orientation(a[0], a[1], a[2], b[c]);
-    if (side_b[0] == side_b[1] && side_b[1] == side_b[2] && side_b[0] != 0)
-      return;
-    std::vector<int> found;
-    edges_through(a, side_a, b, found);
-    edges_through(b, side_b, a, found);
-    keep_once(found);
-    if (mark(i, found))
+    const TriangleMeeting meeting = meet(points, sources[i], sources[j]);
+    if (mark(i, meeting.on_first))
       dirty.push_back(i);
-    if (mark(j, found))
+    if (mark(j, meeting.on_second))
       dirty.push_back(j);
   }
 

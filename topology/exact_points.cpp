@@ -167,6 +167,8 @@ const Vector3& ExactPoints::position(int point) const {
 }
 
 int ExactPoints::orientation(int p, int q, int r, int s) const {
+  if (p == q || p == r || p == s || q == r || q == s || r == s)
+    return 0;
   const Vector3 &x = position(p), a = position(q) - x, b = position(r) - x, c = position(s) - x;
   const double determinant = a.cross(b).dot(c);
   // Coordinates are rounded by one unit each; the bound covers that and the arithmetic five times over.
@@ -180,6 +182,8 @@ int ExactPoints::orientation(int p, int q, int r, int s) const {
 }
 
 int ExactPoints::turn(int p, int q, int r, int axis) const {
+  if (p == q || q == r || r == p)
+    return 0;
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   const Vector3 &x = position(p), a = position(q) - x, b = position(r) - x;
   const double determinant = a[u] * b[v] - a[v] * b[u];
@@ -203,6 +207,10 @@ int ExactPoints::same_side(int u, int v, int r, int s) const {
 int ExactPoints::compare(int p, int q) const {
   if (p == q)
     return 0;
+  // Rounding keeps the order.
+  const Vector3 &x = position(p), &y = position(q);
+  if (x[0] != y[0])
+    return x[0] < y[0] ? -1 : 1;
   const Exact3 a = data_->exact_of(p), b = data_->exact_of(q);
   for (int axis = 0; axis < 3; ++axis)
     if (a[axis] != b[axis])

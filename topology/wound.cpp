@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
-#include <fmt/format.h>
 #include <exception>
+#include <fmt/format.h>
 #include <map>
 #include <unordered_map>
 #include <utility>

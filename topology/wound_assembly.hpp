@@ -56,6 +56,7 @@ class WoundAssembly {
   void join_along_ray(int half, std::vector<int>& group) const;
   void sum_pieces();
 
+  static std::uint64_t key_of(int u, int v); // of an edge
   int new_vertex(const Vector3& position, int point, int owner);
   void new_triangle(int half, int place, int a, int b, int c);
   void drop_triangle(int triangle);
