@@ -72,6 +72,11 @@ BoundingBox box_of(const std::array<Vector3, 3>& p, double margin) {
   return {p[0].cwiseMin(p[1]).cwiseMin(p[2]).array() - margin, p[0].cwiseMax(p[1]).cwiseMax(p[2]).array() + margin};
 }
 
+/// Lexicographic order.
+bool before(const Vector3& a, const Vector3& b) {
+  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+}
+
 Eigen::Vector3f single(const Vector3& x) {
   return x.cast<float>();
 }
@@ -156,6 +161,15 @@ struct Incision::Data {
   [[nodiscard]] bool sees_front(const Vector3& x, const Vector3& f) const {
     constexpr double pulled_in = 1e-3;
     return !blocks(x, f + pulled_in * (x - f));
+  }
+
+  /// Sets the directions of a frame at `share` of its segment.
+  void turn_to(double share, FrontFrame& frame) const {
+    const auto& [segment, from, to] = pieces[frame.segment];
+    frame.normal = ((1 - share) * from.normal + share * to.normal).normalized();
+    const Vector3 ahead = (1 - share) * from.ahead + share * to.ahead;
+    frame.ahead = (ahead - ahead.dot(frame.normal) * frame.normal).normalized();
+    frame.tangent = frame.normal.cross(frame.ahead);
   }
 
   // Order as in TriangleFeature after `face`: edges ab, bc, ca, corners a, b, c.
@@ -265,7 +279,8 @@ std::optional<FrontFrame> Incision::front_frame(const Vector3& x, double reach) 
         const double s = std::clamp((x - from).dot(to - from) / (to - from).squaredNorm(), 0.0, 1.0);
         const Vector3 point = from + s * (to - from);
         const double candidate = (x - point).squaredNorm();
-        if (candidate >= best)
+        if (candidate > best ||
+            (candidate == best && !(frame.segment >= 0 && before(from, data.front[frame.segment].from))))
           return best;
         frame.segment = segment;
         frame.point = point;
@@ -274,18 +289,27 @@ std::optional<FrontFrame> Incision::front_frame(const Vector3& x, double reach) 
       });
   if (frame.segment < 0)
     return std::nullopt;
-  const auto& [segment, from, to] = data.pieces[frame.segment];
+  const FrontPiece& piece = data.pieces[frame.segment];
   frame.distance = std::sqrt(squared);
-  frame.normal = ((1 - share) * from.normal + share * to.normal).normalized();
-  Vector3 ahead = (1 - share) * from.ahead + share * to.ahead;
+  data.turn_to(share, frame);
   // Around a corner of the sheet the way ahead turns with x, from that of one side to that of the other.
-  if ((share == 0 && from.corner) || (share == 1 && to.corner)) {
+  if ((share == 0 && piece.from.corner) || (share == 1 && piece.to.corner)) {
     const Vector3 away = x - frame.point, in_plane = away - away.dot(frame.normal) * frame.normal;
-    if (in_plane.norm() > 1e-6 * frame.distance)
-      ahead = in_plane;
+    if (in_plane.norm() > 1e-6 * frame.distance) {
+      frame.ahead = in_plane.normalized();
+      frame.tangent = frame.normal.cross(frame.ahead);
+    }
   }
-  frame.ahead = (ahead - ahead.dot(frame.normal) * frame.normal).normalized();
-  frame.tangent = frame.normal.cross(frame.ahead);
+  return frame;
+}
+
+FrontFrame Incision::front_frame_at(int segment, double share) const {
+  const auto& [from, to, sheet] = data_->front.at(segment);
+  FrontFrame frame;
+  frame.segment = segment;
+  frame.point = from + share * (to - from);
+  frame.distance = 0;
+  data_->turn_to(share, frame);
   return frame;
 }
 

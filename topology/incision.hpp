@@ -71,8 +71,12 @@ class Incision {
   /// Nearest point of the sheets within `reach` m; nullopt when there is none.
   [[nodiscard]] std::optional<SheetPoint> closest(const Vector3& x, double reach) const;
 
-  /// Frame of the nearest point of the front within `reach` m; nullopt when there is none.
+  /// Frame of the nearest point of the front within `reach` m; nullopt when there is none. Depends on the segments
+  /// within reach alone, not on their order: of two as near, that of the lexicographically smaller `from` counts.
   [[nodiscard]] std::optional<FrontFrame> front_frame(const Vector3& x, double reach) const;
+
+  /// Frame at the point from + share (to - from) of a segment of the front, share in [0, 1]; its distance is 0.
+  [[nodiscard]] FrontFrame front_frame_at(int segment, double share) const;
 
   /// Shortest detour around the front no longer than `reach` m, both of whose legs are clear; nullopt when there is
   /// none. Meant for x and y that do not see each other.

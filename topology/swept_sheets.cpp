@@ -1,7 +1,5 @@
 #include "topology/swept_sheets.hpp"
 
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/intersections.h>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -11,13 +9,37 @@ namespace spherecut::topology {
 
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Corners = std::array<Vector3, 3>;
 
-Kernel::Point_3 exact(const Vector3& x) {
-  return {x.x(), x.y(), x.z()};
+/// Whether no plane across `axis` (any length) passes between the triangles with more than `gap` m to spare.
+bool overlap_along(const Vector3& axis, const Corners& p, const Corners& q, double gap) {
+  const double a = axis.dot(p[0]), b = axis.dot(p[1]), c = axis.dot(p[2]);
+  const double d = axis.dot(q[0]), e = axis.dot(q[1]), f = axis.dot(q[2]);
+  const double apart = std::max(std::min({a, b, c}) - std::max({d, e, f}), std::min({d, e, f}) - std::max({a, b, c}));
+  return apart <= gap * axis.norm();
 }
 
-BoundingBox box_of(const std::array<Vector3, 3>& p, double margin) {
+/// Whether two triangles meet, by separating axes; closer than `gap` m counts as meeting.
+bool meet(const Corners& p, const Corners& q, double gap) {
+  const Vector3 n = (p[1] - p[0]).cross(p[2] - p[0]), m = (q[1] - q[0]).cross(q[2] - q[0]);
+  if (!overlap_along(n, p, q, gap) || !overlap_along(m, p, q, gap))
+    return false;
+  for (int i = 0; i < 3; ++i) {
+    const Vector3 u = p[(i + 1) % 3] - p[i], v = q[(i + 1) % 3] - q[i];
+    if (!overlap_along(n.cross(u), p, q, gap) || !overlap_along(m.cross(v), p, q, gap))
+      return false;
+  }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const Vector3 u = p[(i + 1) % 3] - p[i], v = q[(j + 1) % 3] - q[j], axis = u.cross(v);
+      // Nearly parallel edges give no axis of their own.
+      if (axis.squaredNorm() > 1e-16 * u.squaredNorm() * v.squaredNorm() && !overlap_along(axis, p, q, gap))
+        return false;
+    }
+  return true;
+}
+
+BoundingBox box_of(const Corners& p, double margin) {
   return {p[0].cwiseMin(p[1]).cwiseMin(p[2]).array() - margin, p[0].cwiseMax(p[1]).cwiseMax(p[2]).array() + margin};
 }
 
@@ -94,7 +116,6 @@ std::optional<Vector3> SweptSheets::on_sheet(const Vector3& x) const {
 }
 
 bool SweptSheets::crosses(int sheet, const Triangle& indices, const std::array<Vector3, 3>& p) const {
-  const Kernel::Triangle_3 triangle(exact(p[0]), exact(p[1]), exact(p[2]));
   const BoundingBox box = box_of(p, 0);
   bool meets = false;
   for_cells(box, [&](std::uint64_t key) {
@@ -104,15 +125,12 @@ bool SweptSheets::crosses(int sheet, const Triangle& indices, const std::array<V
     for (const int place : found->second) {
       if (places_[place].sheet != sheet)
         continue;
+      const Corners q = corners(places_[place]);
       const Triangle& other = sheets_[sheet].triangles[places_[place].triangle];
       if (std::any_of(other.begin(), other.end(),
                       [&](int v) { return std::find(indices.begin(), indices.end(), v) != indices.end(); }))
         continue;
-      const auto q = corners(places_[place]);
-      const BoundingBox other_box = box_of(q, 0);
-      if ((other_box.lower.array() > box.upper.array()).any() || (box.lower.array() > other_box.upper.array()).any())
-        continue;
-      if (CGAL::do_intersect(triangle, Kernel::Triangle_3(exact(q[0]), exact(q[1]), exact(q[2])))) {
+      if (meet(p, q, 1e-9 * cell_)) {
         meets = true;
         return;
       }
