@@ -287,6 +287,17 @@ LipState close_lips(const LipPatch& lips, const VectorX& free_opening, double to
   return state;
 }
 
+std::vector<Vector3> pair_forces(const LipPatch& lips, const LipState& state) {
+  std::vector<Vector3> forces;
+  for (int p = 0; p < std::ssize(lips.pairs); ++p) {
+    const std::array<Vector3, 3> axes = mode_axes(lips.pairs[p].normal);
+    forces.emplace_back(Vector3::Zero());
+    for (int m = 0; m < lips.modes; ++m)
+      forces.back() += state.forces[lips.modes * p + m] * axes[m];
+  }
+  return forces;
+}
+
 CutContactState press(const ContactPatch& patch, const LipPatch& lips, const topology::ToolShape& tool,
                       const topology::ToolPose& pose, const ContactOptions& options, const CutContactState* previous) {
   return settle(patch, lips, options.gap_tolerance, previous != nullptr ? previous->lips.closed : std::vector<char>{},

@@ -56,6 +56,9 @@ struct LipState {
 LipState close_lips(const LipPatch& lips, const VectorX& free_opening, double tolerance,
                     const std::vector<char>& closed = {});
 
+/// Force on the `plus` node of every pair, N; that on `minus` is opposite.
+std::vector<Vector3> pair_forces(const LipPatch& lips, const LipState& state);
+
 /// Tool and lips in contact together.
 struct CutContactState {
   ContactState tool;

@@ -30,14 +30,37 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     text += fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
                         solvers::to_string(session.scenario().method.method),
                         session.body()->report().condition_estimate, found.largest_residual);
-  } else {
+  } else if (session.scenario().tool) {
     text += fmt::format("no contact: the force is zero in all {} steps\n", found.steps);
+  }
+  if (session.cuts()) {
+    const CutReport& cut = found.cut;
+    text +=
+        fmt::format("cut of {:.4g} cm2 with a front of {:.3g} cm in {} increments; opens by up to {:.3g} mm, {:.3g} "
+                    "ml between its faces\n",
+                    1e4 * cut.area, 1e2 * cut.front_length, found.increments, 1e3 * found.largest_opening,
+                    1e6 * cut.opening_volume);
+    text += fmt::format("  {} piece{}:", cut.pieces, cut.pieces == 1 ? "" : "s");
+    for (const double volume : cut.volumes)
+      text += fmt::format(" {:.4g} ml", 1e6 * volume);
+    text += fmt::format("; {} pairs of lip nodes, {} closed; {} nodes\n", cut.lip_pairs, cut.closed_pairs, cut.nodes);
+    if (found.refused_cuts > 0)
+      text += fmt::format("  {} increments refused, see cuts.csv\n", found.refused_cuts);
   }
   for (const std::string& remark : output.remarks())
     text += fmt::format("warning: {}\n", remark);
   text += fmt::format("results in {}:", out.string());
   for (const std::string& file : output.files())
     text += " " + file;
+  return text;
+}
+
+std::string step_text(const StepResult& step) {
+  std::string text = fmt::format("t = {:.3g} s", step.time);
+  if (step.candidates > 0 || !step.cut)
+    text += fmt::format(", force {:.4g} N", step.force.norm());
+  if (step.cut)
+    text += fmt::format(", cut {:.3g} cm2, open {:.2g} mm", 1e4 * step.cut->area, 1e3 * step.cut->opening);
   return text;
 }
 
@@ -77,15 +100,14 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
   RunOutput output(out, session);
   RunEnd end = RunEnd::complete;
   try {
-    for (const ToolSample& sample : session.motion()) {
+    for (const StepSample& sample : session.steps()) {
       if (watch.interrupted()) {
         end = RunEnd::interrupted;
         break;
       }
       const StepResult result = session.step(sample);
       output.add(session, result);
-      progress.step(output.findings().steps, session.motion().size(),
-                    fmt::format("t = {:.3g} s, force {:.4g} N", result.time, result.force.norm()));
+      progress.step(output.findings().steps, session.steps().size(), step_text(result));
     }
     output.draw_figures(session);
     output.write_summary(session, end == RunEnd::complete ? RunStatus::complete : RunStatus::interrupted, "");
@@ -106,10 +128,10 @@ void check_scenario(const std::filesystem::path& file, std::FILE* screen) {
   const auto say = [&](const std::string& line) { progress.say(line); };
   const Session session(read_scenario(file), say);
   say(short_text(session));
-  if (session.touches())
+  if (session.touches() || session.cuts())
     say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
-  say(fmt::format("{}: good, {} steps", file.string(), session.motion().size()));
+  say(fmt::format("{}: good, {} steps", file.string(), session.steps().size()));
 }
 
 } // namespace spherecut::app

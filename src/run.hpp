@@ -8,12 +8,13 @@ namespace spherecut::app {
 
 enum class RunEnd { complete, interrupted };
 
-/// Reads the scenario, moves the tool along its way, and leaves the results in `out`. Says how it goes on `screen`.
-/// SIGINT and SIGTERM end the run after the current step. Throws InputError and NumericalError; what was written until
-/// then stays.
+/// Reads the scenario, moves tool and blade along their ways, and leaves the results in `out`. Says how it goes on
+/// `screen`. SIGINT and SIGTERM end the run after the current step. Throws InputError and NumericalError; what was
+/// written until then stays.
 RunEnd run_scenario(const std::filesystem::path& scenario, const std::filesystem::path& out, std::FILE* screen);
 
-/// Everything that run_scenario() does before the first step: organ, motion, nodes, fixed regions. Throws InputError.
+/// Everything that run_scenario() does before the first step: organ, motion, precuts, nodes, fixed regions. Throws
+/// InputError.
 void check_scenario(const std::filesystem::path& scenario, std::FILE* screen);
 
 } // namespace spherecut::app

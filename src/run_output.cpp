@@ -24,11 +24,6 @@ std::string force_row(const StepResult& s) {
                      s.resprinkled ? 1 : 0, s.force_jump, s.seconds);
 }
 
-double von_mises(const Matrix3& stress) {
-  const Matrix3 deviator = stress - stress.trace() / 3 * Matrix3::Identity();
-  return std::sqrt(1.5) * deviator.norm();
-}
-
 struct SampledField {
   std::vector<Vector3> displacement; // m
   std::vector<double> von_mises;     // Pa
@@ -43,22 +38,6 @@ SampledField sample(const std::vector<solvers::PointState>& states) {
   return sampled;
 }
 
-// The field at any point of the organ; nothing has moved before the first contact. A point beyond every sphere takes
-// the state of the nearest node.
-solvers::PointState state_at(const Session& session, const Vector3& x) {
-  if (session.body() == nullptr || session.node_states().empty())
-    return {};
-  try {
-    return session.body()->at(x, session.field());
-  } catch (const InputError&) {
-    const std::vector<Vector3>& nodes = session.sprinkling().nodes.positions;
-    const auto nearest = std::min_element(nodes.begin(), nodes.end(), [&](const Vector3& a, const Vector3& b) {
-      return (a - x).squaredNorm() < (b - x).squaredNorm();
-    });
-    return session.node_states()[static_cast<std::size_t>(nearest - nodes.begin())];
-  }
-}
-
 std::vector<Vector3> moved(const std::vector<Vector3>& points, const std::vector<Vector3>& displacement) {
   std::vector<Vector3> out;
   out.reserve(points.size());
@@ -67,28 +46,71 @@ std::vector<Vector3> moved(const std::vector<Vector3>& points, const std::vector
   return out;
 }
 
+void write_organ(const std::filesystem::path& file, const Session& session) {
+  const topology::SurfaceMesh& surface = session.organ().domain->surface();
+  std::vector<solvers::PointState> states;
+  states.reserve(surface.vertices.size());
+  for (const Vector3& x : surface.vertices)
+    states.push_back(session.at(x));
+  const SampledField skin = sample(states);
+  write_vtp(file, moved(surface.vertices, skin.displacement), surface.triangles,
+            {vector_data("displacement [m]", skin.displacement), scalar_data("von Mises stress [Pa]", skin.von_mises)});
+}
+
 // Height of the underside of the tool above the tangent plane at `origin`, mm, along one vertical; NaN beside the tool.
 double underside(const Session& session, const topology::ToolPose& pose, const Vector3& foot, const Vector3& up,
                  double reach) {
   constexpr int samples = 400;
   for (int i = 0; i <= samples; ++i) {
     const double height = reach * (2.0 * i / samples - 1);
-    if (topology::tool_distance(session.scenario().tool.shape, pose, foot + height * up) <= 0)
+    if (topology::tool_distance(session.scenario().tool->shape, pose, foot + height * up) <= 0)
       return 1e3 * height;
   }
   return std::nan("");
 }
 
+Figure force_figure(const Session& session, const std::vector<StepResult>& history) {
+  Figure force;
+  force.title = session.scenario().title.empty() ? "Force on the tool" : session.scenario().title;
+  force.x_label = "time [s]";
+  force.y_label = "force on the tool [N]";
+  force.series = {{"|F|", {}, {}, SeriesStyle::lines_and_points},
+                  {"x", {}, {}, SeriesStyle::lines},
+                  {"y", {}, {}, SeriesStyle::lines},
+                  {"z", {}, {}, SeriesStyle::lines}};
+  for (const StepResult& step : history)
+    for (std::size_t k = 0; k < 4; ++k) {
+      force.series[k].x.push_back(step.time);
+      force.series[k].y.push_back(k == 0 ? step.force.norm() : step.force[static_cast<Eigen::Index>(k) - 1]);
+    }
+  return force;
+}
+
 } // namespace
 
-RunOutput::RunOutput(std::filesystem::path folder, const Session& session)
-    : folder_(std::move(folder)), forces_(folder_ / "forces.csv") {
-  findings_.planned = session.motion().size();
-  forces_.write(force_columns);
+RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : folder_(std::move(folder)) {
+  findings_.planned = session.steps().size();
+  const auto open = [this](std::optional<OutputFile>& file, const std::string& name, std::string_view columns) {
+    file.emplace(folder_ / name);
+    file->write(columns);
+    files_.push_back(name);
+  };
+  if (session.scenario().tool)
+    open(forces_, "forces.csv", force_columns);
+  if (session.cuts())
+    open(cuts_, "cuts.csv", cut_columns());
 }
 
 void RunOutput::add(const Session& session, const StepResult& step) {
-  forces_.write(force_row(step));
+  if (forces_)
+    forces_->write(force_row(step));
+  if (step.cut) {
+    cuts_->write(cut_row(step.time, *step.cut));
+    findings_.cut = *step.cut;
+    findings_.largest_opening = std::max(findings_.largest_opening, step.cut->opening);
+    findings_.increments += step.cut->triangles > 0 ? 1 : 0;
+    findings_.refused_cuts += step.cut->refused ? 1 : 0;
+  }
   if (const int every = session.scenario().output.vtp_every;
       every > 0 && (findings_.steps % static_cast<std::size_t>(every) == 0 || findings_.steps + 1 == findings_.planned))
     add_frame(session, step);
@@ -113,14 +135,10 @@ void RunOutput::add_frame(const Session& session, const StepResult& step) {
   }
   const auto name = [&](std::string_view what) { return fmt::format("frames/{}_{:05}.vtp", what, findings_.steps); };
 
-  const topology::SurfaceMesh& surface = session.organ().domain->surface();
-  std::vector<solvers::PointState> states;
-  states.reserve(surface.vertices.size());
-  for (const Vector3& x : surface.vertices)
-    states.push_back(state_at(session, x));
-  const SampledField skin = sample(states);
-  write_vtp(folder_ / name("surface"), moved(surface.vertices, skin.displacement), surface.triangles,
-            {vector_data("displacement [m]", skin.displacement), scalar_data("von Mises stress [Pa]", skin.von_mises)});
+  if (session.cuts())
+    write_wound(folder_ / name("surface"), session);
+  else
+    write_organ(folder_ / name("surface"), session);
   series_.push_back({step.time, 0, name("surface")});
 
   const solvers::NodeCloud& nodes = session.sprinkling().nodes;
@@ -135,10 +153,16 @@ void RunOutput::add_frame(const Session& session, const StepResult& step) {
     series_.push_back({step.time, 1, name("nodes")});
   }
 
-  const topology::ToolShape& tool = session.scenario().tool.shape;
-  const topology::SurfaceMesh mesh = topology::tool_mesh(tool, step.pose, topology::tip_radius(tool) / 6);
-  write_vtp(folder_ / name("tool"), mesh.vertices, mesh.triangles, {});
-  series_.push_back({step.time, 2, name("tool")});
+  if (session.scenario().tool) {
+    const topology::ToolShape& tool = session.scenario().tool->shape;
+    const topology::SurfaceMesh mesh = topology::tool_mesh(tool, step.pose, topology::tip_radius(tool) / 6);
+    write_vtp(folder_ / name("tool"), mesh.vertices, mesh.triangles, {});
+    series_.push_back({step.time, 2, name("tool")});
+  }
+  if (session.incision() != nullptr) {
+    write_incision(folder_ / name("incision"), *session.incision());
+    series_.push_back({step.time, 3, name("incision")});
+  }
   write_pvd(folder_ / "series.pvd", series_);
 }
 
@@ -159,7 +183,7 @@ void RunOutput::keep_profile(const Session& session, const StepResult& step) {
   for (int i = -samples; i <= samples; ++i) {
     const double s = reach * i / samples;
     const Vector3 x = session.organ().domain->closest_surface_point(origin + s * along);
-    const Vector3 y = x + state_at(session, x).displacement;
+    const Vector3 y = x + session.at(x).displacement;
     rest.x.push_back(1e3 * along.dot(x - origin));
     rest.y.push_back(1e3 * up.dot(x - origin));
     deformed.x.push_back(1e3 * along.dot(y - origin));
@@ -177,29 +201,29 @@ void RunOutput::keep_profile(const Session& session, const StepResult& step) {
 void RunOutput::draw_figures(const Session& session) {
   if (!session.scenario().output.figures || history_.empty())
     return;
-  Figure force;
-  force.title = session.scenario().title.empty() ? "Force on the tool" : session.scenario().title;
-  force.x_label = "time [s]";
-  force.y_label = "force on the tool [N]";
-  force.series = {{"|F|", {}, {}, SeriesStyle::lines_and_points},
-                  {"x", {}, {}, SeriesStyle::lines},
-                  {"y", {}, {}, SeriesStyle::lines},
-                  {"z", {}, {}, SeriesStyle::lines}};
-  for (const StepResult& step : history_)
-    for (std::size_t k = 0; k < 4; ++k) {
-      force.series[k].x.push_back(step.time);
-      force.series[k].y.push_back(k == 0 ? step.force.norm() : step.force[static_cast<Eigen::Index>(k) - 1]);
-    }
   try {
-    write_png(force, folder_ / "force.png");
-    files_.emplace_back("force.png");
-    if (!profile_.series.empty()) {
-      write_png(profile_, folder_ / "profile.png");
-      files_.emplace_back("profile.png");
+    if (session.scenario().tool)
+      draw(force_figure(session, history_), "force.png");
+    if (!profile_.series.empty())
+      draw(profile_, "profile.png");
+    if (session.cuts()) {
+      std::vector<double> times;
+      std::vector<CutReport> reports;
+      for (const StepResult& step : history_) {
+        times.push_back(step.time);
+        reports.push_back(*step.cut);
+      }
+      for (const auto& [name, figure] : cut_figures(times, reports))
+        draw(figure, name);
     }
   } catch (const InputError& error) {
     remarks_.push_back(fmt::format("figures: {}", error.what()));
   }
+}
+
+void RunOutput::draw(const Figure& figure, const std::string& name) {
+  write_png(figure, folder_ / name);
+  files_.push_back(name);
 }
 
 void RunOutput::write_summary(const Session& session, RunStatus status, const std::string& message) {

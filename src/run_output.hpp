@@ -1,7 +1,7 @@
-// What a run leaves behind: forces.csv row by row, VTP frames in a PVD series, figures, summary.json.
+// What a run leaves behind: forces.csv and cuts.csv row by row, VTP frames in a PVD series, figures, summary.json.
 #pragma once
 
-#include "src/figure.hpp"
+#include "src/cut_output.hpp"
 #include "src/output_file.hpp"
 #include "src/session.hpp"
 #include "src/vtp.hpp"
@@ -18,12 +18,15 @@ struct RunFindings {
   StepResult peak;         // step of the largest force
   double largest_residual = 0, largest_rotation_degrees = 0;
   std::vector<std::pair<double, double>> resprinkles; // time, relative jump of the force
+  CutReport cut;                                      // of the last step
+  double largest_opening = 0;                         // m
+  int increments = 0, refused_cuts = 0;
 };
 
 class RunOutput {
  public:
-  /// Opens forces.csv in a folder of claim_results_folder(). Throws InputError when a file cannot be written; so do the
-  /// others.
+  /// Opens forces.csv, and cuts.csv when the scenario cuts, in a folder of claim_results_folder(). Throws InputError
+  /// when a file cannot be written; so do the others.
   RunOutput(std::filesystem::path folder, const Session& session);
 
   /// Adds the row, and the frame when one is due, of the step that the session has just done.
@@ -40,15 +43,16 @@ class RunOutput {
 
  private:
   void add_frame(const Session& session, const StepResult& step);
+  void draw(const Figure& figure, const std::string& name);
   void keep_profile(const Session& session, const StepResult& step);
 
   std::filesystem::path folder_;
-  OutputFile forces_;
+  std::optional<OutputFile> forces_, cuts_; // with a tool, with a cut
   RunFindings findings_;
   std::vector<SeriesEntry> series_;
   std::vector<StepResult> history_;
   Figure profile_;
-  std::vector<std::string> files_{"forces.csv"};
+  std::vector<std::string> files_;
   std::vector<std::string> remarks_;
 };
 

@@ -1,6 +1,6 @@
 #include "src/scenario.hpp"
 
-#include "src/scenario_document.hpp"
+#include "src/cut_reader.hpp"
 #include "topology/errors.hpp"
 
 #include <fmt/format.h>
@@ -8,20 +8,10 @@
 namespace spherecut::app {
 namespace {
 
-constexpr long most_steps = 1000000;
 constexpr double on_the_plane = 1e-9; // m, so that rounding does not lose the nodes of a face that bounds a region
 
 std::string text_of(const Vector3& v) {
   return fmt::format("[{:g}, {:g}, {:g}]", v.x(), v.y(), v.z());
-}
-
-// A direction of any length but zero, made a unit vector.
-Vector3 direction(const Section& section, std::string_view name, std::string_view key, Offences& offences) {
-  const Vector3 value = section.vector(key);
-  if (value.norm() > 0)
-    return value.normalized();
-  offences.add(section.line(key), fmt::format("{} = [0, 0, 0]: has no direction; allowed: any other vector", name));
-  return Vector3::UnitZ();
 }
 
 OrganSettings organ(const Section& section, const std::filesystem::path& scenario, Offences& offences) {
@@ -156,9 +146,10 @@ ToolSettings tool(const Section& section, Offences& offences) {
     const auto& path = std::get<std::vector<PathPoint>>(tool.motion);
     duration = path.empty() ? 0 : path.back().time - path.front().time;
   }
-  if (duration > 0 && tool.step > 0 && (tool.step > duration || duration / tool.step > most_steps))
-    offences.add(section.line("step"), fmt::format("tool.step = {:g} s: allowed for a motion of {:g} s: {:g} to {:g} s",
-                                                   tool.step, duration, duration / most_steps, duration));
+  if (duration > 0 && tool.step > 0 && (tool.step > duration || duration / tool.step > static_cast<double>(most_steps)))
+    offences.add(section.line("step"),
+                 fmt::format("tool.step = {:g} s: allowed for a motion of {:g} s: {:g} to {:g} s", tool.step, duration,
+                             duration / static_cast<double>(most_steps), duration));
   return tool;
 }
 
@@ -196,12 +187,21 @@ Scenario read_scenario(const std::filesystem::path& file) {
   scenario.method.quadrature = static_cast<int>(method.integer("quadrature"));
   if (root.has("gravity"))
     scenario.gravity = root.table("gravity").vector("acceleration");
-  scenario.tool = tool(root.table("tool"), offences);
+  scenario.pretension = material.strain("pretension");
+  if (root.has("tool"))
+    scenario.tool = tool(root.table("tool"), offences);
   const Section contact = root.table("contact");
   if (contact.text("condition") == "bonded")
     scenario.contact.condition = solvers::ContactCondition::bonded;
   scenario.contact.candidate_radius = contact.optional_number("candidate_radius").value_or(0);
   scenario.contact.follow_fraction = contact.number("follow_fraction");
+  for (const Section& section : root.tables("precut"))
+    scenario.precuts.push_back(precut(section, file, scenario.precuts.size() + 1, offences));
+  scenario.cut = cut(root.table("cut"));
+  if (root.has("blade"))
+    scenario.blade = blade(root.table("blade"), offences);
+  if (!scenario.tool && !scenario.blade && scenario.precuts.empty())
+    offences.add(1, "there is no tool, no blade and no precut: nothing to compute; allowed: one of them or more");
   const Section output = root.table("output");
   scenario.output = {static_cast<int>(output.integer("vtp_every")), output.boolean("figures")};
   offences.throw_if_any();

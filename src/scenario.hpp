@@ -1,8 +1,9 @@
-// A scenario file: organ, material, fixed regions, nodes, method, tool and its way, output. SI units throughout.
+// A scenario file: organ, material, fixed regions, nodes, method, tool and its way, cuts, output. SI units throughout.
 #pragma once
 
 #include "solvers/contact_solver.hpp"
 #include "solvers/discretisation.hpp"
+#include "src/cut_settings.hpp"
 #include "topology/tool.hpp"
 
 #include <cstdint>
@@ -102,9 +103,13 @@ struct Scenario {
   std::vector<FixedRegion> fixed;
   NodeSettings nodes;
   solvers::DiscretisationOptions method;
-  std::optional<Vector3> gravity; // m/s2
-  ToolSettings tool;
+  std::optional<Vector3> gravity;       // m/s2
+  Matrix3 pretension = Matrix3::Zero(); // strain that the tissue is stretched by in its given shape
+  std::optional<ToolSettings> tool;
   ContactSettings contact;
+  std::vector<PrecutSettings> precuts;
+  CutSettings cut;
+  std::optional<BladeSettings> blade;
   OutputSettings output;
 };
 

@@ -52,6 +52,10 @@ std::string_view wanted(const ScenarioKey& key) {
     return "a string";
   case KeyKind::vector:
     return "an array of three numbers";
+  case KeyKind::points:
+    return "an array of points, each three numbers";
+  case KeyKind::strain:
+    return "an array of three or six numbers";
   case KeyKind::axes:
     return "an array of strings";
   }
@@ -160,20 +164,36 @@ class Checker {
       out_of_range(key, name, node);
   }
 
-  void vector(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+  // False after a complaint about `node`, the value of the key or one of its points.
+  bool numbers(const ScenarioKey& key, const std::string& name, const toml::node& node) {
     const toml::array* array = node.as_array();
-    if (array == nullptr || array->size() != 3 ||
+    const bool size_fits =
+        array != nullptr && (array->size() == 3 || (key.kind == KeyKind::strain && array->size() == 6));
+    if (!size_fits ||
         !std::all_of(array->begin(), array->end(), [](const toml::node& entry) { return entry.is_number(); })) {
       wrong_type(key, name, node);
-      return;
+      return false;
     }
     for (const toml::node& entry : *array) {
       const double value = entry.value_or(std::nan(""));
       if (!std::isfinite(value) || !key.range.holds(value)) {
         out_of_range(key, name, node);
-        return;
+        return false;
       }
     }
+    return true;
+  }
+
+  void points(const ScenarioKey& key, const std::string& name, const toml::node& node) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr) {
+      wrong_type(key, name, node);
+      return;
+    }
+    std::size_t number = 1;
+    for (const toml::node& point : *array)
+      if (!numbers(key, fmt::format("{}[{}]", name, number++), point))
+        return;
   }
 
   void axes(const ScenarioKey& key, const std::string& name, const toml::node& node) {
@@ -228,7 +248,11 @@ class Checker {
       choice(key, name, node);
       break;
     case KeyKind::vector:
-      vector(key, name, node);
+    case KeyKind::strain:
+      numbers(key, name, node);
+      break;
+    case KeyKind::points:
+      points(key, name, node);
       break;
     case KeyKind::axes:
       axes(key, name, node);
@@ -317,6 +341,15 @@ void Offences::throw_if_any() {
   throw InputError(message);
 }
 
+namespace {
+
+Vector3 vector_of(const toml::array& array) {
+  return {array.get(0)->value<double>().value(), array.get(1)->value<double>().value(),
+          array.get(2)->value<double>().value()};
+}
+
+} // namespace
+
 struct Section::Value {
   const toml::node* node = nullptr;
   std::optional<toml::table> fallback{}; // owns the node when it is a fallback
@@ -377,9 +410,27 @@ std::string Section::text(std::string_view key) const {
 
 Vector3 Section::vector(std::string_view key) const {
   const Value value = require(key);
+  return vector_of(*value.node->as_array());
+}
+
+std::vector<Vector3> Section::points(std::string_view key) const {
+  const Value value = require(key);
+  std::vector<Vector3> all;
+  for (const toml::node& point : *value.node->as_array())
+    all.push_back(vector_of(*point.as_array()));
+  return all;
+}
+
+Matrix3 Section::strain(std::string_view key) const {
+  const Value value = require(key);
   const toml::array& array = *value.node->as_array();
-  return {array.get(0)->value<double>().value(), array.get(1)->value<double>().value(),
-          array.get(2)->value<double>().value()};
+  Matrix3 tensor = vector_of(array).asDiagonal();
+  if (array.size() == 6) {
+    tensor(1, 2) = tensor(2, 1) = array.get(3)->value<double>().value();
+    tensor(0, 2) = tensor(2, 0) = array.get(4)->value<double>().value();
+    tensor(0, 1) = tensor(1, 0) = array.get(5)->value<double>().value();
+  }
+  return tensor;
 }
 
 std::array<bool, 3> Section::axes(std::string_view key) const {
@@ -419,6 +470,14 @@ long Section::line(std::string_view key) const {
   const auto* table = static_cast<const toml::table*>(table_);
   const toml::node* node = key.empty() ? nullptr : table->get(key);
   return line_of(node == nullptr ? *table : *node);
+}
+
+Vector3 direction(const Section& section, std::string_view name, std::string_view key, Offences& offences) {
+  const Vector3 value = section.vector(key);
+  if (value.norm() > 0)
+    return value.normalized();
+  offences.add(section.line(key), fmt::format("{} = [0, 0, 0]: has no direction; allowed: any other vector", name));
+  return Vector3::UnitZ();
 }
 
 ScenarioDocument::ScenarioDocument(const std::filesystem::path& file) : text_(read_text(file)) {

@@ -40,6 +40,9 @@ class Section {
   [[nodiscard]] bool boolean(std::string_view key) const;
   [[nodiscard]] std::string text(std::string_view key) const;
   [[nodiscard]] Vector3 vector(std::string_view key) const;
+  [[nodiscard]] std::vector<Vector3> points(std::string_view key) const;
+  /// Symmetric tensor of [xx, yy, zz] or [xx, yy, zz, yz, xz, xy].
+  [[nodiscard]] Matrix3 strain(std::string_view key) const;
   [[nodiscard]] std::array<bool, 3> axes(std::string_view key) const;
   /// Sub-table; an empty section when the file leaves it out.
   [[nodiscard]] Section table(std::string_view key) const;
@@ -57,6 +60,10 @@ class Section {
   const void* table_ = nullptr;          // toml::table, null when the file leaves it out
   std::string path_;                     // as in scenario_keys()
 };
+
+/// The value of a vector key as a unit vector, whatever its length; a zero vector is an offence (`name`: of the key in
+/// messages) and gives the z axis.
+Vector3 direction(const Section& section, std::string_view name, std::string_view key, Offences& offences);
 
 class ScenarioDocument {
  public:

@@ -56,6 +56,11 @@ constexpr std::array keys = {
                 "Poisson's ratio nu. Soft tissue: 0.45 to 0.49; 0.5 (incompressible) cannot be computed.",
                 from(0, 0.499)},
     ScenarioKey{"material.density", number, "kg/m3", "1060.0", "Mass density, used by gravity alone.", above(0, 1e5)},
+    ScenarioKey{
+        "material.pretension", strain, "", "[0, 0, 0]",
+        "Strain by which the tissue is stretched in its given shape, so that a cut gapes: xx, yy, zz, and, when "
+        "six are given, the tensor components yz, xz, xy. 0.05 along x: 5 % longer than without stress.",
+        from(-0.5, 0.5)},
 
     ScenarioKey{"fixed", array_of_tables, "", "required",
                 "Regions that hold the organ: every surface node inside one is fixed. At least one region."},
@@ -78,14 +83,17 @@ constexpr std::array keys = {
     ScenarioKey{"fixed[].axes", axes, "", "[\"x\", \"y\", \"z\"]", "Components of the displacement that are held."},
 
     ScenarioKey{"nodes", table, "", "", "Sprinkling of the organ with nodes; left out: all defaults."},
-    ScenarioKey{"nodes.fine_spacing", number, "m", "", "Node spacing at the contact; left out: tip radius / 3.",
-                above(0, 1)},
+    ScenarioKey{
+        "nodes.fine_spacing", number, "m", "",
+        "Node spacing at the contact and the cuts; left out: tip radius / 3, or cut.front_spacing without a tool.",
+        above(0, 1)},
     ScenarioKey{"nodes.coarse_spacing", number, "m", "",
-                "Largest node spacing, far from the contact; left out: 1/10 of the largest extent, at least fine.",
+                "Largest node spacing, far from contact and cuts; left out: 1/10 of the largest extent, at least fine.",
                 above(0, 1)},
     ScenarioKey{"nodes.slope", number, "", "0.3", "Growth of the spacing per distance from the fine zone.",
                 above(0, 1)},
-    ScenarioKey{"nodes.fine_radius", number, "m", "", "Radius of the fine zone; left out: 1.5 tip radii.", above(0)},
+    ScenarioKey{"nodes.fine_radius", number, "m", "",
+                "Radius of the fine zone about the contact; left out: 1.5 tip radii.", above(0)},
     ScenarioKey{"nodes.count", integer, "", "",
                 "Number of nodes, about: both spacings are scaled by one factor to reach it; left out: not scaled.",
                 from(20, 200000)},
@@ -111,7 +119,8 @@ constexpr std::array keys = {
     ScenarioKey{"gravity.acceleration", vector, "m/s2", "required", "Acceleration, e.g. [0, 0, -9.81].",
                 from(-100, 100)},
 
-    ScenarioKey{"tool", table, "", "required", "The rigid tool and its way."},
+    ScenarioKey{"tool", table, "", "",
+                "The rigid tool and its way; left out: none, then there is a blade or a precut."},
     ScenarioKey{"tool.shape",
                 choice,
                 "",
@@ -173,6 +182,99 @@ constexpr std::array keys = {
                 "The fine zone follows when the contact has left its centre by this fraction of the fine radius.",
                 above(0, 1)},
 
+    ScenarioKey{"precut", array_of_tables, "", "",
+                "Cuts that are there from the start, as many as needed: sheets without thickness, inside the organ or "
+                "reaching out of it. Left out: none."},
+    ScenarioKey{"precut[].shape", choice, "", "required", "Kind of sheet.", {}, "disc, rectangle, polygon, file"},
+    ScenarioKey{"precut[].centre", vector, "m", "required", "Centre.", {}, "", "shape = disc, rectangle"},
+    ScenarioKey{"precut[].normal",
+                vector,
+                "",
+                "required",
+                "Normal of the sheet, any length.",
+                {},
+                "",
+                "shape = disc, rectangle"},
+    ScenarioKey{"precut[].radius", number, "m", "required", "Radius.", above(0, 10), "", "shape = disc"},
+    ScenarioKey{"precut[].up",
+                vector,
+                "",
+                "required",
+                "Direction of the height, any length; its part along the normal is ignored.",
+                {},
+                "",
+                "shape = rectangle"},
+    ScenarioKey{"precut[].width", number, "m", "required", "Size across up.", above(0, 10), "", "shape = rectangle"},
+    ScenarioKey{"precut[].height", number, "m", "required", "Size along up.", above(0, 10), "", "shape = rectangle"},
+    ScenarioKey{"precut[].points",
+                points,
+                "m",
+                "required",
+                "Corners of a plane polygon, in order around it; three or more.",
+                {},
+                "",
+                "shape = polygon"},
+    ScenarioKey{"precut[].file",
+                text,
+                "",
+                "required",
+                "OBJ, PLY, STL or OFF file of a surface, open or closed, relative to the scenario file.",
+                {},
+                "",
+                "shape = file"},
+    ScenarioKey{"precut[].scale", number, "", "1", "Metres per unit of the file (0.001 for millimetres).",
+                above(0, 1e6), "", "shape = file"},
+    ScenarioKey{"precut[].pressure", number, "Pa", "0.0", "Pressure on both faces; positive pushes them apart.",
+                from(-1e9, 1e9)},
+
+    ScenarioKey{"cut", table, "", "", "How cuts are computed; left out: all defaults."},
+    ScenarioKey{
+        "cut.sight",
+        choice,
+        "",
+        "",
+        "How a sphere reaches around a cut: it ends where the cut hides its node, it bends around the front, or "
+        "it bends and the basis gains the field of a crack front. Left out: the method's own.",
+        {},
+        "visibility, diffraction, enriched"},
+    ScenarioKey{"cut.lips",
+                choice,
+                "",
+                "\"frictionless\"",
+                "Contact between the faces of a cut: none (they may go through one another), sliding, or sticking.",
+                {},
+                "open, frictionless, sticking"},
+    ScenarioKey{"cut.unheld",
+                choice,
+                "",
+                "\"hold\"",
+                "A severed piece that no fixed region holds: the cut is refused, the piece stays where it was at rest, "
+                "or it leaves the computation.",
+                {},
+                "refuse, hold, drop"},
+    ScenarioKey{
+        "cut.front_spacing", number, "m", "",
+        "Node spacing at the cuts and along the way of the blade, where it is finer than nodes.fine_spacing; left "
+        "out: that, or without it and without a tool a sixth of the root of the smallest precut's area, for a "
+        "blade a twelfth of its edge.",
+        above(0, 1)},
+
+    ScenarioKey{"blade", table, "", "", "A blade that cuts along its way; left out: none."},
+    ScenarioKey{"blade.edge", points, "m", "required",
+                "Cutting edge in the blade's own frame, from end to end; two points or more.", from(-10, 10)},
+    ScenarioKey{"blade.edge_radius", number, "m", "0.0001", "Radius of the cutting edge.", above(0, 0.01)},
+    ScenarioKey{"blade.step", number, "s", "",
+                "Time step; left out: such that the edge moves by about one spacing of the front in a step.", above(0)},
+    ScenarioKey{"blade.path", array_of_tables, "", "required",
+                "Poses of the blade, between which it moves evenly; at least two. It cuts whatever its edge sweeps."},
+    ScenarioKey{"blade.path[].time", number, "s", "required", "Time, rising from pose to pose.", from(0)},
+    ScenarioKey{"blade.path[].position", vector, "m", "required", "Origin of the blade's frame."},
+    ScenarioKey{
+        "blade.path[].rotation", vector, "degrees", "[0, 0, 0]",
+        "Turn of the blade's frame: about the axis along this vector, by its length. [0, 0, 90]: a quarter turn "
+        "about z.",
+        from(-360, 360)},
+
     ScenarioKey{"output", table, "", "", "What is written; left out: all defaults."},
     ScenarioKey{"output.vtp_every", integer, "", "1", "Steps between two VTP frames; 0: none.", from(0, 1e6)},
     ScenarioKey{"output.figures", boolean, "", "true", "Draw PNG figures at the end."},
@@ -195,6 +297,10 @@ std::string_view name_of(KeyKind kind) {
     return "string";
   case vector:
     return "[x, y, z]";
+  case points:
+    return "array of [x, y, z]";
+  case strain:
+    return "three or six numbers";
   case axes:
     return "array of strings";
   }
@@ -254,7 +360,7 @@ std::string allowed_values(const ScenarioKey& key) {
   if (std::isfinite(key.range.lower))
     text += fmt::format("{:g} {} ", key.range.lower, key.range.lower_open ? "<" : "<=");
   if (std::isfinite(key.range.lower) || std::isfinite(key.range.upper))
-    text += key.kind == vector ? "each" : "value";
+    text += key.kind == vector || key.kind == points || key.kind == strain ? "each" : "value";
   if (std::isfinite(key.range.upper))
     text += fmt::format(" {} {:g}", key.range.upper_open ? "<" : "<=", key.range.upper);
   return text;

@@ -18,6 +18,8 @@ enum class KeyKind {
   text,
   choice, // one of ScenarioKey::choices
   vector, // array of three finite numbers
+  points, // array of vectors, any number
+  strain, // array of three or six finite numbers
   axes,   // array of distinct "x", "y", "z", not empty
 };
 

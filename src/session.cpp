@@ -1,12 +1,12 @@
 #include "src/session.hpp"
 
-#include "solvers/contact_rings.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <numbers>
 
 namespace spherecut::app {
@@ -16,7 +16,6 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
-constexpr int most_iterations = 300;        // of the contact: deep presses converge slowly
 
 // Adds its lifetime to a stage of the profile.
 class StageTimer {
@@ -36,75 +35,67 @@ Organ timed_organ(const OrganSettings& settings, double& seconds) {
   return make_organ(settings);
 }
 
-FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain) {
-  const NodeSettings& nodes = scenario.nodes;
-  const double tip = topology::tip_radius(scenario.tool.shape);
-  FineZone zone;
-  zone.spacing.fine = nodes.fine_spacing > 0 ? nodes.fine_spacing : tip / 3;
-  zone.spacing.coarse = nodes.coarse_spacing > 0
-                            ? nodes.coarse_spacing
-                            : std::max(zone.spacing.fine, domain.bounds().extent().maxCoeff() / 10);
-  if (zone.spacing.coarse < zone.spacing.fine)
-    throw InputError(fmt::format("nodes.coarse_spacing = {:g} m is below the fine spacing, one third of the tip radius "
-                                 "= {:g} m; allowed: at least that, or give nodes.fine_spacing",
-                                 zone.spacing.coarse, zone.spacing.fine));
-  zone.spacing.slope = nodes.slope;
-  zone.spacing.radius = nodes.fine_radius > 0 ? nodes.fine_radius : 1.5 * tip;
-  return zone;
-}
-
-// A node at the contact; about a flat punch on a flat surface also rings on both sides of its edge, where the pressure
-// peaks.
-std::vector<solvers::SeedNode> contact_seeds(const Scenario& scenario, const topology::Domain& domain,
-                                             const topology::SurfaceContact& contact, double spacing) {
-  std::vector<solvers::SeedNode> tip{{contact.point, solvers::NodeKind::surface}};
-  const auto* punch = std::get_if<topology::FlatPunch>(&scenario.tool.shape);
-  if (punch == nullptr || punch->radius < 2 * spacing)
-    return tip;
-  const auto flat = [&](const solvers::SeedNode& seed) {
-    return domain.normal(seed.position).dot(contact.normal) > 0.95 &&
-           std::abs((seed.position - contact.point).dot(contact.normal)) < 0.25 * spacing;
-  };
-  try {
-    std::vector<solvers::SeedNode> rings =
-        solvers::contact_rings(domain, contact.point, contact.normal, punch->radius, spacing,
-                               solvers::contact_ring_offset(scenario.method.method));
-    return std::all_of(rings.begin(), rings.end(), flat) ? rings : tip;
-  } catch (const InputError&) { // the end of the punch reaches over the edge of the organ
-    return tip;
-  }
-}
-
 } // namespace
 
 Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     : scenario_(std::move(scenario)), say_(std::move(say)), organ_(timed_organ(scenario_.organ, profile_.organ)),
-      query_(organ_.domain->surface()), motion_(tool_motion(scenario_.tool, query_, *organ_.domain)),
-      touch_(first_touch(scenario_.tool, motion_, query_)) {
+      query_(organ_.domain->surface()) {
   for (const std::string& remark : organ_.remarks)
     warn(remark, remark);
   zone_ = fine_zone(scenario_, *organ_.domain);
+  std::vector<ToolSample> motion;
+  if (scenario_.tool) {
+    motion = tool_motion(*scenario_.tool, query_, *organ_.domain);
+    touch_ = first_touch(*scenario_.tool, motion, query_);
+  }
+  steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
   if (scenario_.method.method == solvers::Method::published)
     warn("published", "the published scheme does not converge and its force is not one in newtons: see docs");
-  if (!touch_) {
+  if (scenario_.tool && !touch_)
     warn("touch", "the tool never touches the organ on its way");
-    return;
+  if (cuts()) {
+    const StageTimer timer(profile_.topology);
+    incisions_ = std::make_unique<IncisionBuilder>(scenario_, organ_.domain, sheet_edge(zone_));
+    model_.incision = incisions_->incision();
+    incisions_->update_fields();
+    check_pieces(steps_.front().time);
   }
-  sprinkle(centre_of(touch_->contact, touch_->pose));
-  static_cast<void>(fixed_nodes());
+  if (!touch_ && !cuts())
+    return;
+  if (touch_)
+    zone_contact_ = centre_of(touch_->contact, touch_->pose);
+  lay_out_zone();
+  sprinkle(nullptr, model_);
+  static_cast<void>(fixed_nodes(scenario_, *organ_.domain, model_.sprinkling.nodes));
+}
+
+// Fine at the contact, at the fronts of the precuts, and where the blade is going to cut.
+void Session::lay_out_zone() {
+  if (zone_contact_)
+    zone_.spacing.centres = {zone_contact_->point};
+  zone_.spacing.segments.clear();
+  if (scenario_.blade)
+    zone_.spacing.segments = blade_tracks(*scenario_.blade, *organ_.domain, 2 * zone_.spacing.fine);
+  if (!scenario_.precuts.empty()) {
+    const auto fronts = solvers::front_segments(*model_.incision, zone_.spacing.fine);
+    zone_.spacing.segments.insert(zone_.spacing.segments.end(), fronts.begin(), fronts.end());
+  }
+  if (scenario_.nodes.count > 0)
+    zone_.spacing =
+        solvers::spacing_for_count(*organ_.domain, zone_.spacing, scenario_.nodes.count, sprinkle_options(model_));
 }
 
 topology::SurfaceContact Session::find_contact(const topology::ToolPose& pose) const {
-  const bool near = last_contact_ && last_contact_->depth > -topology::tip_radius(scenario_.tool.shape);
-  return near ? query_.walk(scenario_.tool.shape, pose, *last_contact_)
-              : query_.first_touch(scenario_.tool.shape, pose);
+  const topology::ToolShape& shape = scenario_.tool->shape;
+  const bool near = last_contact_ && last_contact_->depth > -topology::tip_radius(shape);
+  return near ? query_.walk(shape, pose, *last_contact_) : query_.first_touch(shape, pose);
 }
 
 // Where fine nodes belong: at the contact; under a flat punch, whose deepest point may be anywhere on its end, below
 // the middle of that.
 topology::SurfaceContact Session::centre_of(const topology::SurfaceContact& contact,
                                             const topology::ToolPose& pose) const {
-  const auto* punch = std::get_if<topology::FlatPunch>(&scenario_.tool.shape);
+  const auto* punch = std::get_if<topology::FlatPunch>(&scenario_.tool->shape);
   if (punch == nullptr)
     return contact;
   topology::SurfaceContact centre = contact;
@@ -114,35 +105,36 @@ topology::SurfaceContact Session::centre_of(const topology::SurfaceContact& cont
   return below ? centre : contact;
 }
 
-StepResult Session::step(const ToolSample& sample) {
+StepResult Session::step(const StepSample& sample) {
   StepResult result;
   result.time = sample.time;
-  result.pose = sample.pose;
   const auto start = std::chrono::steady_clock::now();
-  result.contact = find_contact(sample.pose);
-  last_contact_ = result.contact;
-  // Without weight the organ keeps its rest shape until the tool is on it.
-  const bool loaded = touch_ && (result.contact.depth > 0 || body_ != nullptr || scenario_.gravity);
+  if (sample.tool) {
+    result.pose = *sample.tool;
+    result.contact = find_contact(*sample.tool);
+    last_contact_ = result.contact;
+  }
+  if (cuts())
+    result.cut.emplace();
+  const bool solved = sample.blade && cut(sample, *result.cut);
+  // Without any load the organ keeps its rest shape until the tool is on it.
+  const bool touched = touch_ && result.contact.depth > 0;
+  const bool loaded = (touch_ || cuts()) && (touched || model_.body != nullptr || scenario_.gravity ||
+                                             !scenario_.pretension.isZero() || model_.incision != nullptr);
   if (loaded) {
-    if (body_ == nullptr)
-      build();
-    press(sample.pose);
-    const topology::SurfaceContact centre = centre_of(result.contact, sample.pose);
-    if (must_follow(centre)) {
-      const Vector3 before = state_->tool_force;
-      say_(fmt::format("the fine zone follows the tool, t = {:g} s", sample.time));
-      sprinkle(centre);
-      build();
-      press(sample.pose);
-      result.resprinkled = true;
-      result.force_jump = before.norm() > 0 ? (state_->tool_force - before).norm() / before.norm() : 0;
-      if (result.force_jump > allowed_force_jump)
-        warn("jump", fmt::format("the force jumped by {:.1f} % at a re-sprinkle (t = {:g} s); finer nodes or a larger "
-                                 "fine radius bring it under {:g} %",
-                                 100 * result.force_jump, sample.time, 100 * allowed_force_jump));
+    if (model_.body == nullptr)
+      build(model_);
+    if (!solved)
+      solve(sample, model_);
+    if (touch_) {
+      const topology::SurfaceContact centre = centre_of(result.contact, result.pose);
+      if (must_follow(centre))
+        follow(sample, centre, result);
     }
     evaluate(result);
   }
+  if (result.cut)
+    report_cut(*result.cut);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }
@@ -151,172 +143,277 @@ StepResult Session::step(const ToolSample& sample) {
 bool Session::must_follow(const topology::SurfaceContact& contact) const {
   if (scenario_.contact.condition == solvers::ContactCondition::bonded || contact.depth <= 0)
     return false;
-  const double away = (contact.point - zone_contact_.point).norm();
+  const double away = (contact.point - zone_contact_->point).norm();
   return away > scenario_.contact.follow_fraction * zone_.spacing.radius;
 }
 
-solvers::SprinkleOptions Session::sprinkle_options(const topology::SurfaceContact& contact) const {
+void Session::follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result) {
+  const Vector3 before = model_.state->tool.tool_force;
+  say_(fmt::format("the fine zone follows the tool, t = {:g} s", sample.time));
+  zone_contact_ = centre;
+  zone_.spacing.centres = {centre.point};
+  BodyModel next;
+  next.incision = model_.incision;
+  sprinkle(&model_.sprinkling.nodes, next);
+  build(next);
+  solve(sample, next);
+  model_ = std::move(next);
+  result.resprinkled = true;
+  const Vector3& after = model_.state->tool.tool_force;
+  result.force_jump = before.norm() > 0 ? (after - before).norm() / before.norm() : 0;
+  if (result.force_jump > allowed_force_jump)
+    warn("jump", fmt::format("the force jumped by {:.1f} % at a re-sprinkle (t = {:g} s); finer nodes or a larger fine "
+                             "radius bring it under {:g} %",
+                             100 * result.force_jump, sample.time, 100 * allowed_force_jump));
+}
+
+solvers::SprinkleOptions Session::sprinkle_options(const BodyModel& model) const {
   solvers::SprinkleOptions options;
   options.spacing = zone_.spacing;
-  options.spacing.centres = {contact.point};
-  options.seeds = contact_seeds(scenario_, *organ_.domain, contact, zone_.spacing.fine);
+  if (zone_contact_)
+    options.seeds = contact_seeds(scenario_, *organ_.domain, *zone_contact_, zone_.spacing.fine);
   options.random_seed = scenario_.nodes.random_seed;
+  options.incision = model.incision;
   return options;
 }
 
-void Session::sprinkle(const topology::SurfaceContact& contact) {
+void Session::sprinkle(const solvers::NodeCloud* previous, BodyModel& model) {
   const StageTimer timer(profile_.sprinkle);
-  const bool first = sprinkling_.nodes.size() == 0;
-  if (first && scenario_.nodes.count > 0) {
-    zone_.spacing.centres = {contact.point};
-    zone_.spacing =
-        solvers::spacing_for_count(*organ_.domain, zone_.spacing, scenario_.nodes.count, sprinkle_options(contact));
-  }
-  const solvers::SprinkleOptions options = sprinkle_options(contact);
-  sprinkling_ = first ? solvers::sprinkle(*organ_.domain, options)
-                      : solvers::resprinkle(*organ_.domain, options, sprinkling_.nodes);
-  zone_contact_ = contact;
-  zone_.candidate_radius = scenario_.contact.candidate_radius > 0 ? scenario_.contact.candidate_radius
-                                                                  : zone_.spacing.radius + 2 * zone_.spacing.fine;
-}
-
-std::vector<solvers::Prescribed> Session::fixed_nodes() const {
-  const solvers::NodeCloud& nodes = sprinkling_.nodes;
-  std::vector<solvers::Prescribed> prescribed;
-  std::vector<int> held(scenario_.fixed.size(), 0);
-  for (int i = 0; i < nodes.size(); ++i) {
-    if (nodes.kinds[i] == solvers::NodeKind::interior)
-      continue;
-    solvers::Prescribed entry{i, {false, false, false}, Vector3::Zero()};
-    for (std::size_t r = 0; r < scenario_.fixed.size(); ++r)
-      if (scenario_.fixed[r].holds(nodes.positions[i])) {
-        ++held[r];
-        for (int c = 0; c < 3; ++c)
-          entry.components[c] = entry.components[c] || scenario_.fixed[r].components[c];
-      }
-    if (entry.components[0] || entry.components[1] || entry.components[2])
-      prescribed.push_back(entry);
-  }
-  for (std::size_t r = 0; r < scenario_.fixed.size(); ++r)
-    if (held[r] == 0) {
-      const BoundingBox box = organ_.domain->bounds();
-      throw InputError(fmt::format("{}:{}: fixed region '{}' holds no surface node; the organ spans [{:.4g}, {:.4g}, "
-                                   "{:.4g}] to [{:.4g}, {:.4g}, {:.4g}] m: move or widen the region, or sprinkle finer",
-                                   scenario_.file.string(), scenario_.fixed[r].line, scenario_.fixed[r].name,
-                                   box.lower.x(), box.lower.y(), box.lower.z(), box.upper.x(), box.upper.y(),
-                                   box.upper.z()));
-    }
-  return prescribed;
+  const solvers::SprinkleOptions options = sprinkle_options(model);
+  model.sprinkling = previous == nullptr ? solvers::sprinkle(*organ_.domain, options)
+                                         : solvers::resprinkle(*organ_.domain, options, *previous);
 }
 
 // Surface nodes near the contact on its side of the organ, without those that are held.
-std::vector<int> Session::candidates() const {
-  const solvers::NodeCloud& nodes = sprinkling_.nodes;
-  std::vector<char> held(nodes.size(), 0);
-  for (const solvers::Prescribed& entry : body_->problem().prescribed)
+std::vector<int> Session::candidates(const BodyModel& model) const {
+  const solvers::NodeCloud& nodes = model.sprinkling.nodes;
+  std::vector<char> held(nodes.positions.size(), 0);
+  for (const solvers::Prescribed& entry : model.body->problem().prescribed)
     held[entry.node] = 1;
   std::vector<int> near;
   for (int i = 0; i < nodes.size(); ++i)
-    if (nodes.kinds[i] != solvers::NodeKind::interior && held[i] == 0 &&
-        (nodes.positions[i] - zone_contact_.point).norm() <= zone_.candidate_radius &&
-        nodes.normals[i].dot(zone_contact_.normal) > 0)
+    if (on_surface(nodes.kinds[i]) && held[i] == 0 &&
+        (nodes.positions[i] - zone_contact_->point).norm() <= zone_.candidate_radius &&
+        nodes.normals[i].dot(zone_contact_->normal) > 0)
       near.push_back(i);
   if (near.empty())
     throw InputError(fmt::format("no free surface node within {:g} m of the contact at [{:.4g}, {:.4g}, {:.4g}] m: the "
                                  "tool presses on a fixed region, or contact.candidate_radius is too small",
-                                 zone_.candidate_radius, zone_contact_.point.x(), zone_contact_.point.y(),
-                                 zone_contact_.point.z()));
+                                 zone_.candidate_radius, zone_contact_->point.x(), zone_contact_->point.y(),
+                                 zone_contact_->point.z()));
   return near;
 }
 
-void Session::build() {
+// Whether the tool can be on the surface, as far as that has moved by now.
+bool Session::tool_in_reach() const {
+  if (!touch_ || !last_contact_)
+    return false;
+  double moved = 0;
+  for (const solvers::PointState& state : node_states_)
+    moved = std::max(moved, state.displacement.norm());
+  return last_contact_->depth > -(2 * moved + zone_.spacing.radius + topology::tip_radius(scenario_.tool->shape));
+}
+
+void Session::build(BodyModel& model) {
   {
     const StageTimer timer(profile_.discretise);
-    solvers::Problem problem;
-    problem.domain = organ_.domain;
-    problem.nodes = sprinkling_.nodes;
-    problem.material = scenario_.material;
-    problem.prescribed = fixed_nodes();
-    const bool held_fully = std::all_of(scenario_.fixed.begin(), scenario_.fixed.end(), [](const FixedRegion& region) {
-      return region.components == std::array<bool, 3>{true, true, true};
-    });
-    if (held_fully)
-      problem.prescribed_region = [regions = scenario_.fixed](const Vector3& x, const Vector3&) {
-        return std::any_of(regions.begin(), regions.end(), [&](const FixedRegion& region) { return region.holds(x); });
-      };
-    if (scenario_.gravity) {
-      const Vector3 weight = scenario_.material.density * *scenario_.gravity;
-      problem.loads.body_force = [weight](const Vector3&) -> const Vector3& { return weight; };
-    }
-    say_(fmt::format("{} nodes, {} of them on the surface, {} fixed", problem.nodes.size(),
-                     sprinkling_.report.surface_nodes + sprinkling_.report.edge_nodes, problem.prescribed.size()));
-    body_ = solvers::discretise(std::move(problem), scenario_.method);
+    assemble(scenario_, organ_.domain, model);
+    const solvers::SprinkleReport& report = model.sprinkling.report;
+    say_(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",
+                     model.sprinkling.nodes.size(), report.surface_nodes + report.edge_nodes, report.lip_nodes,
+                     model.body->problem().prescribed.size()));
   }
-  condense(candidates());
+  condense(tool_in_reach() ? candidates(model) : std::vector<int>{}, model);
 }
 
-void Session::condense(const std::vector<int>& candidates) {
+void Session::condense(const std::vector<int>& candidates, BodyModel& model) {
   const StageTimer timer(profile_.condense);
-  patch_ = solvers::condense(*body_, candidates);
-  state_.reset();
+  app::condense(candidates, model);
 }
 
-void Session::press(const topology::ToolPose& pose) {
-  const solvers::ContactOptions options{.condition = scenario_.contact.condition,
-                                        .maximum_iterations = most_iterations};
+void Session::solve(const StepSample& sample, BodyModel& model) {
+  if (tool_in_reach() && model.patch.nodes.empty())
+    condense(candidates(model), model);
+  const ToolSettings* tool = scenario_.tool ? &*scenario_.tool : nullptr;
+  const topology::ToolPose* pose = sample.tool ? &*sample.tool : nullptr;
   for (int growth = 0; growth <= patch_growths; ++growth) {
     {
       const StageTimer timer(profile_.press);
-      state_ = solvers::press(patch_, scenario_.tool.shape, pose, options, state_ ? &*state_ : nullptr);
-      field_ = solvers::deform(patch_, *state_);
+      solve_contact(tool, pose, scenario_, model);
     }
-    const std::vector<int> missed = penetrated_outside_patch(pose);
+    if (model.patch.nodes.empty())
+      return;
+    const std::vector<int> missed = penetrated_outside_patch(*pose, model);
     if (missed.empty())
       return;
-    std::vector<int> grown = patch_.nodes;
+    std::vector<int> grown = model.patch.nodes;
     grown.insert(grown.end(), missed.begin(), missed.end());
     std::sort(grown.begin(), grown.end());
-    condense(grown);
+    condense(grown, model);
   }
   warn("patch", "the tool reaches surface nodes beyond its candidate patch; give a larger contact.candidate_radius");
 }
 
 // Surface nodes that the tool has gone into although they were not candidates.
-std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pose) const {
-  const solvers::NodeCloud& nodes = sprinkling_.nodes;
-  std::vector<char> known(nodes.size(), 0);
-  for (const int node : patch_.nodes)
+std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const {
+  const solvers::NodeCloud& nodes = model.sprinkling.nodes;
+  std::vector<char> known(nodes.positions.size(), 0);
+  for (const int node : model.patch.nodes)
     known[node] = 1;
-  for (const solvers::Prescribed& entry : body_->problem().prescribed)
+  for (const solvers::Prescribed& entry : model.body->problem().prescribed)
     known[entry.node] = 1;
   std::vector<int> missed;
   for (int i = 0; i < nodes.size(); ++i)
-    if (nodes.kinds[i] != solvers::NodeKind::interior && known[i] == 0 &&
-        topology::tool_distance(scenario_.tool.shape, pose,
-                                body_->contact_point(i) + body_->contact_displacement(i, field_)) <
+    if (on_surface(nodes.kinds[i]) && known[i] == 0 &&
+        topology::tool_distance(scenario_.tool->shape, pose,
+                                model.body->contact_point(i) + model.body->contact_displacement(i, model.field)) <
             -patch_gap * zone_.spacing.fine)
       missed.push_back(i);
   return missed;
 }
 
+// Where the material that is now at x was at rest. A place in the opening of a cut, where there is none, belongs to the
+// sheet.
+Vector3 Session::rest_position(const Vector3& x) const {
+  const auto displacement = [this](const Vector3& rest) { return at(rest).displacement; };
+  try {
+    return topology::rest_position(x, displacement, 1e-6 * zone_.spacing.fine);
+  } catch (const NumericalError&) {
+    const Vector3 guess = x - displacement(x);
+    if (model_.incision != nullptr)
+      if (const auto on = model_.incision->closest(guess, 4 * zone_.spacing.fine))
+        return on->point;
+    throw;
+  }
+}
+
+// Moves the blade; true when that cut something and the body with the new cut is built and solved. A refusal leaves
+// body, incision and wound as they were.
+bool Session::cut(const StepSample& sample, CutReport& report) {
+  topology::RestMap to_rest;
+  if (model_.state)
+    to_rest = [this](const Vector3& x) { return rest_position(x); };
+  topology::SweepResult swept;
+  const auto refuse = [&](const char* why) {
+    report.triangles = 0;
+    report.refused = true;
+    report.reason = why;
+    warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, why));
+  };
+  {
+    const StageTimer timer(report.seconds.topology);
+    try {
+      swept = incisions_->move_to(*sample.blade, to_rest);
+    } catch (const InputError& error) {
+      refuse(error.what());
+    } catch (const NumericalError& error) {
+      refuse(error.what());
+    }
+  }
+  report.triangles = swept.triangles;
+  if (swept.triangles == 0) {
+    if (!report.refused)
+      report.reason = swept.refused;
+    return false;
+  }
+  try {
+    BodyModel next;
+    next.incision = incisions_->incision();
+    require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
+    check_pieces(sample.time);
+    {
+      const StageTimer timer(report.seconds.level_sets);
+      incisions_->update_fields();
+    }
+    {
+      const StageTimer timer(report.seconds.sprinkling);
+      sprinkle(&model_.sprinkling.nodes, next);
+    }
+    build(next);
+    const solvers::AssemblyReport& assembly = next.body->report();
+    report.seconds.visibility = assembly.supports_seconds;
+    report.seconds.assembly = assembly.assembly_seconds;
+    {
+      const StageTimer timer(report.seconds.solve);
+      solve(sample, next);
+    }
+    report.seconds.solve += assembly.factor_seconds;
+    const std::vector<int>& from = next.sprinkling.kept_from;
+    report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+    profile_.topology += report.seconds.topology;
+    profile_.level_sets += report.seconds.level_sets;
+    model_ = std::move(next);
+    return true;
+  } catch (const InputError& error) {
+    refuse(error.what());
+  } catch (const NumericalError& error) {
+    refuse(error.what());
+  }
+  incisions_->take_back(*sample.blade, to_rest);
+  return false;
+}
+
+void Session::check_pieces(double time) {
+  const topology::Wound& wound = incisions_->wound();
+  require_pieces(wound, zone_.spacing);
+  const std::vector<int> unheld = unheld_pieces(wound, scenario_.fixed);
+  if (unheld.empty())
+    return;
+  const double volume = wound.pieces[static_cast<std::size_t>(unheld.front())].volume;
+  const std::string what = fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region",
+                                       unheld.size(), wound.pieces.size(), volume, unheld.size() == 1 ? "is" : "are");
+  if (scenario_.cut.unheld == UnheldRule::refuse)
+    throw InputError(fmt::format("{}; allowed by cut.unheld = \"refuse\": none", what));
+  warn(fmt::format("unheld {}", unheld.size()),
+       fmt::format("t = {:g} s: {}: {}", time, what,
+                   scenario_.cut.unheld == UnheldRule::hold ? "it stays where it was at rest"
+                                                            : "it leaves the computation"));
+}
+
+void Session::report_cut(CutReport& report) const {
+  const topology::Wound& wound = incisions_->wound();
+  if (model_.incision != nullptr) {
+    report.area = model_.incision->area();
+    report.front_length = model_.incision->front_length();
+    report.sheets = static_cast<int>(model_.incision->sheets().size());
+  }
+  report.pieces = static_cast<int>(wound.pieces.size());
+  for (const topology::WoundPiece& piece : wound.pieces)
+    report.volumes.push_back(piece.volume);
+  std::sort(report.volumes.rbegin(), report.volumes.rend());
+  report.unheld = static_cast<int>(unheld_pieces(wound, scenario_.fixed).size());
+  report.nodes = model_.sprinkling.nodes.size();
+  report.lip_pairs = static_cast<int>(model_.pairs.size());
+  if (model_.state) {
+    for (const double opening : normal_openings(model_))
+      report.opening = std::max(report.opening, opening);
+    report.opening_volume = opening_volume(wound, model_);
+    for (const char closed : model_.state->lips.closed)
+      report.closed_pairs += closed;
+    report.lips_converged = model_.state->lips.converged;
+  }
+  report.surface_hash = topology::surface_hash(wound.surface);
+}
+
 void Session::evaluate(StepResult& result) {
   const StageTimer timer(profile_.evaluate);
-  result.force = state_->tool_force;
-  result.contact_radius = state_->contact_radius;
-  result.active_nodes = state_->active_nodes;
-  result.candidates = static_cast<int>(patch_.nodes.size());
-  result.nodes = sprinkling_.nodes.size();
-  result.iterations = state_->iterations;
-  result.converged = state_->converged;
-  result.largest_penetration = state_->largest_penetration;
-  result.residual = body_->residual(field_, patch_.nodes, state_->nodal_forces);
+  const solvers::ContactState& tool = model_.state->tool;
+  result.force = tool.tool_force;
+  result.contact_radius = tool.contact_radius;
+  result.active_nodes = tool.active_nodes;
+  result.candidates = static_cast<int>(model_.patch.nodes.size());
+  result.nodes = model_.sprinkling.nodes.size();
+  result.iterations = tool.iterations;
+  result.converged = tool.converged;
+  result.largest_penetration = tool.largest_penetration;
+  result.residual = residual(model_);
   if (!result.force.allFinite())
     throw NumericalError(fmt::format("the tool force at t = {:g} s is not finite; residual {:.1e}, condition estimate "
                                      "{:.1e}",
-                                     result.time, result.residual, body_->report().condition_estimate));
+                                     result.time, result.residual, model_.body->report().condition_estimate));
   node_states_.clear();
-  for (const Vector3& x : sprinkling_.nodes.positions) {
-    node_states_.push_back(body_->at(x, field_));
+  for (const Vector3& x : model_.sprinkling.nodes.positions) {
+    node_states_.push_back(model_.body->at(x, model_.field));
     const Matrix3& gradient = node_states_.back().gradient;
     const Matrix3 skew = 0.5 * (gradient - gradient.transpose());
     const double angle = Vector3(skew(2, 1), skew(0, 2), skew(1, 0)).norm() * 180 / std::numbers::pi;
@@ -330,6 +427,8 @@ void Session::evaluate(StepResult& result) {
   if (!result.converged)
     warn("contact", fmt::format("the contact did not converge at t = {:g} s: {:.2g} m of penetration left", result.time,
                                 result.largest_penetration));
+  if (!model_.state->lips.converged)
+    warn("lips", fmt::format("the contact of the lips did not converge at t = {:g} s", result.time));
 }
 
 void Session::warn(const std::string& key, const std::string& text) {

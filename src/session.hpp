@@ -1,10 +1,12 @@
-// One palpation: the organ, its nodes about the contact, and the tool pressed into it step by step. A step reads like
-// the paper: contact, sprinkle, supports and collocation, solve, force [De 2001, sections 2 and 3].
+// One run: the organ, its nodes about contact and cuts, the tool pressed into it and the blade drawn through it, step
+// by step. A step reads like the paper: contact, sprinkle, supports and collocation, solve, force [De 2001, sections 2
+// and 3]. A cut goes before it: blade at rest, incision, wound, sprinkle, assemble.
 #pragma once
 
-#include "src/organ.hpp"
-#include "src/scenario.hpp"
-#include "src/tool_motion.hpp"
+#include "src/cut_report.hpp"
+#include "src/incision_builder.hpp"
+#include "src/node_zone.hpp"
+#include "src/schedule.hpp"
 
 #include <functional>
 
@@ -26,59 +28,71 @@ struct StepResult {
   bool resprinkled = false;       // the fine zone has followed the tool
   double force_jump = 0;          // |force after - before| / |force before| at the re-sprinkle
   double seconds = 0;             // wall clock of the step
+  std::optional<CutReport> cut;   // in a scenario that cuts
 };
 
 /// Wall clock of each stage, s, summed over the run.
 struct SessionProfile {
-  double organ = 0, sprinkle = 0, discretise = 0, condense = 0, press = 0, evaluate = 0;
-};
-
-/// The zone of fine nodes about the contact, with every length derived that the scenario leaves out.
-struct FineZone {
-  solvers::SpacingField spacing; // centre: the contact
-  double candidate_radius = 0;   // m
+  double organ = 0, sprinkle = 0, discretise = 0, condense = 0, press = 0, evaluate = 0, topology = 0, level_sets = 0;
 };
 
 class Session {
  public:
-  /// Builds and checks organ, motion and fixed regions; sprinkles when the motion touches the organ. Throws InputError.
+  /// Builds and checks organ, motion, precuts and fixed regions; sprinkles when something touches or cuts the organ.
+  /// Throws InputError.
   explicit Session(
       Scenario scenario, std::function<void(const std::string&)> say = [](const std::string&) {});
 
-  [[nodiscard]] const std::vector<ToolSample>& motion() const { return motion_; }
-  /// False: the motion never touches the organ and every step is free of force.
+  [[nodiscard]] const std::vector<StepSample>& steps() const { return steps_; }
+  /// False: there is no tool, or it never touches the organ, and every step is free of its force.
   [[nodiscard]] bool touches() const { return touch_.has_value(); }
+  /// Whether there is a blade or a precut.
+  [[nodiscard]] bool cuts() const { return scenario_.blade || !scenario_.precuts.empty(); }
 
-  /// Moves the tool to a sample of motion() and solves. Throws NumericalError.
-  StepResult step(const ToolSample& sample);
+  /// Goes on to a step of steps(), in their order: cuts, moves the tool, solves. A cut that is refused leaves
+  /// everything as it was, and says why in the result and once in warnings(). Throws NumericalError.
+  StepResult step(const StepSample& sample);
 
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const Organ& organ() const { return organ_; }
-  [[nodiscard]] const solvers::Sprinkling& sprinkling() const { return sprinkling_; }
+  [[nodiscard]] const solvers::Sprinkling& sprinkling() const { return model_.sprinkling; }
   [[nodiscard]] const FineZone& zone() const { return zone_; }
   /// Null before the first step that needs it.
-  [[nodiscard]] const solvers::Discretisation* body() const { return body_.get(); }
+  [[nodiscard]] const solvers::Discretisation* body() const { return model_.body.get(); }
   /// Solution of the last step.
-  [[nodiscard]] const solvers::Field& field() const { return field_; }
+  [[nodiscard]] const solvers::Field& field() const { return model_.field; }
+  /// The cut so far; null: none.
+  [[nodiscard]] const topology::Incision* incision() const { return model_.incision.get(); }
+  /// The surface with the cut so far; in a scenario without cuts it is not made.
+  [[nodiscard]] const topology::Wound* wound() const { return cuts() ? &incisions_->wound() : nullptr; }
+  /// Displacement and stress at a point of the body in the last step; at rest before the first.
+  [[nodiscard]] solvers::PointState at(const Vector3& x) const { return model_.at(x); }
   /// Displacement, gradient and stress at every node in the last step.
   [[nodiscard]] const std::vector<solvers::PointState>& node_states() const { return node_states_; }
   [[nodiscard]] const SessionProfile& profile() const { return profile_; }
-  /// Said once each: stretched linear elasticity, jumps at re-sprinkles, contact that did not converge.
+  /// Said once each: stretched linear elasticity, jumps at re-sprinkles, contact that did not converge, refused cuts.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
+  void lay_out_zone();
+  void make_precuts();
   [[nodiscard]] topology::SurfaceContact find_contact(const topology::ToolPose& pose) const;
   [[nodiscard]] topology::SurfaceContact centre_of(const topology::SurfaceContact& contact,
                                                    const topology::ToolPose& pose) const;
   [[nodiscard]] bool must_follow(const topology::SurfaceContact& contact) const;
-  [[nodiscard]] solvers::SprinkleOptions sprinkle_options(const topology::SurfaceContact& contact) const;
-  [[nodiscard]] std::vector<solvers::Prescribed> fixed_nodes() const;
-  [[nodiscard]] std::vector<int> candidates() const;
-  void sprinkle(const topology::SurfaceContact& contact);
-  void build();
-  void condense(const std::vector<int>& candidates);
-  void press(const topology::ToolPose& pose);
-  [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose) const;
+  void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
+  [[nodiscard]] solvers::SprinkleOptions sprinkle_options(const BodyModel& model) const;
+  void sprinkle(const solvers::NodeCloud* previous, BodyModel& model);
+  [[nodiscard]] std::vector<int> candidates(const BodyModel& model) const;
+  [[nodiscard]] bool tool_in_reach() const;
+  void build(BodyModel& model);
+  void condense(const std::vector<int>& candidates, BodyModel& model);
+  void solve(const StepSample& sample, BodyModel& model);
+  [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
+  bool cut(const StepSample& sample, CutReport& report);
+  [[nodiscard]] Vector3 rest_position(const Vector3& x) const;
+  void check_pieces(double time);
+  void report_cut(CutReport& report) const;
   void evaluate(StepResult& result);
   void warn(const std::string& key, const std::string& text);
 
@@ -87,16 +101,13 @@ class Session {
   SessionProfile profile_;
   Organ organ_;
   topology::ContactQuery query_;
-  std::vector<ToolSample> motion_;
   std::optional<FirstTouch> touch_;
   FineZone zone_;
-  topology::SurfaceContact zone_contact_; // its centre
-  solvers::Sprinkling sprinkling_;
-  std::unique_ptr<solvers::Discretisation> body_;
-  solvers::ContactPatch patch_;
-  std::optional<solvers::ContactState> state_;
+  std::vector<StepSample> steps_;
+  std::optional<topology::SurfaceContact> zone_contact_; // centre of the fine zone; empty: no tool touches
+  std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
+  BodyModel model_;
   std::optional<topology::SurfaceContact> last_contact_;
-  solvers::Field field_;
   std::vector<solvers::PointState> node_states_;
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;

@@ -39,6 +39,7 @@ Json nodes(const Session& session) {
               {"surface", report.surface_nodes},
               {"edge", report.edge_nodes},
               {"interior", report.interior_nodes},
+              {"lip", report.lip_nodes},
               {"fine_spacing_m", zone.spacing.fine},
               {"coarse_spacing_m", zone.spacing.coarse},
               {"fine_radius_m", zone.spacing.radius},
@@ -83,9 +84,29 @@ Json solver(const Session& session, const RunFindings& findings) {
   return out;
 }
 
+Json cut(const Session& session, const RunFindings& findings) {
+  const CutReport& last = findings.cut;
+  return {{"increments", findings.increments},
+          {"refused", findings.refused_cuts},
+          {"area_m2", last.area},
+          {"front_m", last.front_length},
+          {"sheets", last.sheets},
+          {"pieces", last.pieces},
+          {"unheld_pieces", last.unheld},
+          {"volumes_m3", last.volumes},
+          {"opening_m", last.opening},
+          {"largest_opening_m", findings.largest_opening},
+          {"opening_volume_m3", last.opening_volume},
+          {"lip_pairs", last.lip_pairs},
+          {"closed_pairs", last.closed_pairs},
+          {"lips", solvers::to_string(session.scenario().cut.lips)},
+          {"surface_hash", hash_text(last.surface_hash)}};
+}
+
 Json timings(const SessionProfile& profile) {
-  return {{"organ", profile.organ},       {"sprinkle", profile.sprinkle}, {"discretise", profile.discretise},
-          {"condense", profile.condense}, {"press", profile.press},       {"evaluate", profile.evaluate}};
+  return {{"organ", profile.organ},       {"topology", profile.topology},     {"level_sets", profile.level_sets},
+          {"sprinkle", profile.sprinkle}, {"discretise", profile.discretise}, {"condense", profile.condense},
+          {"press", profile.press},       {"evaluate", profile.evaluate}};
 }
 
 } // namespace
@@ -105,6 +126,7 @@ std::string summary_json(const Session& session, const RunOutput& output, RunSta
   summary["touched"] = findings.touched;
   summary["steps"] = {{"done", findings.steps}, {"planned", findings.planned}};
   summary["peak_force"] = findings.touched ? peak(findings.peak) : Json(nullptr);
+  summary["cut"] = session.cuts() ? cut(session, findings) : Json(nullptr);
   summary["nodes"] = nodes(session);
   summary["solver"] = solver(session, findings);
   summary["timings_s"] = timings(session.profile());

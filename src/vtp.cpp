@@ -44,11 +44,28 @@ std::string array_line(std::string_view type, std::string_view name, int compone
       components, offset);
 }
 
-std::string cells(std::string_view tag, const std::vector<std::int64_t>& connectivity,
-                  const std::vector<std::int64_t>& offsets, Appended& appended) {
+template <std::size_t size>
+std::string cells(std::string_view tag, const std::vector<std::array<int, size>>& corners, Appended& appended) {
+  std::vector<std::int64_t> connectivity;
+  std::vector<std::int64_t> offsets;
+  for (const std::array<int, size>& cell : corners) {
+    connectivity.insert(connectivity.end(), cell.begin(), cell.end());
+    offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
+  }
   std::string text = fmt::format("<{}>\n", tag);
   text += array_line("Int64", "connectivity", 1, appended.add(connectivity));
   text += array_line("Int64", "offsets", 1, appended.add(offsets));
+  return text + fmt::format("</{}>\n", tag);
+}
+
+std::string value_arrays(std::string_view tag, const std::vector<PointData>& arrays, std::size_t count,
+                         Appended& appended) {
+  std::string text = fmt::format("<{}>\n", tag);
+  for (const PointData& array : arrays) {
+    if (array.values.size() != count * static_cast<std::size_t>(array.components))
+      throw std::logic_error(fmt::format("{} '{}' has {} values for {}", tag, array.name, array.values.size(), count));
+    text += array_line("Float64", array.name, array.components, appended.add(array.values));
+  }
   return text + fmt::format("</{}>\n", tag);
 }
 
@@ -62,35 +79,35 @@ PointData vector_data(std::string name, const std::vector<Vector3>& values) {
   return {std::move(name), 3, flat(values)};
 }
 
-void write_vtp(const std::filesystem::path& file, const std::vector<Vector3>& points,
-               const std::vector<Triangle>& triangles, const std::vector<PointData>& data) {
+void write_vtp(const std::filesystem::path& file, const PolyData& data) {
   Appended appended;
+  const bool cloud = data.triangles.empty() && data.lines.empty();
+  const std::size_t vertices = cloud ? data.points.size() : 0;
   std::string xml = fmt::format("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" "
                                 "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n"
-                                "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"0\" "
-                                "NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n<PointData>\n",
-                                points.size(), triangles.empty() ? points.size() : 0, triangles.size());
-  for (const PointData& array : data) {
-    if (array.values.size() != points.size() * static_cast<std::size_t>(array.components))
-      throw std::logic_error(
-          fmt::format("point data '{}' has {} values for {} points", array.name, array.values.size(), points.size()));
-    xml += array_line("Float64", array.name, array.components, appended.add(array.values));
+                                "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"{}\" NumberOfLines=\"{}\" "
+                                "NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n",
+                                data.points.size(), vertices, data.lines.size(), data.triangles.size());
+  xml += value_arrays("PointData", data.point_data, data.points.size(), appended);
+  xml += value_arrays("CellData", data.cell_data, vertices + data.lines.size() + data.triangles.size(), appended);
+  xml += "<Points>\n" + array_line("Float64", "Points", 3, appended.add(flat(data.points))) + "</Points>\n";
+  if (cloud) {
+    std::vector<std::array<int, 1>> singles;
+    for (int i = 0; i < std::ssize(data.points); ++i)
+      singles.push_back({i});
+    xml += cells("Verts", singles, appended);
   }
-  xml += "</PointData>\n<Points>\n" + array_line("Float64", "Points", 3, appended.add(flat(points))) + "</Points>\n";
-  std::vector<std::int64_t> connectivity;
-  std::vector<std::int64_t> offsets;
-  for (const Triangle& triangle : triangles) {
-    connectivity.insert(connectivity.end(), triangle.begin(), triangle.end());
-    offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
-  }
-  if (triangles.empty())
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      connectivity.push_back(static_cast<std::int64_t>(i));
-      offsets.push_back(static_cast<std::int64_t>(i) + 1);
-    }
-  xml += cells(triangles.empty() ? "Verts" : "Polys", connectivity, offsets, appended);
+  if (!data.lines.empty())
+    xml += cells("Lines", data.lines, appended);
+  if (!data.triangles.empty())
+    xml += cells("Polys", data.triangles, appended);
   xml += "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_";
   replace_file(file, xml + appended.bytes() + "\n</AppendedData>\n</VTKFile>\n");
+}
+
+void write_vtp(const std::filesystem::path& file, const std::vector<Vector3>& points,
+               const std::vector<Triangle>& triangles, const std::vector<PointData>& data) {
+  write_vtp(file, PolyData{points, triangles, {}, data, {}});
 }
 
 void write_pvd(const std::filesystem::path& file, const std::vector<SeriesEntry>& entries) {

@@ -8,18 +8,30 @@
 
 namespace spherecut::app {
 
-/// A value at every point: one component or three.
+/// A value at every point or cell: one component or three.
 struct PointData {
   std::string name; // with its unit: "displacement [m]"
   int components = 1;
-  std::vector<double> values; // components per point
+  std::vector<double> values; // components per point or cell
 };
 
 PointData scalar_data(std::string name, std::vector<double> values);
 PointData vector_data(std::string name, const std::vector<Vector3>& values);
 
-/// Writes points with data; triangles when there are any, else one vertex cell for each point. Throws InputError when
-/// the file cannot be written, std::logic_error when a length does not match.
+/// Points with triangles and straight lines between them and data on points and cells. Without triangles and
+/// lines every point is a vertex cell.
+struct PolyData {
+  std::vector<Vector3> points; // m
+  std::vector<Triangle> triangles;
+  std::vector<std::array<int, 2>> lines;
+  std::vector<PointData> point_data;
+  std::vector<PointData> cell_data; // components per line, then per triangle, as VTK counts cells
+};
+
+/// Throws InputError when the file cannot be written, std::logic_error when a length does not match.
+void write_vtp(const std::filesystem::path& file, const PolyData& data);
+
+/// Points and triangles with data at the points.
 void write_vtp(const std::filesystem::path& file, const std::vector<Vector3>& points,
                const std::vector<Triangle>& triangles, const std::vector<PointData>& data);
 

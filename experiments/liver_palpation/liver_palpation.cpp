@@ -66,9 +66,10 @@ app::Scenario scenario(const Press& press, Method method, double fine, int steps
   scenario.nodes.coarse_spacing = 8 * fine; // the whole cloud is refined, not the contact alone
   scenario.nodes.fine_radius = press.fine_radius;
   scenario.method.method = method;
-  scenario.tool.shape = topology::Laparoscope{0.0075, 0.005, 0.30, press.port};
-  scenario.tool.motion = press.approach;
-  scenario.tool.step = press.approach.duration / steps;
+  app::ToolSettings& tool = scenario.tool.emplace();
+  tool.shape = topology::Laparoscope{0.0075, 0.005, 0.30, press.port};
+  tool.motion = press.approach;
+  tool.step = press.approach.duration / steps;
   return scenario;
 }
 
@@ -81,7 +82,7 @@ struct Curve {
 Curve run(app::Scenario scenario) {
   Curve curve;
   curve.session = std::make_unique<app::Session>(std::move(scenario));
-  for (const app::ToolSample& sample : curve.session->motion())
+  for (const app::StepSample& sample : curve.session->steps())
     curve.steps.push_back(curve.session->step(sample));
   return curve;
 }

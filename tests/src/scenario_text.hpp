@@ -37,6 +37,31 @@ clearance = 0.001
 figures = false
 )";
 
+/// A block of 60 x 60 x 30 mm on its base with coarse nodes, without tool or cut. Line numbers matter to the tests.
+inline const std::string cut_block = R"([organ]
+shape = "block"
+size = [0.06, 0.06, 0.03]
+edge = 0.006
+[material]
+young_modulus = 1e4
+poisson_ratio = 0.3
+[[fixed]]
+region = "box"
+lower = [-1, -1, -0.001]
+upper = [1, 1, 0.001]
+[nodes]
+fine_spacing = 0.005
+coarse_spacing = 0.012
+)";
+
+/// A disc buried in the middle of it.
+inline const std::string disc_precut = R"([[precut]]
+shape = "disc"
+centre = [0, 0, 0.016]
+normal = [0, 0, 1]
+radius = 0.01
+)";
+
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);
   if (at == std::string::npos)

@@ -53,8 +53,8 @@ TEST_CASE("A scenario is read with its values and the documented defaults") {
   CHECK(scenario.method.method == solvers::Method::galerkin);
   CHECK(scenario.method.support_radius == 0);
   CHECK_FALSE(scenario.gravity);
-  CHECK(std::get<topology::SphereTip>(scenario.tool.shape).radius == 0.01);
-  const auto& approach = std::get<Approach>(scenario.tool.motion);
+  CHECK(std::get<topology::SphereTip>(scenario.tool->shape).radius == 0.01);
+  const auto& approach = std::get<Approach>(scenario.tool->motion);
   CHECK(approach.depth == 0.002);
   CHECK(approach.duration == 1);
   CHECK(scenario.contact.condition == solvers::ContactCondition::frictionless);

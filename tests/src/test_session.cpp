@@ -20,7 +20,7 @@ Session session_of(const std::string& text) {
 
 std::vector<StepResult> run(Session& session) {
   std::vector<StepResult> steps;
-  for (const ToolSample& sample : session.motion())
+  for (const StepSample& sample : session.steps())
     steps.push_back(session.step(sample));
   return steps;
 }
@@ -41,9 +41,9 @@ std::string path(const std::vector<std::pair<double, std::string>>& poses) {
 
 TEST_CASE("An approach starts its clearance above the first touch and ends its depth below") {
   Session session = session_of(small_scenario);
-  REQUIRE(session.motion().size() == 5);
-  CHECK(session.motion().front().pose.point.isApprox(Vector3(0, 0, 0.031), 1e-6));
-  CHECK(session.motion().back().pose.point.isApprox(Vector3(0, 0, 0.028), 1e-6));
+  REQUIRE(session.steps().size() == 5);
+  CHECK(session.steps().front().tool->point.isApprox(Vector3(0, 0, 0.031), 1e-6));
+  CHECK(session.steps().back().tool->point.isApprox(Vector3(0, 0, 0.028), 1e-6));
   CHECK(session.touches());
 }
 
@@ -127,7 +127,7 @@ TEST_CASE("The fine zone follows a sliding tool and the force hardly jumps") {
 
 TEST_CASE("Gravity alone bends the organ by its weight") {
   Session session = session_of(small_scenario + "[gravity]\nacceleration = [0, 0, -9.81]\n");
-  const StepResult first = session.step(session.motion().front());
+  const StepResult first = session.step(session.steps().front());
   static_cast<void>(first);
   Vector3 carried = Vector3::Zero();
   for (const Vector3& force : session.body()->constraint_forces(session.field()))

@@ -1,0 +1,201 @@
+#include "src/body_model.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <limits>
+
+namespace spherecut::app {
+namespace {
+
+constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
+constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
+constexpr double rim = 1e-2; // of its spacing: a lip node so near to the surface stands on the rim of its wound
+
+bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& nodes, int node) {
+  switch (nodes.kinds[node]) {
+  case solvers::NodeKind::interior:
+    return false;
+  case solvers::NodeKind::lip:
+    return domain.signed_distance(nodes.positions[node]) > -rim * nodes.spacings[node];
+  case solvers::NodeKind::surface:
+  case solvers::NodeKind::edge:
+    return true;
+  }
+  return true;
+}
+
+solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                            const BodyModel& model) {
+  solvers::Problem problem;
+  problem.domain = domain;
+  problem.incision = model.incision;
+  problem.nodes = model.sprinkling.nodes;
+  problem.material = scenario.material;
+  problem.prescribed = fixed_nodes(scenario, *domain, problem.nodes);
+  const bool held_fully = std::all_of(scenario.fixed.begin(), scenario.fixed.end(), [](const FixedRegion& region) {
+    return region.components == std::array<bool, 3>{true, true, true};
+  });
+  if (held_fully)
+    problem.prescribed_region = [regions = scenario.fixed](const Vector3& x, const Vector3&) {
+      return std::any_of(regions.begin(), regions.end(), [&](const FixedRegion& region) { return region.holds(x); });
+    };
+  if (scenario.gravity) {
+    const Vector3 weight = scenario.material.density * *scenario.gravity;
+    problem.loads.body_force = [weight](const Vector3&) -> const Vector3& { return weight; };
+  }
+  problem.loads.initial_strain = -scenario.pretension;
+  const bool pressed = std::any_of(scenario.precuts.begin(), scenario.precuts.end(),
+                                   [](const PrecutSettings& precut) { return precut.pressure != 0; });
+  if (pressed && model.incision != nullptr) {
+    std::vector<double> pressures; // by sheet: the precuts come first
+    for (const PrecutSettings& precut : scenario.precuts)
+      pressures.push_back(precut.pressure);
+    problem.loads.lip_traction = [pressures, incision = model.incision](const Vector3& x,
+                                                                        const Vector3& normal) -> Vector3 {
+      const auto on = incision->closest(x, std::numeric_limits<double>::infinity());
+      if (!on || on->sheet >= std::ssize(pressures))
+        return Vector3::Zero();
+      return -pressures[static_cast<std::size_t>(on->sheet)] * normal;
+    };
+  }
+  return problem;
+}
+
+} // namespace
+
+solvers::PointState BodyModel::at(const Vector3& x) const {
+  if (!state)
+    return {};
+  try {
+    return body->at(x, field);
+  } catch (const InputError&) {
+    const std::vector<Vector3>& nodes = sprinkling.nodes.positions;
+    std::size_t nearest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      if (const double distance = (nodes[i] - x).squaredNorm();
+          distance < least && (incision == nullptr || !incision->blocks(x, nodes[i]))) {
+        least = distance;
+        nearest = i;
+      }
+    return body->at(nodes[nearest], field);
+  }
+}
+
+std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const topology::Domain& domain,
+                                             const solvers::NodeCloud& nodes) {
+  std::vector<solvers::Prescribed> prescribed;
+  std::vector<int> held(scenario.fixed.size(), 0);
+  for (int i = 0; i < nodes.size(); ++i) {
+    if (!carries_surface(domain, nodes, i))
+      continue;
+    solvers::Prescribed entry{i, {false, false, false}, Vector3::Zero()};
+    for (std::size_t r = 0; r < scenario.fixed.size(); ++r)
+      if (scenario.fixed[r].holds(nodes.positions[i])) {
+        ++held[r];
+        for (int c = 0; c < 3; ++c)
+          entry.components[c] = entry.components[c] || scenario.fixed[r].components[c];
+      }
+    if (entry.components[0] || entry.components[1] || entry.components[2])
+      prescribed.push_back(entry);
+  }
+  for (std::size_t r = 0; r < scenario.fixed.size(); ++r)
+    if (held[r] == 0) {
+      const BoundingBox box = domain.bounds();
+      throw InputError(fmt::format("{}:{}: fixed region '{}' holds no surface node; the organ spans [{:.4g}, {:.4g}, "
+                                   "{:.4g}] to [{:.4g}, {:.4g}, {:.4g}] m: move or widen the region, or sprinkle finer",
+                                   scenario.file.string(), scenario.fixed[r].line, scenario.fixed[r].name,
+                                   box.lower.x(), box.lower.y(), box.lower.z(), box.upper.x(), box.upper.y(),
+                                   box.upper.z()));
+    }
+  return prescribed;
+}
+
+void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model) {
+  solvers::DiscretisationOptions options = scenario.method;
+  if (scenario.cut.sight)
+    options.sight = *scenario.cut.sight;
+  model.body = solvers::discretise(problem_of(scenario, domain, model), options);
+  model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
+}
+
+void condense(const std::vector<int>& candidates, BodyModel& model) {
+  model.lips.reset();
+  model.state.reset();
+  if (candidates.empty()) {
+    model.patch = {};
+    model.base = model.body->solve();
+  } else {
+    model.patch = solvers::condense(*model.body, candidates);
+    model.base = model.patch.base;
+  }
+}
+
+void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario,
+                   BodyModel& model) {
+  const solvers::ContactOptions options{
+      .condition = scenario.contact.condition, .maximum_iterations = most_iterations, .gap_tolerance = lip_tolerance};
+  const bool in_reach = tool != nullptr && !model.patch.nodes.empty();
+  const solvers::CutContactState* previous = model.state ? &*model.state : nullptr;
+  if (!model.lips) { // lips that stay apart by themselves need no contact
+    solvers::CutContactState state;
+    if (in_reach)
+      state.tool = solvers::press(model.patch, tool->shape, *pose, options, previous ? &previous->tool : nullptr);
+    model.field = in_reach ? solvers::deform(model.patch, state.tool) : model.base;
+    const std::vector<double> openings = normal_openings(model);
+    const bool apart =
+        std::all_of(openings.begin(), openings.end(), [](double opening) { return opening >= -lip_tolerance; });
+    if (apart || scenario.cut.lips == solvers::LipCondition::open) {
+      model.state = std::move(state);
+      return;
+    }
+    model.lips = solvers::condense_lips(*model.body, model.pairs, scenario.cut.lips, in_reach ? &model.patch : nullptr);
+  }
+  solvers::CutContactState state;
+  if (in_reach) {
+    const bool same_lips = previous != nullptr && previous->lips.closed.size() == model.pairs.size();
+    state = solvers::press(model.patch, *model.lips, tool->shape, *pose, options, same_lips ? previous : nullptr);
+    model.field = solvers::deform(model.patch, *model.lips, state);
+  } else {
+    state.lips = solvers::close_lips(*model.lips, model.lips->base_opening, lip_tolerance,
+                                     previous ? previous->lips.closed : std::vector<char>{});
+    model.field = solvers::deform(model.base, *model.lips, state.lips);
+  }
+  model.state = std::move(state);
+}
+
+double residual(const BodyModel& model) {
+  std::vector<int> loaded = model.patch.nodes;
+  std::vector<Vector3> forces = model.state->tool.nodal_forces;
+  if (model.lips) {
+    const std::vector<Vector3> pair_forces = solvers::pair_forces(*model.lips, model.state->lips);
+    for (std::size_t p = 0; p < pair_forces.size(); ++p) {
+      loaded.push_back(model.pairs[p].plus);
+      forces.push_back(pair_forces[p]);
+      loaded.push_back(model.pairs[p].minus);
+      forces.emplace_back(-pair_forces[p]);
+    }
+  }
+  return model.body->residual(model.field, loaded, forces);
+}
+
+std::vector<double> normal_openings(const BodyModel& model) {
+  std::vector<double> openings;
+  if (model.pairs.empty())
+    return openings;
+  std::vector<int> plus;
+  std::vector<int> minus;
+  for (const solvers::LipPair& pair : model.pairs) {
+    plus.push_back(pair.plus);
+    minus.push_back(pair.minus);
+  }
+  const MatrixX apart =
+      model.body->contact_displacements(plus, {model.field}) - model.body->contact_displacements(minus, {model.field});
+  for (std::size_t p = 0; p < model.pairs.size(); ++p)
+    openings.push_back(model.pairs[p].normal.dot(apart.col(0).segment<3>(3 * static_cast<Eigen::Index>(p))));
+  return openings;
+}
+
+} // namespace spherecut::app

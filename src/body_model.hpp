@@ -1,0 +1,58 @@
+// The body at one moment of a run: its cut, nodes, assembled system and solution. Everything that a cut replaces, so
+// that a refused cut leaves the old one standing.
+#pragma once
+
+#include "solvers/lip_contact.hpp"
+#include "src/scenario.hpp"
+
+namespace spherecut::app {
+
+/// Wall clock of the stages of a rebuild, s.
+struct RebuildSeconds {
+  double topology = 0, level_sets = 0, visibility = 0, sprinkling = 0, assembly = 0, solve = 0;
+};
+
+struct BodyModel {
+  std::shared_ptr<const topology::Incision> incision; // null: uncut
+  solvers::Sprinkling sprinkling;
+  std::vector<solvers::LipPair> pairs;
+  std::unique_ptr<solvers::Discretisation> body; // null before the first load, touch or cut
+  solvers::Field base;                           // without tool and contact
+  solvers::ContactPatch patch;                   // no nodes: the tool is far
+  std::optional<solvers::LipPatch> lips;         // empty: no pair has had to be held yet
+  std::optional<solvers::CutContactState> state; // empty: not solved yet
+  solvers::Field field;                          // solution
+
+  /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
+  /// rest before the first solution.
+  [[nodiscard]] solvers::PointState at(const Vector3& x) const;
+};
+
+/// Whether a node of this kind is one of the organ's own surface, for a tool to touch.
+inline bool on_surface(solvers::NodeKind kind) {
+  return kind == solvers::NodeKind::surface || kind == solvers::NodeKind::edge;
+}
+
+/// Nodes of the fixed regions with the components that are held. Throws InputError naming the region that holds none.
+std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const topology::Domain& domain,
+                                             const solvers::NodeCloud& nodes);
+
+/// Assembles and factors the body of a scenario on the model's nodes and incision: the one place where a cut rebuilds
+/// the system. Throws as solvers::discretise does.
+void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model);
+
+/// Condenses the model onto tool candidates; none: the tool is far. Forgets the state.
+void condense(const std::vector<int>& candidates, BodyModel& model);
+
+/// Solves for tool and lips in contact; `tool` null: the tool is far, and candidates there are none. Starts from the
+/// model's state where it has one.
+void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario,
+                   BodyModel& model);
+
+/// Largest unbalanced force over the largest force.
+double residual(const BodyModel& model);
+
+/// Openings of the pairs along their normals, m.
+std::vector<double> normal_openings(const BodyModel& model);
+
+} // namespace spherecut::app

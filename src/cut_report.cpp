@@ -1,0 +1,101 @@
+#include "src/cut_report.hpp"
+
+#include "topology/errors.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <fmt/format.h>
+#include <optional>
+
+namespace spherecut::app {
+namespace {
+
+// Half the cross product of two sides: area times outward normal, m2.
+Vector3 area_vector(const topology::SurfaceMesh& surface, const Triangle& triangle) {
+  const Vector3& corner = surface.vertices[triangle[0]];
+  return 0.5 * (surface.vertices[triangle[1]] - corner).cross(surface.vertices[triangle[2]] - corner);
+}
+
+} // namespace
+
+double opening_volume(const topology::Wound& wound, const BodyModel& model) {
+  std::vector<std::optional<Vector3>> displacement(wound.surface.vertices.size());
+  const auto moved = [&](int vertex) {
+    if (!displacement[vertex])
+      displacement[vertex] = model.at(wound.evaluation[vertex]).displacement;
+    return *displacement[vertex];
+  };
+  double volume = 0;
+  for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
+    if (wound.part[t] == topology::WoundPart::organ)
+      continue;
+    const Triangle& triangle = wound.surface.triangles[t];
+    const Vector3 mean = (moved(triangle[0]) + moved(triangle[1]) + moved(triangle[2])) / 3;
+    volume -= mean.dot(area_vector(wound.surface, triangle)); // outward is into the cut
+  }
+  return volume;
+}
+
+void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing) {
+  if (wound.pieces.size() < 2)
+    return;
+  std::vector<double> area(wound.pieces.size(), 0);
+  std::vector<Vector3> centre(wound.pieces.size(), Vector3::Zero());
+  for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
+    const Triangle& triangle = wound.surface.triangles[t];
+    const auto piece = static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)));
+    const double part = area_vector(wound.surface, triangle).norm();
+    area[piece] += part;
+    for (const int vertex : triangle)
+      centre[piece] += part / 3 * wound.surface.vertices[vertex];
+  }
+  for (std::size_t piece = 0; piece < wound.pieces.size(); ++piece) {
+    const Vector3 middle = centre[piece] / area[piece];
+    const double size = 6 * wound.pieces[piece].volume / area[piece];
+    if (const double h = spacing(middle); size < h)
+      throw InputError(fmt::format("the cut leaves a piece of {:.3g} m3 at [{:.4g}, {:.4g}, {:.4g}] m that is smaller "
+                                   "than the node spacing: {:.3g} m across; allowed: at least {:.3g} m",
+                                   wound.pieces[piece].volume, middle.x(), middle.y(), middle.z(), size, h));
+  }
+}
+
+std::vector<int> unheld_pieces(const topology::Wound& wound, const std::vector<FixedRegion>& fixed) {
+  std::vector<char> held(wound.pieces.size(), 0);
+  for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
+    char& mark = held[static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)))];
+    if (mark != 0 || wound.part[t] != topology::WoundPart::organ)
+      continue;
+    const Triangle& triangle = wound.surface.triangles[t];
+    const std::vector<Vector3>& vertices = wound.surface.vertices;
+    const Vector3 middle = (vertices[triangle[0]] + vertices[triangle[1]] + vertices[triangle[2]]) / 3;
+    mark = std::any_of(fixed.begin(), fixed.end(), [&](const FixedRegion& region) { return region.holds(middle); });
+  }
+  std::vector<int> unheld;
+  for (std::size_t piece = 0; piece < held.size(); ++piece)
+    if (held[piece] == 0)
+      unheld.push_back(static_cast<int>(piece));
+  return unheld;
+}
+
+void require_clear_of_tool(const topology::Incision& incision, const BodyModel& before,
+                           solvers::ContactCondition condition) {
+  if (!before.state || before.state->tool.active_nodes == 0)
+    return;
+  if (condition == solvers::ContactCondition::bonded)
+    throw InputError(
+        "the tool sticks to the tissue (contact.condition = bonded), and a cut would forget where; allowed: "
+        "a frictionless tool, or cutting while the tool is away");
+  for (std::size_t c = 0; c < before.patch.nodes.size(); ++c) {
+    if (before.state->tool.active[c] == 0)
+      continue;
+    const Vector3& x = before.patch.rest[c];
+    const double reach = before.patch.spacings[c];
+    if (incision.closest(x, reach) && !(before.incision != nullptr && before.incision->closest(x, reach)))
+      throw InputError(
+          fmt::format("the blade cuts where the tool is pressing: within {:.3g} m of the contact at [{:.4g}, "
+                      "{:.4g}, {:.4g}] m; allowed: a node spacing away, or lift the tool first",
+                      reach, x.x(), x.y(), x.z()));
+  }
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,44 @@
+// What a cut has come to: the numbers of cuts.csv.
+#pragma once
+
+#include "src/body_model.hpp"
+#include "topology/wound.hpp"
+
+namespace spherecut::app {
+
+/// The cut at the end of a step.
+struct CutReport {
+  int triangles = 0;                 // of sheet, added in this step
+  bool refused = false;              // the cut of this step; everything is as before it
+  std::string reason;                // why it was refused, or why the blade added nothing
+  double area = 0, front_length = 0; // m2 and m, inside the body
+  int sheets = 0;
+  int pieces = 1;
+  std::vector<double> volumes; // m3, of the pieces, largest first
+  int unheld = 0;              // pieces that no fixed region holds
+  double opening = 0;          // m, largest distance between the faces along their normal
+  double opening_volume = 0;   // m3, between the faces
+  int lip_pairs = 0, closed_pairs = 0;
+  bool lips_converged = true;
+  int nodes = 0, kept_nodes = 0;  // kept: with the place they had before this step's cut
+  RebuildSeconds seconds;         // of this step
+  std::uint64_t surface_hash = 0; // of the wound at rest
+};
+
+/// Volume between the faces of the cut, m3: the integral of the opening over the sheets, each face displaced as the
+/// material on its own side.
+double opening_volume(const topology::Wound& wound, const BodyModel& model);
+
+/// Throws InputError naming the first piece that is smaller than the node spacing there: 6 volume / area, the diameter
+/// of a ball of that ratio, below it.
+void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing);
+
+/// Pieces no part of whose surface lies in a fixed region.
+std::vector<int> unheld_pieces(const topology::Wound& wound, const std::vector<FixedRegion>& fixed);
+
+/// Throws InputError, naming the place, when the new incision comes nearer than a node spacing to the tissue under the
+/// tool where the old one did not, or when a bonded contact is to be kept.
+void require_clear_of_tool(const topology::Incision& incision, const BodyModel& before,
+                           solvers::ContactCondition condition);
+
+} // namespace spherecut::app

@@ -1,0 +1,110 @@
+#include "src/node_zone.hpp"
+
+#include "solvers/contact_rings.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double sheet_edges = 0.5; // edges of a sheet's triangles, of the fine spacing
+constexpr double across_precut = 6; // derived spacings across a precut
+constexpr double across_blade = 12; // and along the edge of a blade
+constexpr double across_organ = 10; // and, at the coarsest, across the organ
+
+double size_of(const PrecutSettings& precut, double extent) {
+  if (const auto* disc = std::get_if<DiscSheet>(&precut.shape))
+    return std::sqrt(std::numbers::pi) * disc->radius;
+  if (const auto* rectangle = std::get_if<RectangleSheet>(&precut.shape))
+    return std::sqrt(rectangle->width * rectangle->height);
+  if (const auto* polygon = std::get_if<PolygonSheet>(&precut.shape)) {
+    Vector3 area = Vector3::Zero();
+    for (std::size_t i = 2; i < polygon->points.size(); ++i)
+      area += 0.5 * (polygon->points[i - 1] - polygon->points[0]).cross(polygon->points[i] - polygon->points[0]);
+    return std::sqrt(area.norm());
+  }
+  return extent / 2; // a file: a sheet about as large as the organ
+}
+
+double edge_length(const BladeSettings& blade) {
+  double length = 0;
+  for (std::size_t i = 1; i < blade.edge.size(); ++i)
+    length += (blade.edge[i] - blade.edge[i - 1]).norm();
+  return length;
+}
+
+// m; infinite without cuts.
+double derived_front_spacing(const Scenario& scenario, double extent) {
+  double spacing = std::numeric_limits<double>::infinity();
+  for (const PrecutSettings& precut : scenario.precuts)
+    spacing = std::min(spacing, std::min(size_of(precut, extent), extent) / across_precut);
+  if (scenario.blade)
+    spacing = std::min(spacing, std::min(edge_length(*scenario.blade), extent) / across_blade);
+  return spacing;
+}
+
+} // namespace
+
+FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain) {
+  const NodeSettings& nodes = scenario.nodes;
+  const double extent = domain.bounds().extent().maxCoeff();
+  const bool cuts = scenario.blade || !scenario.precuts.empty();
+  std::string origin = "nodes.fine_spacing";
+  FineZone zone;
+  zone.spacing.fine = nodes.fine_spacing;
+  if (zone.spacing.fine <= 0 && scenario.tool) {
+    zone.spacing.fine = topology::tip_radius(scenario.tool->shape) / 3;
+    origin = "the fine spacing, one third of the tip radius";
+  }
+  if (const double front = scenario.cut.front_spacing;
+      cuts && front > 0 && (zone.spacing.fine <= 0 || front < zone.spacing.fine)) {
+    zone.spacing.fine = front;
+    origin = "cut.front_spacing";
+  }
+  if (zone.spacing.fine <= 0) {
+    zone.spacing.fine = derived_front_spacing(scenario, extent);
+    origin = "the spacing derived from the cuts";
+  }
+  zone.spacing.coarse =
+      nodes.coarse_spacing > 0 ? nodes.coarse_spacing : std::max(zone.spacing.fine, extent / across_organ);
+  if (zone.spacing.coarse < zone.spacing.fine)
+    throw InputError(fmt::format("nodes.coarse_spacing = {:g} m is below {} = {:g} m; allowed: at least that, or give "
+                                 "nodes.fine_spacing",
+                                 zone.spacing.coarse, origin, zone.spacing.fine));
+  zone.spacing.slope = nodes.slope;
+  if (scenario.tool)
+    zone.spacing.radius = nodes.fine_radius > 0 ? nodes.fine_radius : 1.5 * topology::tip_radius(scenario.tool->shape);
+  zone.candidate_radius = scenario.contact.candidate_radius > 0 ? scenario.contact.candidate_radius
+                                                                : zone.spacing.radius + 2 * zone.spacing.fine;
+  return zone;
+}
+
+double sheet_edge(const FineZone& zone) {
+  return sheet_edges * zone.spacing.fine;
+}
+
+std::vector<solvers::SeedNode> contact_seeds(const Scenario& scenario, const topology::Domain& domain,
+                                             const topology::SurfaceContact& contact, double spacing) {
+  std::vector<solvers::SeedNode> tip{{contact.point, solvers::NodeKind::surface}};
+  const auto* punch = std::get_if<topology::FlatPunch>(&scenario.tool->shape);
+  if (punch == nullptr || punch->radius < 2 * spacing)
+    return tip;
+  const auto flat = [&](const solvers::SeedNode& seed) {
+    return domain.normal(seed.position).dot(contact.normal) > 0.95 &&
+           std::abs((seed.position - contact.point).dot(contact.normal)) < 0.25 * spacing;
+  };
+  try {
+    std::vector<solvers::SeedNode> rings =
+        solvers::contact_rings(domain, contact.point, contact.normal, punch->radius, spacing,
+                               solvers::contact_ring_offset(scenario.method.method));
+    return std::all_of(rings.begin(), rings.end(), flat) ? rings : tip;
+  } catch (const InputError&) { // the end of the punch reaches over the edge of the organ
+    return tip;
+  }
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,35 @@
+// The moments of a run: where tool and blade are at each.
+#pragma once
+
+#include "src/tool_motion.hpp"
+#include "topology/blade.hpp"
+
+namespace spherecut::app {
+
+/// One moment of a run.
+struct StepSample {
+  double time = 0;                          // s
+  std::optional<topology::ToolPose> tool;   // empty: no tool in this scenario
+  std::optional<topology::BladePose> blade; // empty: no blade, or not on its way at this time
+};
+
+/// Pose of a blade on its path, between two poses evenly moved and turned; empty outside its times.
+std::optional<topology::BladePose> blade_pose(const BladeSettings& blade, double time);
+
+/// Largest way of a point of the edge from one pose of the path to the next, summed, m.
+double blade_travel(const BladeSettings& blade);
+
+/// The moments of the tool's motion and of the blade's path together, in order; one at time 0 when there is neither.
+/// Before and after its own motion the tool stays where that starts and ends; in between it moves evenly from sample to
+/// sample. Without a time step of its own the blade's edge moves by `blade_stride` m in a step. Throws InputError
+/// naming file and line when that makes more increments than `most_triangles` triangles of the sheet allow, with
+/// columns of `column` m along the edge.
+std::vector<StepSample> schedule(const Scenario& scenario, const std::vector<ToolSample>& tool, double blade_stride,
+                                 double column, int most_triangles);
+
+/// Lines along the way of the blade's edge, about `apart` m from one another, that come nearer than `apart` to the
+/// body: where the cut is expected.
+std::vector<std::array<Vector3, 2>> blade_tracks(const BladeSettings& blade, const topology::Domain& domain,
+                                                 double apart);
+
+} // namespace spherecut::app

@@ -1,0 +1,147 @@
+#include "src/scenario.hpp"
+#include "tests/src/scenario_text.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "topology/errors.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+using Catch::Contains;
+
+namespace {
+
+std::string complaint(const std::string& text) {
+  const TemporaryFolder folder;
+  const auto file = write_file(folder.path() / "case.toml", text);
+  try {
+    static_cast<void>(read_scenario(file));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string complaint_about(const std::string& addition) {
+  return complaint(cut_block + addition);
+}
+
+Scenario read(const std::string& text) {
+  const TemporaryFolder folder;
+  return read_scenario(write_file(folder.path() / "case.toml", text));
+}
+
+const std::string two_poses = "[[blade.path]]\ntime = 0\nposition = [0, 0, 0]\n"
+                              "[[blade.path]]\ntime = 1\nposition = [0.1, 0, 0]\n";
+
+} // namespace
+
+TEST_CASE("Cuts are read with their values and the documented defaults") {
+  const Scenario scenario = read(cut_block + R"(
+[[precut]]
+shape = "disc"
+centre = [0, 0, 0.015]
+normal = [0, 0, 2]
+radius = 0.01
+pressure = 100
+[[precut]]
+shape = "rectangle"
+centre = [0.01, 0, 0.02]
+normal = [1, 0, 0]
+up = [1, 0, 1]
+width = 0.02
+height = 0.01
+[[precut]]
+shape = "polygon"
+points = [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]]
+[blade]
+edge = [[0, 0, -0.01], [0, 0, 0.01]]
+[[blade.path]]
+time = 0
+position = [-0.1, 0, 0]
+[[blade.path]]
+time = 2
+position = [0.1, 0, 0]
+rotation = [0, 0, 90]
+)");
+  CHECK_FALSE(scenario.tool);
+  REQUIRE(scenario.precuts.size() == 3);
+  const auto& disc = std::get<DiscSheet>(scenario.precuts[0].shape);
+  CHECK(disc.normal == Vector3(0, 0, 1));
+  CHECK(disc.radius == 0.01);
+  CHECK(scenario.precuts[0].pressure == 100);
+  CHECK(scenario.precuts[1].pressure == 0);
+  const auto& rectangle = std::get<RectangleSheet>(scenario.precuts[1].shape);
+  CHECK(rectangle.up.isApprox(Vector3(0, 0, 1)));
+  CHECK(std::get<PolygonSheet>(scenario.precuts[2].shape).points[1] == Vector3(0.01, 0, 0));
+  CHECK_FALSE(scenario.cut.sight);
+  CHECK(scenario.cut.lips == solvers::LipCondition::frictionless);
+  CHECK(scenario.cut.front_spacing == 0);
+  REQUIRE(scenario.blade);
+  CHECK(scenario.blade->edge.size() == 2);
+  CHECK(scenario.blade->edge_radius == 1e-4);
+  CHECK(scenario.blade->path[0].rotation == Vector3::Zero());
+  CHECK(scenario.blade->path[1].rotation == Vector3(0, 0, 90));
+  CHECK(scenario.pretension.isZero());
+}
+
+TEST_CASE("Pretension is read as three normal or six components") {
+  const auto with = [](const std::string& value) {
+    return replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = " + value) + disc_precut;
+  };
+  CHECK(read(with("[0.1, 0.2, 0]")).pretension.isApprox(Matrix3(Vector3(0.1, 0.2, 0).asDiagonal())));
+  Matrix3 full;
+  full << 0.1, 0.03, 0.02, 0.03, 0.2, 0.01, 0.02, 0.01, 0;
+  CHECK(read(with("[0.1, 0.2, 0, 0.01, 0.02, 0.03]")).pretension.isApprox(full));
+  CHECK_THAT(complaint(with("[0.1, 0.2]")), Contains("material.pretension") && Contains("three or six numbers"));
+  CHECK_THAT(complaint(with("[0.1, 0.2, 0.9]")), Contains("material.pretension") && Contains("<= 0.5"));
+}
+
+TEST_CASE("Every offence of a cut names file, line, key, value and what is allowed") {
+  struct Case {
+    std::string addition;
+    std::vector<std::string> expected;
+  };
+  const std::vector<Case> cases = {
+      {"", {"no tool, no blade and no precut"}},
+      {"[[precut]]\nshape = \"disc\"\n", {"precut[1].centre is missing", "precut[1].radius is missing"}},
+      {"[[precut]]\nshape = \"cone\"\n", {":16:", "precut[1].shape", "cone", "polygon"}},
+      {replaced(disc_precut, "radius = 0.01", "radius = 0"), {":19:", "precut[1].radius", "0 < value"}},
+      {replaced(disc_precut, "normal = [0, 0, 1]", "normal = [0, 0, 0]"), {":18:", "normal", "no direction"}},
+      {replaced(disc_precut, "radius = 0.01", "radius = 0.01\nwidth = 1"), {":20:", "precut[1].width", "rectangle"}},
+      {"[[precut]]\nshape = \"rectangle\"\ncentre = [0,0,0]\nnormal = [0,0,1]\nup = [0,0,3]\nwidth = 1\nheight = 1\n",
+       {":19:", "up", "along the normal"}},
+      {"[[precut]]\nshape = \"polygon\"\npoints = [[0,0,0], [1,0,0]]\n", {":17:", "2 corners", "three or more"}},
+      {"[[precut]]\nshape = \"polygon\"\npoints = [[0,0,0], [1,0]]\n",
+       {":17:", "precut[1].points[2]", "three numbers"}},
+      {"[[precut]]\nshape = \"file\"\nfile = \"none.obj\"\n", {":17:", "none.obj", "no file"}},
+      {"[cut]\nsight = \"blind\"\n", {":16:", "cut.sight", "diffraction"}},
+      {"[cut]\nlips = \"glued\"\n", {":16:", "cut.lips", "sticking"}},
+      {"[cut]\nunheld = \"lose\"\n", {":16:", "cut.unheld", "drop"}},
+      {"[cut]\nfront_spacing = \"1 mm\"\n", {":16:", "cut.front_spacing", "metres"}},
+      {"[blade]\n" + two_poses, {"blade.edge is missing"}},
+      {"[blade]\nedge = []\n" + two_poses, {":16:", "blade.edge has 0 points", "two or more"}},
+      {"[blade]\nedge = [[0, 0, 1]]\n" + two_poses, {":16:", "blade.edge has 1 point", "two or more"}},
+      {"[blade]\nedge = [[0, 0, 1], [0, 0, 1]]\n" + two_poses, {":16:", "points 1 and 2", "at least 1e-06 m"}},
+      {"[blade]\nedge = [[0, 0, nan], [0, 0, 1]]\n" + two_poses, {":16:", "blade.edge[1]", "nan"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\n", {"blade.path is missing"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\n[[blade.path]]\ntime = 0\nposition = [0, 0, 0]\n",
+       {"blade.path has 1 pose", "two or more"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\n" + replaced(two_poses, "time = 1", "time = 0"),
+       {":21:", "blade.path[2].time = 0 s", "above 0 s"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\n" + replaced(two_poses, "time = 1", "time = nan"),
+       {":21:", "blade.path[2].time", "nan"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\n" + replaced(two_poses, "[0.1, 0, 0]", "[inf, 0, 0]"),
+       {":22:", "blade.path[2].position", "inf"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nstep = 3\n" + two_poses, {":17:", "blade.step = 3 s", "1 s"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nedge_radius = 0\n" + two_poses, {":17:", "edge_radius", "0 < value"}},
+  };
+  for (const Case& c : cases) {
+    const std::string said = complaint_about(c.addition);
+    INFO(c.addition << "\nsaid: " << said);
+    for (const std::string& part : c.expected)
+      CHECK_THAT(said, Contains(part));
+  }
+}
