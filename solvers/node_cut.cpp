@@ -18,7 +18,8 @@ namespace {
 // In units of h.
 constexpr double station_crowding = 0.6; // between new pairs of rings and rims
 constexpr double grown_crowding = 0.75;  // of such pairs against those placed before the cut grew
-constexpr double taken_crowding = 0.4;   // of pairs and rings against seeds
+constexpr double single_crowding = 0.7;  // of the ring ahead
+constexpr double taken_crowding = 0.4;   // of pairs against seeds
 constexpr double facing = 0.5;           // of lip nodes of different sheets that see each other
 constexpr double step_crowding = 0.87;   // as between other nodes: see node_filler.cpp
 constexpr double sweep_crowding = 0.88;
@@ -211,8 +212,8 @@ class Chooser {
   }
 
   [[nodiscard]] bool single_fits(const Vector3& x, double h) const {
-    return allowed(x) && !incision_.closest(x, sheet_clearance * h) && !singles_.crowded(x, h, station_crowding) &&
-           !there_.taken->crowded(x, h, taken_crowding);
+    return allowed(x) && !incision_.closest(x, sheet_clearance * h) && !singles_.crowded(x, h, single_crowding) &&
+           !lips_.crowded(x, h, single_crowding) && !there_.taken->crowded(x, h, single_crowding);
   }
 
   void add_single(const Vector3& x, double h, NodeKind kind, const Vector3& normal) {

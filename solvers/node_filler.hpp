@@ -9,6 +9,11 @@
 
 namespace spherecut::solvers {
 
+// Distances in units of the mean spacing of two nodes; see node_filler.cpp for what was measured.
+constexpr double kept_crowding = 0.7;   // between corners and edge nodes, and between previous nodes
+constexpr double sweep_crowding = 0.88; // above: a place that the front has missed
+constexpr double sweep_fraction = 0.5;  // size of the samples that find such places, in units of h
+
 /// Throws InputError naming the option that is out of range.
 void check_options(const SprinkleOptions& options);
 
@@ -20,6 +25,8 @@ class Filler {
   // In this order; keep() and, without an incision, place_cut() may be left out.
   void place_seeds();
   void keep(const NodeCloud& previous);
+  /// In place of the two above, for a region: of the nodes around it those that are `fixed` stay in any case.
+  void keep_around(const NodeCloud& previous, const std::vector<bool>& fixed);
   void place_cut();
   void place_edges();
   /// Fronts start from all nodes present, after keep() from those alone around which something has changed.
@@ -31,6 +38,10 @@ class Filler {
   [[nodiscard]] int size() const { return nodes_.size(); }
   /// The nodes, where they were kept from, and the report; throws when they are too few or a zone is under-filled.
   Sprinkling finish();
+  [[nodiscard]] const NodeCloud& nodes() const { return nodes_; }
+  /// Per node, -1 for a new one; shorter when the last nodes are new.
+  [[nodiscard]] const std::vector<int>& kept_from() const { return kept_from_; }
+  [[nodiscard]] const std::vector<VolumeSample>& samples() const { return volume_samples_; }
 
  private:
   void add(const Vector3& x, double h, NodeKind kind, const Vector3& normal);
@@ -55,6 +66,7 @@ class Filler {
   [[nodiscard]] std::vector<int> front_starts() const;
   void surface_front(std::vector<int> front);
   void interior_front(std::vector<int> front);
+  void keep_others(const NodeCloud& previous, std::vector<bool> stays);
   /// Lip nodes of `previous` that still lie on a sheet, both of the pair.
   [[nodiscard]] std::vector<int> lips_to_keep(const NodeCloud& previous) const;
   /// Whether previous node j, no lip node, may stay where h is wanted; ratio: its spacing / h.

@@ -37,6 +37,24 @@ double inside_share(const topology::Domain& domain, const Vector3& x, double h, 
   return static_cast<double>(inside) / directions;
 }
 
+} // namespace
+
+double node_share(const topology::Domain& domain, const Vector3& x, double h, NodeKind kind, const Vector3& normal) {
+  switch (kind) {
+  case NodeKind::interior:
+    return 1;
+  case NodeKind::surface:
+    return 0.5;
+  case NodeKind::edge:
+    return inside_share(domain, x, h);
+  case NodeKind::lip:
+    return domain.signed_distance(x) < -0.25 * h ? 0.5 : inside_share(domain, x, h, &normal);
+  }
+  return 1;
+}
+
+namespace {
+
 /// Limits of the bands of h, ascending, one more than there are bands.
 std::vector<double> band_limits(const std::vector<VolumeSample>& samples) {
   double low = std::numeric_limits<double>::infinity(), high = 0;
@@ -134,25 +152,21 @@ SprinkleReport inspect_filling(const topology::Domain& domain, const SprinkleOpt
       // A partner across the sheet does not count.
       nearest[zone_of(h)].push_back(
           grid.nearest_in_spacings(x, h, i, nodes.kinds[i] == NodeKind::lip ? 20 * lip_offset * h : -1));
-    double share = 1;
     switch (nodes.kinds[i]) {
     case NodeKind::interior:
       ++report.interior_nodes;
       break;
     case NodeKind::surface:
       ++report.surface_nodes;
-      share = 0.5;
       break;
     case NodeKind::edge:
       ++report.edge_nodes;
-      share = inside_share(domain, x, h);
       break;
     case NodeKind::lip:
       ++report.lip_nodes;
-      share = domain.signed_distance(x) < -0.25 * h ? 0.5 : inside_share(domain, x, h, &nodes.normals[i]);
       break;
     }
-    zone.density += share / zone.expected;
+    zone.density += node_share(domain, x, h, nodes.kinds[i], nodes.normals[i]) / zone.expected;
   }
   for (std::size_t z = 0; z < report.zones.size(); ++z) {
     if (nearest[z].empty())

@@ -29,6 +29,9 @@ std::vector<VolumeSample> sample_volume(const topology::Domain& domain, const Sp
 std::vector<SurfaceSample> sample_surface(const topology::SurfaceMesh& surface, const SpacingField& spacing,
                                           double fraction, int maximum_nodes);
 
+/// Share of a node's surroundings that lies in the body and on its side of a sheet; see SprinkleZone.
+double node_share(const topology::Domain& domain, const Vector3& x, double h, NodeKind kind, const Vector3& normal);
+
 /// Size, place and flatness of the pieces of a cut body, largest first.
 std::vector<SprinklePiece> inspect_pieces(const NodeCloud& nodes, const topology::Incision& incision);
 

@@ -112,9 +112,28 @@ Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& optio
 /// was placed with is at most 25 % below and 10 % above the one wanted now (coarser is the tighter limit because
 /// spacing too coarse by 10 % already costs a quarter of the density), when no node kept before it is nearer than 0.7
 /// of their mean spacing, 0.8 where the spacing has grown, and when it still keeps clear of the wall. A seed that
-/// coincides with a previous node counts as kept. With unchanged options the result is the previous cloud, bit for bit.
-/// Throws as sprinkle does.
+/// coincides with a previous node counts as kept. Lip pairs stay while their sheet is there; other nodes go when a
+/// sheet comes within 0.3 h of them or a new lip pair or ring node needs their place. With unchanged options the result
+/// is the previous cloud, bit for bit (nodes of severed pieces thinner than 0.45 h excepted). Throws as sprinkle does.
 Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& previous);
+
+/// What one increment of a cut changes in a cloud.
+struct SprinkleIncrement {
+  std::vector<int> removed; // nodes of the previous cloud that have to go, ascending
+  NodeCloud added;          // to be appended; lip nodes in pairs, the node on the + side of the sheet first
+  SprinkleZone touched;     // expected number and density of the region that was looked at
+};
+
+/// The fast variant of resprinkle for a cut that has grown: looks at what lies within two spacings of the sheets' new
+/// triangles alone. Nodes there that the new sheet crowds go, those farther away are left as they are; lip pairs stay
+/// where they are when the front moves on, the ring ahead moves with it, new pairs and nodes fill what has become
+/// empty. options.incision is the cut as it is now, `before` as it was (null: uncut); options.spacing must be the field
+/// that `previous` was placed with, fine where the cut goes. Nodes marked in `retired` (one entry a node, or empty)
+/// have been removed by earlier increments: the ids of the others stay valid. Throws as sprinkle does, of the density
+/// in the region alone.
+SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const SprinkleOptions& options,
+                                    const NodeCloud& previous, const topology::Incision* before,
+                                    const std::vector<bool>& retired = {});
 
 /// Piece of each node: nodes closer than twice the mean of their spacings that see each other belong together. Pieces
 /// are numbered by falling number of nodes, then by their first node.

@@ -4,6 +4,7 @@
 #include "topology/voronoi_cells.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/lip_lift.hpp"
 #include "topology/point_tree.hpp"
 
 #include <Eigen/Geometry>
@@ -19,6 +20,8 @@ namespace {
 
 constexpr double cell_reach = 6;    // half size of the initial box of a cell, in h
 constexpr double cap_height = 0.75; // how far outside the curved surface a cell is cut off, in h
+constexpr double lip_reach = 0.01;  // a node this near to a sheet lies on one of its faces, in h
+constexpr double lip_lift = 0.1;    // by which it is lifted to look for its neighbours, in h
 constexpr int first_plane_id = -100;
 constexpr int cap_id = -50;
 
@@ -169,6 +172,8 @@ struct CellBuilder {
   const std::vector<double>& spacings;
   const Domain& domain;
   const PointTree& tree;
+  const Incision* incision;
+  const std::vector<Vector3>& lookouts; // of the nodes, when there is an incision
   bool curved;
   std::vector<PointTree::Found> near;
   std::vector<double> vertices;
@@ -179,6 +184,12 @@ struct CellBuilder {
 
  private:
   bool cut(int i, voro::voronoicell_neighbor& cell);
+  [[nodiscard]] bool hidden(int i, int j) const {
+    if (incision == nullptr)
+      return false;
+    const Vector3 &a = lookouts[i], &b = lookouts[j];
+    return incision->near(0.5 * (a + b), 0.5001 * (b - a).norm()) && incision->blocks(a, b);
+  }
 };
 
 bool CellBuilder::cut(int i, voro::voronoicell_neighbor& cell) {
@@ -292,6 +303,12 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
       cells.boundary.push_back({i, first_plane_id - neighbour, area, centroid});
       append_corners(polygon.vertices, x, h, cells.boundary_corners, cells.boundary_start);
       closure[i] += area;
+    } else if (neighbour > i && hidden(i, neighbour)) {
+      cells.lips.push_back({i, neighbour, area, centroid});
+      cells.lips.push_back({neighbour, i, -area, centroid});
+      append_corners(polygon.vertices, x, h, cells.lip_corners, cells.lip_start);
+      closure[i] += area;
+      closure[neighbour] -= area;
     } else if (neighbour > i) {
       cells.faces.push_back({i, neighbour, area, centroid});
       append_corners(polygon.vertices, x, h, cells.face_corners, cells.face_start);
@@ -309,17 +326,59 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
   }
 }
 
+/// The two nodes of a lip pair as mirror images about the tangent plane of their sheet: on a surface that the sheet
+/// meets at a slant they are not, and the face between their cells would lie askew. Moves nodes by at most their
+/// distance from the sheet.
+std::vector<Vector3> mirrored_lips(const std::vector<Vector3>& nodes, const std::vector<double>& spacings,
+                                   const Incision& incision) {
+  std::vector<int> lips;
+  std::vector<Vector3> places;
+  for (int i = 0; i < std::ssize(nodes); ++i)
+    if (incision.near(nodes[i], lip_reach * spacings[i])) {
+      lips.push_back(i);
+      places.push_back(nodes[i]);
+    }
+  std::vector<Vector3> sites = nodes;
+  const PointTree tree(places);
+  std::vector<PointTree::Found> found;
+  for (const int i : lips) {
+    found.clear();
+    tree.within(nodes[i], lip_reach * spacings[i], found);
+    std::sort(found.begin(), found.end());
+    for (const PointTree::Found& other : found) {
+      const int j = lips[other.index];
+      if (j == i || !incision.blocks(nodes[i], nodes[j]))
+        continue;
+      if (j < i) // done from there
+        break;
+      const Vector3 middle = 0.5 * (nodes[i] + nodes[j]);
+      const auto sheet = incision.closest(middle, lip_reach * spacings[i]);
+      if (sheet) {
+        const double height = 0.5 * (nodes[i] - nodes[j]).dot(sheet->normal);
+        sites[i] = sheet->point + height * sheet->normal;
+        sites[j] = sheet->point - height * sheet->normal;
+      }
+      break;
+    }
+  }
+  return sites;
+}
+
 } // namespace
 
-CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings,
-                          const Domain& domain) {
+CellComplex voronoi_cells(const std::vector<Vector3>& places, const std::vector<double>& spacings, const Domain& domain,
+                          const Incision* incision) {
+  const std::vector<Vector3> nodes = incision == nullptr ? places : mirrored_lips(places, spacings, *incision);
+  std::vector<Vector3> lookouts;
+  for (std::size_t i = 0; incision != nullptr && i < places.size(); ++i)
+    lookouts.push_back(lift_off(*incision, places[i], lip_reach * spacings[i], lip_lift * spacings[i]));
   const int count = static_cast<int>(nodes.size());
   CellComplex cells;
   cells.faces.reserve(8 * nodes.size());
   const PointTree tree(nodes);
   std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
   const bool curved = count > 0 && std::isfinite(domain.curved_distance(nodes.front()));
-  CellBuilder builder{nodes, spacings, domain, tree, curved, {}, {}, {}, {}, {}};
+  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, curved, {}, {}, {}, {}, {}};
   for (int i = 0; i < count; ++i)
     builder.build(i, cells, closure);
   std::vector<char> on_curve(nodes.size(), 0);
@@ -348,6 +407,8 @@ CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<d
     add_cone(face.first, face.area, face.centroid);
     add_cone(face.second, -face.area, face.centroid);
   }
+  for (const LipFace& face : cells.lips)
+    add_cone(face.node, face.area, face.centroid);
   for (const BoundaryFace& face : cells.boundary)
     add_cone(face.node, face.area, face.centroid);
   for (int i = 0; i < count; ++i) {
