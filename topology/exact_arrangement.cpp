@@ -7,8 +7,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <fmt/format.h>
+#include <optional>
 #include <utility>
 
 namespace spherecut::topology {
@@ -51,6 +53,8 @@ int third(const Triangle& t, int u, int v) {
 bool runs(const Triangle& t, int u, int v) {
   return (t[0] == u && t[1] == v) || (t[1] == u && t[2] == v) || (t[2] == u && t[0] == v);
 }
+
+constexpr int ray_tries = 30;
 
 void keep_once(std::vector<int>& values) {
   std::sort(values.begin(), values.end());
@@ -203,36 +207,49 @@ struct ExactArrangement::Data {
     return before(u, v, from, third(pieces[f].facet.points, u, v), to) ? Place::inside : Place::outside;
   }
 
+  /// 1 when the segment passes the triangle along its normal, -1 against it, 0 when it misses it; nothing when it
+  /// touches its border or lies in its plane.
+  [[nodiscard]] std::optional<int> crossing(int from, int to, const Triangle& t) const {
+    const int start = points.orientation(t[0], t[1], t[2], from), end = points.orientation(t[0], t[1], t[2], to);
+    if (start * end > 0)
+      return 0;
+    int left = 0, right = 0;
+    for (int e = 0; e < 3; ++e) {
+      const int turn = points.orientation(from, to, t[e], t[(e + 1) % 3]);
+      left += turn > 0;
+      right += turn < 0;
+    }
+    if (left > 0 && right > 0)
+      return 0;
+    if (start == 0 || end == 0 || (left < 3 && right < 3))
+      return std::nullopt;
+    return end;
+  }
+
+  /// The far end of ray number `k` from a point, beyond the surface.
+  int far_end(const Vector3& start, int k) {
+    const double reach = 2 * (size + (points.position(sources[0][0]) - start).norm());
+    const double height = (2 * k + 1.0) / ray_tries - 1, turn = 2.399963 * (k + 1); // a spiral over the sphere
+    const double radius = std::sqrt(1 - height * height);
+    return points.add(start + reach * Vector3(radius * std::cos(turn), radius * std::sin(turn), height));
+  }
+
   /// Place of a facet by the parity of a ray from its centroid.
   Place place_by_ray(int f) {
     const int from = points.centroid(pieces[f].facet.points);
     const Vector3 start = points.position(from);
-    const Vector3 far_corner = points.position(sources[0][0]) - start;
-    const double reach = 2 * (size + far_corner.norm());
-    const std::array<Vector3, 6> directions = {Vector3(0.61, 0.37, 0.70),   Vector3(-0.43, 0.81, 0.39),
-                                               Vector3(0.29, -0.53, -0.79), Vector3(-0.83, -0.47, 0.31),
-                                               Vector3(0.13, 0.23, -0.97),  Vector3(0.97, -0.11, 0.19)};
-    for (const Vector3& direction : directions) {
-      const Vector3 end = start + reach * direction;
-      const int to = points.add(end);
+    for (int k = 0; k < ray_tries; ++k) {
+      const int to = far_end(start, k);
       std::vector<int> near;
-      surface_tree.along(start, end, near);
+      surface_tree.along(start, points.position(to), near);
       int crossings = 0;
-      bool grazes = false;
+      bool clear = true;
       for (const int s : near) {
-        const Triangle& t = sources[s];
-        if (points.orientation(t[0], t[1], t[2], from) * points.orientation(t[0], t[1], t[2], to) > 0)
-          continue;
-        int left = 0, right = 0;
-        for (int e = 0; e < 3; ++e) {
-          const int turn = points.orientation(from, to, t[e], t[(e + 1) % 3]);
-          left += turn > 0;
-          right += turn < 0;
-        }
-        crossings += left == 3 || right == 3;
-        grazes = grazes || (left < 3 && right < 3 && !(left > 0 && right > 0));
+        const std::optional<int> crossed = crossing(from, to, sources[s]);
+        clear = clear && crossed;
+        crossings += crossed.value_or(0) != 0;
       }
-      if (!grazes)
+      if (clear)
         return crossings % 2 == 1 ? Place::inside : Place::outside;
     }
     throw NumericalError(fmt::format("cannot tell whether the sheet is inside at ({:.6g}, {:.6g}, {:.6g}) m", start.x(),
@@ -449,6 +466,41 @@ void ExactArrangement::sort_about_edge(int from, int to, std::vector<int>& facet
   const int start = opposite(facets.front());
   std::sort(facets.begin() + 1, facets.end(),
             [&](int f, int g) { return f != g && data_->before(from, to, start, opposite(f), opposite(g)); });
+}
+
+std::vector<ExactArrangement::RayCrossing> ExactArrangement::ray_from(int facet, bool along_normal) {
+  Data& d = *data_;
+  const Triangle own = d.pieces[facet].facet.points;
+  const int from = d.points.centroid(own);
+  for (int k = 0; k < ray_tries; ++k) {
+    const int to = d.far_end(d.points.position(from), k);
+    if (d.points.orientation(own[0], own[1], own[2], to) != (along_normal ? 1 : -1))
+      continue;
+    std::vector<std::pair<int, RayCrossing>> crossings; // with the point
+    bool clear = true;
+    for (int f = 0; f < facet_count() && clear; ++f) {
+      if (!active(f) || f == facet)
+        continue;
+      const Triangle t = d.pieces[f].facet.points;
+      const std::optional<int> crossed = d.crossing(from, to, t);
+      clear = crossed.has_value();
+      if (crossed.value_or(0) != 0)
+        crossings.push_back({d.points.edge_plane(from, to, t), {f, *crossed > 0}});
+    }
+    if (!clear)
+      continue;
+    // On a line the lexicographic order runs one way.
+    const int forward = d.points.compare(from, to);
+    std::sort(crossings.begin(), crossings.end(),
+              [&](const auto& a, const auto& b) { return d.points.compare(a.first, b.first) * forward > 0; });
+    std::vector<RayCrossing> result;
+    for (const auto& [point, crossed] : crossings)
+      result.push_back(crossed);
+    return result;
+  }
+  const Vector3& x = d.points.position(from);
+  throw NumericalError(
+      fmt::format("no ray from ({:.6g}, {:.6g}, {:.6g}) m passes clear of all edges", x.x(), x.y(), x.z()));
 }
 
 std::array<Vector3, 3> ExactArrangement::source_corners(int source) const {

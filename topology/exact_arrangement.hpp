@@ -53,6 +53,14 @@ class ExactArrangement {
   /// Sorts facets that have the edge by their angle, counter-clockwise about the direction from -> to.
   void sort_about_edge(int from, int to, std::vector<int>& facets) const;
 
+  struct RayCrossing {
+    int facet;
+    bool along_normal;
+  };
+  /// The active facets that some ray from the middle of a facet, starting along or against its normal, passes through,
+  /// in order. Looks at all facets.
+  [[nodiscard]] std::vector<RayCrossing> ray_from(int facet, bool along_normal);
+
   /// Corners of an input triangle, m.
   [[nodiscard]] std::array<Vector3, 3> source_corners(int source) const;
 

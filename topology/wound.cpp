@@ -162,8 +162,13 @@ std::uint64_t surface_hash(const SurfaceMesh& surface) {
     for (int c = 0; c < 3; ++c)
       for (int axis = 0; axis < 3; ++axis)
         corner[c] = mix(corner[c], std::bit_cast<std::uint64_t>(surface.vertices[t[c]][axis] + 0.0));
-    std::rotate(corner.begin(), std::min_element(corner.begin(), corner.end()), corner.end());
-    sum += mix(mix(mix(1, corner[0]), corner[1]), corner[2]);
+    // The least rotation: two corners can lie at one place.
+    std::array<std::uint64_t, 3> least = corner;
+    for (int turn = 0; turn < 2; ++turn) {
+      std::rotate(corner.begin(), corner.begin() + 1, corner.end());
+      least = std::min(least, corner);
+    }
+    sum += mix(mix(mix(1, least[0]), least[1]), least[2]);
   }
   return sum;
 }

@@ -53,7 +53,7 @@ class WoundAssembly {
   bool keep_components(const std::vector<int>& halves);
   void label_all();
   void assign_pieces(const std::vector<bool>& flat);
-  void join_along_ray(int half, std::vector<int>& group) const;
+  void join_along_ray(int half, std::vector<int>& group);
   void sum_pieces();
 
   static std::uint64_t key_of(int u, int v); // of an edge

@@ -1,15 +1,10 @@
 // Which parts of a wound's surface are connected, and which material they bound.
 #include "topology/wound_assembly.hpp"
 
-#include "topology/errors.hpp"
-
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
-#include <tuple>
 
 namespace spherecut::topology {
 
@@ -231,59 +226,16 @@ void WoundAssembly::assign_pieces(const std::vector<bool>& flat) {
 
 /// Follows a ray from the middle of a wall into its material, out through the whole organ, and joins the components
 /// between which it runs through material.
-void WoundAssembly::join_along_ray(int half, std::vector<int>& group) const {
-  const auto corners = [&](int facet) {
-    const Triangle& t = arrangement_.facet(facet).points;
-    return std::array<Vector3, 3>{arrangement_.position(t[0]), arrangement_.position(t[1]),
-                                  arrangement_.position(t[2])};
-  };
-  const auto [p, q, r] = corners(half / 2);
-  const Vector3 start = (p + q + r) / 3;
-  const std::array<Vector3, 6> directions = {Vector3(0.61, 0.37, 0.70),   Vector3(-0.43, 0.81, 0.39),
-                                             Vector3(0.29, -0.53, -0.79), Vector3(-0.83, -0.47, 0.31),
-                                             Vector3(0.13, 0.23, -0.97),  Vector3(0.97, -0.11, 0.19)};
-  for (Vector3 direction : directions) {
-    if (direction.dot(outward(half)) > 0)
-      direction = -direction;
-    std::vector<std::tuple<double, int, int>> hits; // how far, the half before and the half behind (-1: outside)
-    bool grazes = false;
-    for (int f = 0; f < arrangement_.facet_count() && !grazes; ++f) {
-      if (!arrangement_.active(f) || f == half / 2)
-        continue;
-      const auto [a, b, c] = corners(f);
-      const Vector3 normal = (b - a).cross(c - a);
-      const double slope = normal.dot(direction), area2 = normal.squaredNorm();
-      if (slope == 0 || area2 == 0)
-        continue;
-      const double along = normal.dot(a - start) / slope;
-      if (along < 0)
-        continue;
-      const Vector3 x = start + along * direction;
-      const double least = std::min({normal.dot((b - a).cross(x - a)), normal.dot((c - b).cross(x - b)),
-                                     normal.dot((a - c).cross(x - c))}) /
-                           area2;
-      constexpr double margin = 1e-7; // of the triangle: nearer to an edge the next facet may be meant
-      grazes = std::abs(least) < margin;
-      if (least < 0)
-        continue;
-      const int behind_normal = 2 * f, before_normal = arrangement_.on_surface(f) ? -1 : 2 * f + 1;
-      if (slope > 0)
-        hits.emplace_back(along, behind_normal, before_normal);
-      else
-        hits.emplace_back(along, before_normal, behind_normal);
-    }
-    if (grazes)
-      continue;
-    std::sort(hits.begin(), hits.end());
-    int last = half;
-    for (const auto& [along, before, behind] : hits) {
-      if (last >= 0 && before >= 0)
-        join(group, output_[last].component, output_[before].component);
-      last = behind;
-    }
-    return;
+void WoundAssembly::join_along_ray(int half, std::vector<int>& group) {
+  const bool before_normal = half % 2 == 1; // the material lies on the + side
+  int last = half;                          // bounds the material that the ray is in; -1 outside
+  for (const auto& [facet, along_normal] : arrangement_.ray_from(half / 2, before_normal)) {
+    const int behind = 2 * facet, before = arrangement_.on_surface(facet) ? -1 : 2 * facet + 1;
+    const int met = along_normal ? behind : before;
+    if (last >= 0 && met >= 0)
+      join(group, output_[last].component, output_[met].component);
+    last = along_normal ? before : behind;
   }
-  throw NumericalError("cannot tell which piece of material holds a buried cut");
 }
 
 void WoundAssembly::sum_pieces() {
