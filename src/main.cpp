@@ -75,7 +75,8 @@ int run(int argc, char** argv) {
   list->add_flag("--names", names_only, "Names alone");
   auto* run_one = experiment->add_subcommand("run", "Run one experiment");
   run_one->add_option("name", name, "Name, from the list")->required();
-  run_one->add_option("--out", out, "Folder for tables, figures and summary.json; must not hold results yet")->required();
+  run_one->add_option("--out", out, "Folder for tables, figures and summary.json; must not hold results yet")
+      ->required();
   run_one->add_flag("--quick", quick, "Smaller variant");
 
   auto* help = commands.add_subcommand("scenario-help", "Every key of a scenario file");
