@@ -1,9 +1,9 @@
 #include "solvers/background_cells.hpp"
 
+#include "solvers/split_box.hpp"
 #include "topology/errors.hpp"
 #include "topology/point_tree.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -25,8 +25,9 @@ double inside_fraction(double distance, const Vector3& normal, const Vector3& ha
 
 class Octree {
  public:
-  Octree(const topology::Domain& domain, const NodeCloud& nodes, const BackgroundOptions& options)
-      : domain_(domain), nodes_(nodes), options_(options), tree_(nodes.positions) {}
+  Octree(const topology::Domain& domain, const NodeCloud& nodes, const BackgroundOptions& options,
+         const topology::Incision* incision)
+      : domain_(domain), nodes_(nodes), options_(options), incision_(incision), tree_(nodes.positions) {}
 
   BackgroundCells build() {
     // Roots as large as the coarsest spacing allows, fitted to the bounding box: a uniform cloud needs no division.
@@ -72,7 +73,9 @@ class Octree {
       return;
     }
     const bool inside = distance < -radius || corners_inside(centre, half);
-    if (inside)
+    if (incision_ != nullptr && may_be_split(centre, half))
+      add_split(centre, half, inside);
+    else if (inside)
       add_gauss(centre, half);
     else
       add_cut(centre, half);
@@ -113,87 +116,164 @@ class Octree {
                volume * weights[n - 1][a] * weights[n - 1][b] * weights[n - 1][c]});
   }
 
+  /// Part of a small box inside the body: its volume over that of the box, and how far its centroid lies from the
+  /// box's.
+  std::pair<double, Vector3> part_inside(const Vector3& x, const Vector3& half) const {
+    const double distance = domain_.signed_distance(x);
+    if (std::abs(distance) >= half.norm())
+      return {distance < 0 ? 1 : 0, Vector3::Zero()};
+    const Vector3 n = domain_.normal(x);
+    const double fraction = inside_fraction(distance, n, half);
+    return {fraction, -(1 - fraction) * n.cwiseAbs().dot(half) * n};
+  }
+
+  static constexpr int octants = 8;
+  static Vector3 octant_centre(const Vector3& centre, const Vector3& half, int octant) {
+    return centre + 0.5 * half.cwiseProduct(Vector3(octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1));
+  }
+
   void add_cut(const Vector3& centre, const Vector3& half) {
-    constexpr int parts = 2;  // octants per direction
-    constexpr int detail = 2; // samples per direction in an octant
-    const Vector3 octant_half = half / parts, sample_half = octant_half / detail;
-    for (int octant = 0; octant < parts * parts * parts; ++octant) {
-      const Vector3 middle =
-          centre + octant_half.cwiseProduct(Vector3(octant & 1 ? 1 : -1, octant & 2 ? 1 : -1, octant & 4 ? 1 : -1));
+    const Vector3 octant_half = half / 2, sample_half = half / 4;
+    for (int octant = 0; octant < octants; ++octant) {
+      const Vector3 middle = octant_centre(centre, half, octant);
       double volume = 0;
       Vector3 moment = Vector3::Zero();
-      for (int k = 0; k < 8; ++k) {
-        const Vector3 x = middle + sample_half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1));
-        const double distance = domain_.signed_distance(x);
-        double fraction = distance < 0 ? 1 : 0;
-        Vector3 place = x;
-        if (std::abs(distance) < sample_half.norm()) {
-          const Vector3 n = domain_.normal(x);
-          fraction = inside_fraction(distance, n, sample_half);
-          place -= (1 - fraction) * n.cwiseAbs().dot(sample_half) * n; // centroid of what remains
-        }
+      for (int k = 0; k < octants; ++k) {
+        const Vector3 x = octant_centre(middle, octant_half, k);
+        const auto [fraction, shift] = part_inside(x, sample_half);
         const double part = fraction * 8 * sample_half.prod();
         volume += part;
-        moment += part * place;
+        moment += part * (x + shift);
       }
       if (volume > 1e-3 * 8 * octant_half.prod())
         cells_.points.push_back({moment / volume, volume});
     }
   }
 
+  bool may_be_split(const Vector3& centre, const Vector3& half) const {
+    const double radius = half.norm();
+    if (!incision_->near(centre, radius))
+      return false;
+    const auto sheet = incision_->closest(centre, radius);
+    return sheet && std::abs(sheet->normal.dot(centre - sheet->point)) < sheet->normal.cwiseAbs().dot(half);
+  }
+
+  /// The points of a cell that see one another.
+  struct Group {
+    Vector3 eye; // one of them
+    std::vector<QuadraturePoint> points;
+  };
+
+  void add_split(const Vector3& centre, const Vector3& half, bool inside) {
+    groups_.clear();
+    for (int octant = 0; octant < octants; ++octant)
+      add_split_octant(octant_centre(centre, half, octant), half / 2, inside);
+    for (const Group& group : groups_)
+      for (std::size_t k = 0; k < group.points.size(); ++k) {
+        if (std::ssize(cells_.points) - cells_.start.back() == most_cell_points ||
+            (k == 0 && std::ssize(cells_.points) > cells_.start.back()))
+          cells_.start.push_back(static_cast<int>(cells_.points.size()));
+        cells_.points.push_back(group.points[k]);
+      }
+  }
+
+  void add_split_octant(const Vector3& centre, const Vector3& half, bool inside) {
+    const auto sheet = incision_->closest(centre, half.norm());
+    if (inside) {
+      const auto parts = sheet ? split_box(centre, half, sheet->point, sheet->normal)
+                               : std::array<BoxPart, 2>{BoxPart{8 * half.prod(), centre}, BoxPart{}};
+      if (clear_parts(centre, half, sheet, parts)) {
+        for (const BoxPart& part : parts)
+          if (part.volume > 0)
+            add_to_group(part.centroid, part.volume);
+        return;
+      }
+    }
+    // Samples where the body ends, or where one plane does not tell what hides what: those that see one another count
+    // together.
+    struct Part {
+      Vector3 eye;
+      double volume;
+      Vector3 moment;
+    };
+    std::vector<Part> visible;
+    const int detail = inside ? 4 : 2;
+    const Vector3 sample_half = half / detail;
+    const auto add_sample = [&](const Vector3& x, double volume) {
+      auto part =
+          std::find_if(visible.begin(), visible.end(), [&](const Part& p) { return !incision_->blocks(p.eye, x); });
+      if (part == visible.end())
+        part = visible.insert(visible.end(), {x, 0, Vector3::Zero()});
+      part->volume += volume;
+      part->moment += volume * x;
+    };
+    for (int a = 0; a < detail; ++a)
+      for (int b = 0; b < detail; ++b)
+        for (int c = 0; c < detail; ++c) {
+          const Vector3 x = centre - half + sample_half.cwiseProduct(Vector3(2 * a + 1, 2 * b + 1, 2 * c + 1));
+          const auto [fraction, shift] =
+              inside ? std::pair(1.0, Vector3(Vector3::Zero())) : part_inside(x, sample_half);
+          if (!(fraction > 0))
+            continue;
+          const auto plane = incision_->closest(x, sample_half.norm());
+          const auto parts = plane ? split_box(x, sample_half, plane->point, plane->normal)
+                                   : std::array<BoxPart, 2>{BoxPart{8 * sample_half.prod(), x}, BoxPart{}};
+          for (const BoxPart& part : parts) {
+            if (part.volume == 0)
+              continue;
+            const Vector3 moved = part.centroid + shift;
+            add_sample(incision_->blocks(part.centroid, moved) ? part.centroid : moved, fraction * part.volume);
+          }
+        }
+    for (const Part& part : visible)
+      if (part.volume > 1e-4 * 8 * half.prod())
+        add_to_group(incision_->blocks(part.eye, part.moment / part.volume) ? part.eye : part.moment / part.volume,
+                     part.volume);
+  }
+
+  /// Whether each part's centroid sees the part's corners of the octant: then the plane is the whole cut there.
+  bool clear_parts(const Vector3& centre, const Vector3& half, const std::optional<topology::SheetPoint>& sheet,
+                   const std::array<BoxPart, 2>& parts) const {
+    for (int k = 0; k < octants; ++k) {
+      const Vector3 corner =
+          centre + 0.999 * half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1));
+      const bool first = !sheet || sheet->normal.dot(corner - sheet->point) >= 0;
+      const BoxPart& part = first ? parts[0] : parts[1];
+      if (part.volume > 0 && incision_->blocks(part.centroid, corner))
+        return false;
+    }
+    return true;
+  }
+
+  void add_to_group(const Vector3& x, double volume) {
+    auto group =
+        std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return !incision_->blocks(g.eye, x); });
+    if (group == groups_.end())
+      group = groups_.insert(groups_.end(), {x, {}});
+    group->points.push_back({x, volume});
+  }
+
   const topology::Domain& domain_;
   const NodeCloud& nodes_;
   BackgroundOptions options_;
+  const topology::Incision* incision_;
   topology::PointTree tree_;
   std::vector<topology::PointTree::Found> found_;
+  std::vector<Group> groups_;
   BackgroundCells cells_;
 };
 
 } // namespace
 
 BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
-                                 const BackgroundOptions& options) {
+                                 const BackgroundOptions& options, const topology::Incision* incision) {
   if (options.gauss < 1 || options.gauss > 3)
     throw InputError(fmt::format("quadrature of {} points per direction; there are 1, 2 and 3", options.gauss));
   if (!(options.cell_size > 0) || !std::isfinite(options.cell_size))
     throw InputError(fmt::format("background cells of {} node spacings: the size must be positive", options.cell_size));
   if (nodes.size() == 0)
     throw InputError("background cells need nodes: their spacings set the size");
-  return Octree(domain, nodes, options).build();
-}
-
-std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes, double edge,
-                                             double centroid_below) {
-  const topology::PointTree tree(nodes.positions);
-  const topology::SurfaceMesh& surface = domain.surface();
-  std::vector<SurfacePoint> points;
-  std::vector<std::array<Vector3, 3>> pending;
-  for (const Triangle& triangle : surface.triangles) {
-    pending.push_back({surface.vertices[triangle[0]], surface.vertices[triangle[1]], surface.vertices[triangle[2]]});
-    while (!pending.empty()) {
-      const std::array<Vector3, 3> t = pending.back();
-      pending.pop_back();
-      const Vector3 centre = (t[0] + t[1] + t[2]) / 3;
-      const double spacing = nodes.spacings[tree.nearest(centre).index];
-      const double longest = std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
-      if (longest > edge * spacing) {
-        const Vector3 a = 0.5 * (t[0] + t[1]), b = 0.5 * (t[1] + t[2]), c = 0.5 * (t[2] + t[0]);
-        pending.push_back({t[0], a, c});
-        pending.push_back({a, t[1], b});
-        pending.push_back({c, b, t[2]});
-        pending.push_back({a, b, c});
-        continue;
-      }
-      const Vector3 area = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]);
-      const double size = area.norm();
-      if (size > 0 && longest < centroid_below * spacing)
-        points.push_back({centre, area / size, size});
-      else if (size > 0)
-        for (const Vector3& corner : t)
-          points.push_back({0.5 * (centre + corner), area / size, size / 3});
-    }
-  }
-  return points;
+  return Octree(domain, nodes, options, incision).build();
 }
 
 } // namespace spherecut::solvers

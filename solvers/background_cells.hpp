@@ -22,19 +22,30 @@ struct BackgroundOptions {
 };
 
 /// Cells inside the body carry gauss^3 Gauss points. Cells that meet the surface are cut into octants, each of which
-/// carries one point at the centroid of its part inside, weighted by that part's volume.
+/// carries one point at the centroid of its part inside, weighted by that part's volume. Cells that a sheet of the
+/// incision (null: uncut) may pass through are cut into octants and these by the sheet's plane; the points that do not
+/// see one another make cells of their own.
 BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
-                                 const BackgroundOptions& options = {});
+                                 const BackgroundOptions& options = {}, const topology::Incision* incision = nullptr);
+
+/// Most points of one cell.
+inline constexpr int most_cell_points = 27;
 
 /// Points of a quadrature rule over the surface, `weight` is an area, m2. Triangles of the tessellation are divided to
 /// edges of at most `edge` local spacings; each carries three points, exact for quadratic functions, or its centroid
-/// alone where it is less than 0.6 of that size anyway.
+/// alone where it is less than `centroid_below` spacings long. Triangles that a sheet of the incision (null: uncut)
+/// meets are divided by it.
 struct SurfacePoint {
   Vector3 position;
   Vector3 normal;
   double weight;
 };
 std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes, double edge = 0.5,
-                                             double centroid_below = 0);
+                                             double centroid_below = 0, const topology::Incision* incision = nullptr);
+
+/// The same over both faces of an incision, as far as they lie inside the body: positions lip_offset spacings off the
+/// sheet, normals out of the material.
+std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge = 0.5,
+                                         double centroid_below = 0);
 
 } // namespace spherecut::solvers

@@ -27,6 +27,25 @@ Method method_from_string(std::string_view name) {
   throw InputError(fmt::format("method '{}' does not exist; there are: published, collocation, galerkin", name));
 }
 
+std::string_view to_string(UnheldPieces treatment) {
+  switch (treatment) {
+  case UnheldPieces::refuse:
+    return "refuse";
+  case UnheldPieces::hold:
+    return "hold";
+  case UnheldPieces::drop:
+    return "drop";
+  }
+  return "unknown";
+}
+
+UnheldPieces unheld_pieces_from_string(std::string_view name) {
+  for (UnheldPieces treatment : {UnheldPieces::refuse, UnheldPieces::hold, UnheldPieces::drop})
+    if (name == to_string(treatment))
+      return treatment;
+  throw InputError(fmt::format("'{}' for pieces that nothing holds; there are: refuse, hold, drop", name));
+}
+
 void Field::add(double factor, const Field& other) {
   coefficients += factor * other.coefficients;
   if (pressure.size() > 0)

@@ -52,14 +52,32 @@ struct Problem {
   std::function<Vector3(const Vector3& x)> prescribed_field;
 };
 
+/// What becomes of a piece that is cut off and that no prescribed displacement holds.
+enum class UnheldPieces {
+  refuse, // InputError that says which
+  hold,   // six soft springs on three of its nodes: exact under loads in balance, which leave the springs unloaded
+  drop,   // its unknowns are taken out and its displacement is zero
+};
+std::string_view to_string(UnheldPieces treatment);
+/// Throws InputError naming the value and the three allowed names.
+UnheldPieces unheld_pieces_from_string(std::string_view name);
+
 struct DiscretisationOptions {
   Method method = Method::galerkin;
-  double support_radius = 0;             // rho, support radius / h; 0: the method's default for this Poisson ratio
-  int quadrature = 2;                    // Gauss points per direction in a background cell (galerkin)
-  double cell_size = 0.75;               // edge of a background cell in units of h (galerkin)
-  int tip_node = -1;                     // the tool-tip node of `published`
-  SightRule sight = SightRule::enriched; // only where there is an incision
-  bool estimate_condition = true;        // a dozen more solves; leave out where every rebuild counts
+  double support_radius = 0;                  // rho, support radius / h; 0: the method's default for this Poisson ratio
+  int quadrature = 2;                         // Gauss points per direction in a background cell (galerkin)
+  double cell_size = 0.75;                    // edge of a background cell in units of h (galerkin)
+  int tip_node = -1;                          // the tool-tip node of `published`
+  SightRule sight = SightRule::enriched;      // only where there is an incision
+  UnheldPieces unheld = UnheldPieces::refuse; // galerkin
+  bool estimate_condition = true;             // a dozen more solves; leave out where every rebuild counts
+};
+
+/// Nodes that couple among themselves alone.
+struct Piece {
+  std::vector<int> nodes;             // ascending
+  Vector3 centroid = Vector3::Zero(); // m, mean of the nodes
+  bool held = false;                  // by some prescribed displacement
 };
 
 /// Diagnostics of assembly and factorisation. Times are wall clock, s.
@@ -71,6 +89,7 @@ struct AssemblyReport {
   double condition_estimate = 0;     // 1-norm estimate (Hager-Higham), 0 when not asked for
   double worst_moment_condition = 0; // largest condition number of a moment matrix
   int grown_supports = 0;            // supports whose radius had to grow
+  std::vector<Piece> pieces;         // one for a body that is not cut apart (galerkin)
   double supports_seconds = 0, assembly_seconds = 0, factor_seconds = 0;
 };
 

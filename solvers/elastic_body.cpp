@@ -28,6 +28,8 @@ void check_problem(const Problem& problem) {
                                  nodes.spacings.size(), nodes.kinds.size(), nodes.normals.size()));
   if (nodes.size() < 4)
     throw InputError(fmt::format("{} nodes: a linear basis in three dimensions needs at least 4", nodes.size()));
+  if (!problem.loads.initial_strain.allFinite())
+    throw InputError("the initial strain is not finite");
   for (int i = 0; i < nodes.size(); ++i) {
     if (!nodes.positions[i].allFinite())
       throw InputError(fmt::format("node {}: its position is not finite", i));
@@ -84,6 +86,11 @@ Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient) 
          material.shear_modulus() * (gradient + gradient.transpose());
 }
 
+Matrix3 initial_stress(const Problem& problem) {
+  return stress_from_gradient(problem.material,
+                              0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose()));
+}
+
 ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule)
     : problem_(checked(std::move(problem))),
       spheres_(problem_.nodes.positions, problem_.nodes.spacings, rho, Basis::linear, worst_moment_condition,
@@ -137,10 +144,15 @@ PointState ElasticBody::at(const Vector3& x, const Field& field) const {
       pressure += shape.value[k] * field.pressure[j];
   }
   state.strain = 0.5 * (state.gradient + state.gradient.transpose());
+  // The initial strain acts with the loads. A pressure unknown holds the volumetric part, -lambda tr(strain - initial).
+  const Matrix3& initial = problem_.loads.initial_strain;
   if (field.pressure.size() > 0)
-    state.stress = 2 * problem_.material.shear_modulus() * state.strain - pressure * Matrix3::Identity();
+    state.stress = 2 * problem_.material.shear_modulus() *
+                       (state.strain - field.load_factor * 0.5 * (initial + initial.transpose())) -
+                   pressure * Matrix3::Identity();
   else
-    state.stress = stress_from_gradient(problem_.material, state.gradient);
+    state.stress =
+        stress_from_gradient(problem_.material, state.gradient) - field.load_factor * initial_stress(problem_);
   return state;
 }
 

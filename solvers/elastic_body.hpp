@@ -28,6 +28,10 @@ void check_problem(const Problem& problem);
 /// Stress of isotropic linear elasticity from the displacement gradient, Pa.
 Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient);
 
+/// Stress that the initial strain of the loads leaves behind where the body does not deform, with its sign turned:
+/// sigma = C strain - initial_stress, Pa.
+Matrix3 initial_stress(const Problem& problem);
+
 /// Shared part of the two finite-sphere discretisations.
 class ElasticBody : public Discretisation {
  public:

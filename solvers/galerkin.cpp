@@ -6,37 +6,30 @@
 // quadrature of the traction). A penalty P = `penalty` E h_i per component adds P m m^T, and the force of the
 // constraint on the body is P (g - m(u)). Forces of the tool act on the same shares. The shape functions sum to one, so
 // the rows of K add up to zero and all forces balance to rounding.
+#include "solvers/galerkin.hpp"
+
 #include "solvers/background_cells.hpp"
+#include "solvers/cell_shapes.hpp"
 #include "solvers/elastic_body.hpp"
-#include "solvers/factorisation.hpp"
 #include "solvers/stiffness_kernel.hpp"
 #include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
-#include "topology/point_tree.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <numeric>
 
 namespace spherecut::solvers {
 
 namespace {
 
-constexpr double penalty = 1e5;
+constexpr double penalty = 1e4;
 
 double default_support_radius(double poisson_ratio) {
   // Larger supports carry more volume-preserving modes: they cure locking.
   return poisson_ratio >= 0.45 ? 2.2 : 2.0;
 }
-
-/// Shape function gradients of one background cell over the union of its points' supports.
-struct CellShapes {
-  std::vector<int> ranks; // elimination ranks of the nodes, ascending
-  bool grown = false;     // some support had to reach beyond its radius
-  int points = 0;
-  int stride = 0;
-  std::vector<double> gradients; // [point][axis][stride], times sqrt(weight)
-};
 
 class Galerkin final : public ElasticBody {
  public:
@@ -49,11 +42,10 @@ class Galerkin final : public ElasticBody {
     BackgroundOptions background;
     background.gauss = options.quadrature;
     background.cell_size = options.cell_size;
-    cells_ = background_cells(*problem_.domain, problem_.nodes, background);
+    cells_ = background_cells(*problem_.domain, problem_.nodes, background, problem_.incision.get());
     hold_surface();
-    order_nodes();
     evaluate_cells();
-    build_pattern();
+    order_and_build_pattern(options.unheld);
     assemble();
     assemble_loads();
     report_.unknowns = 3 * problem_.nodes.size();
@@ -71,6 +63,7 @@ class Galerkin final : public ElasticBody {
   }
 
   Method method() const override { return Method::galerkin; }
+  OrderedStiffness stiffness() const { return {stiffness_, order_, anchors_}; }
 
   Field solve() const override {
     VectorX prescribed = prescribed_values(problem_);
@@ -120,10 +113,11 @@ class Galerkin final : public ElasticBody {
                   const std::vector<Vector3>& nodal_forces) const override;
 
  private:
-  void order_nodes();
   void evaluate_cells();
   void hold_surface();
-  void build_pattern();
+  void order_and_build_pattern(UnheldPieces unheld);
+  void treat_unheld(UnheldPieces unheld);
+  void list_by_rank();
   void assemble();
   void assemble_loads();
   [[nodiscard]] double constraint_stiffness(int node) const {
@@ -142,8 +136,15 @@ class Galerkin final : public ElasticBody {
       by_node.middleRows<3>(3 * i) = by_rank.middleRows<3>(3 * static_cast<Eigen::Index>(rank_[i]));
     return by_node;
   }
-  [[nodiscard]] MatrixX solve_ordered(const MatrixX& right) const {
+  [[nodiscard]] MatrixX solve_ordered(MatrixX right) const {
+    clear_dropped(right);
     return unordered(factorisation_->solve(ordered(right)));
+  }
+  template <typename Rows>
+  void clear_dropped(Rows& rows) const {
+    for (int i = 0; i < std::ssize(dropped_); ++i)
+      if (dropped_[i] != 0)
+        rows.template middleRows<3>(3 * i).setZero();
   }
   template <typename Column>
   static void add_force(const DisplacementMean& mean, const Vector3& force, Column&& right) {
@@ -171,10 +172,13 @@ class Galerkin final : public ElasticBody {
 
   BackgroundCells cells_;
   std::unique_ptr<SurfacePatches> patches_;
-  std::vector<DisplacementMean> held_; // one per prescribed entry
-  std::vector<int> rank_;              // elimination rank of every node
-  std::vector<CellShapes> shapes_;
-  std::vector<int> cells_start_, cells_of_rank_;             // compressed rows: (cell, place of the node in it) pairs
+  std::vector<DisplacementMean> held_;           // one per prescribed entry
+  std::vector<char> dropped_;                    // nodes whose unknowns are taken out; empty when there are none
+  std::vector<Anchor> anchors_;                  // hold pieces that nothing else holds
+  std::vector<int> order_;                       // node of every elimination rank
+  std::vector<int> rank_;                        // elimination rank of every node
+  std::vector<CellShapes> shapes_;               // by ranks
+  std::vector<int> cells_start_, cells_of_rank_; // compressed rows: (cell, place of the node in it) pairs
   std::vector<int> constraints_start_, constraints_of_rank_; // prescribed entries whose mean holds the node
   std::vector<int> column_start_, column_rows_;              // lower block pattern in ranks, rows >= column, ascending
   SparseMatrix stiffness_;                                   // lower triangle (diagonal blocks full), in ranks
@@ -182,91 +186,16 @@ class Galerkin final : public ElasticBody {
   std::unique_ptr<Factorisation> factorisation_;
 };
 
-void Galerkin::order_nodes() {
-  // Nodes couple where their spheres overlap and through the means of the held surface. Ordering nodes instead of
-  // unknowns is a ninth of the graph, and a matrix assembled in elimination order needs no permutation in the
-  // factorisation.
-  const int count = problem_.nodes.size();
-  const std::vector<double>& radii = spheres_.radii();
-  const double largest = *std::max_element(radii.begin(), radii.end());
-  const topology::PointTree tree(problem_.nodes.positions);
-  std::vector<topology::PointTree::Found> near;
-  std::vector<std::vector<int>> means_of_node(count);
-  for (int p = 0; p < std::ssize(held_); ++p)
-    for (int node : held_[p].nodes)
-      means_of_node[node].push_back(p);
-  std::vector<int> start(1, 0), neighbours;
-  for (int i = 0; i < count; ++i) {
-    near.clear();
-    tree.within(problem_.nodes.positions[i], radii[i] + largest, near);
-    for (const topology::PointTree::Found& other : near) {
-      const double reach = radii[i] + radii[other.index];
-      if (other.squared_distance < reach * reach)
-        neighbours.push_back(other.index);
-    }
-    for (int p : means_of_node[i])
-      neighbours.insert(neighbours.end(), held_[p].nodes.begin(), held_[p].nodes.end());
-    start.push_back(static_cast<int>(neighbours.size()));
-  }
-  const std::vector<int> order = fill_reducing_ordering(start, neighbours);
-  rank_.resize(count);
-  for (int k = 0; k < count; ++k)
-    rank_[order[k]] = k;
-}
-
 void Galerkin::evaluate_cells() {
-  const int cell_count = static_cast<int>(cells_.start.size()) - 1;
-  shapes_.resize(cell_count);
-  std::vector<int> place(problem_.nodes.size(), -1);
-  std::array<ShapeFunctions, 27> at_point;
-  for (int c = 0; c < cell_count; ++c) {
-    CellShapes& cell = shapes_[c];
-    cell.points = cells_.start[c + 1] - cells_.start[c];
-    for (int q = 0; q < cell.points; ++q) {
-      const Vector3& x = cells_.points[cells_.start[c] + q].position;
-      if (!evaluate(spheres_, x, at_point[q]))
-        throw NumericalError(fmt::format("the quadrature point ({:.6g}, {:.6g}, {:.6g}) m has {} supporting nodes: the "
-                                         "nodes leave a hole there",
-                                         x.x(), x.y(), x.z(), at_point[q].size()));
-      for (int node : at_point[q].nodes)
-        if (place[rank_[node]] < 0) {
-          place[rank_[node]] = 0;
-          cell.ranks.push_back(rank_[node]);
-        }
-    }
-    std::sort(cell.ranks.begin(), cell.ranks.end());
-    if (std::ssize(cell.ranks) > stiffness_kernel_rows)
-      throw NumericalError(fmt::format("a background cell is covered by {} nodes; at most {} are handled: the node "
-                                       "spacing changes too abruptly",
-                                       cell.ranks.size(), stiffness_kernel_rows));
-    cell.stride = (static_cast<int>(cell.ranks.size()) + 7) / 8 * 8;
-    cell.gradients.assign(static_cast<std::size_t>(3 * cell.points) * cell.stride, 0.0);
-    for (int k = 0; k < std::ssize(cell.ranks); ++k)
-      place[cell.ranks[k]] = k;
-    for (int q = 0; q < cell.points; ++q) {
-      const double root = std::sqrt(cells_.points[cells_.start[c] + q].weight);
-      double* x = cell.gradients.data() + static_cast<std::size_t>(3 * q) * cell.stride;
-      double* y = x + cell.stride;
-      double* z = y + cell.stride;
-      for (int k = 0; k < at_point[q].size(); ++k) {
-        const int node = at_point[q].nodes[k];
-        const double radius = spheres_.radii()[node];
-        cell.grown = cell.grown ||
-                     (cells_.points[cells_.start[c] + q].position - problem_.nodes.positions[node]).squaredNorm() >=
-                         radius * radius;
-        const int p = place[rank_[node]];
-        x[p] = root * at_point[q].dx[k];
-        y[p] = root * at_point[q].dy[k];
-        z[p] = root * at_point[q].dz[k];
-      }
-    }
-    for (int rank : cell.ranks)
-      place[rank] = -1;
-  }
+  shapes_.resize(cells_.start.size() - 1);
+  CellEvaluator evaluator(spheres_);
+  for (std::size_t c = 0; c < shapes_.size(); ++c)
+    evaluator.evaluate(std::span(cells_.points).subspan(cells_.start[c], cells_.start[c + 1] - cells_.start[c]),
+                       shapes_[c]);
 }
 
 void Galerkin::hold_surface() {
-  patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes);
+  patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
   std::vector<int> nodes;
   nodes.reserve(problem_.prescribed.size());
   for (const Prescribed& entry : problem_.prescribed)
@@ -279,11 +208,11 @@ void Galerkin::hold_surface() {
     held_.push_back(value_at(spheres_, problem_.nodes.positions[node]));
 }
 
-void Galerkin::build_pattern() {
+void Galerkin::list_by_rank() {
   const int count = problem_.nodes.size();
   cells_start_.assign(count + 1, 0);
   for (const CellShapes& cell : shapes_)
-    for (int rank : cell.ranks)
+    for (int rank : cell.nodes)
       ++cells_start_[rank + 1];
   constraints_start_.assign(count + 1, 0);
   for (const DisplacementMean& mean : held_)
@@ -297,8 +226,8 @@ void Galerkin::build_pattern() {
   constraints_of_rank_.resize(constraints_start_[count]);
   std::vector<int> next(cells_start_.begin(), cells_start_.end() - 1);
   for (int c = 0; c < std::ssize(shapes_); ++c)
-    for (int k = 0; k < std::ssize(shapes_[c].ranks); ++k) {
-      const int slot = next[shapes_[c].ranks[k]]++;
+    for (int k = 0; k < std::ssize(shapes_[c].nodes); ++k) {
+      const int slot = next[shapes_[c].nodes[k]]++;
       cells_of_rank_[2 * slot] = c;
       cells_of_rank_[2 * slot + 1] = k;
     }
@@ -306,40 +235,73 @@ void Galerkin::build_pattern() {
   for (int p = 0; p < std::ssize(held_); ++p)
     for (int node : held_[p].nodes)
       constraints_of_rank_[next[rank_[node]]++] = p;
+}
 
-  // Two nodes of one cell whose spheres do not overlap share no point of it: their block is zero and left out.
-  std::vector<Vector3> centre(count);
-  std::vector<double> radius(count);
-  for (int i = 0; i < count; ++i) {
-    centre[rank_[i]] = problem_.nodes.positions[i];
-    radius[rank_[i]] = spheres_.radii()[i];
-  }
-  const auto overlap = [&](int a, int b) {
-    const double reach = radius[a] + radius[b];
-    return (centre[a] - centre[b]).squaredNorm() < reach * reach;
-  };
-  column_start_.assign(1, 0);
-  column_rows_.clear();
-  std::vector<int> seen(count, -1);
+void Galerkin::order_and_build_pattern(UnheldPieces unheld) {
+  // Nodes couple that have a point of some cell in common, or a mean of the held surface. Ordering nodes instead of
+  // unknowns is a ninth of the graph, and a matrix assembled in elimination order needs no permutation in the
+  // factorisation.
+  const int count = problem_.nodes.size();
+  rank_.resize(count);
+  std::iota(rank_.begin(), rank_.end(), 0);
+  list_by_rank();
+  std::vector<int> start(1, 0), neighbours, seen(count, -1);
   for (int j = 0; j < count; ++j) {
     const auto visit = [&](int i) {
-      if (i >= j && seen[i] != j) {
+      if (seen[i] != j) {
         seen[i] = j;
-        column_rows_.push_back(i);
+        neighbours.push_back(i);
       }
     };
     visit(j);
     for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot) {
       const CellShapes& cell = shapes_[cells_of_rank_[2 * slot]];
-      for (std::size_t k = cells_of_rank_[2 * slot + 1]; k < cell.ranks.size(); ++k)
-        if (cell.grown || overlap(j, cell.ranks[k]))
-          visit(cell.ranks[k]);
+      const std::uint32_t own = cell.reached[cells_of_rank_[2 * slot + 1]];
+      for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+        if ((own & cell.reached[k]) != 0)
+          visit(cell.nodes[k]);
     }
     for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot)
       for (int node : held_[constraints_of_rank_[slot]].nodes)
-        visit(rank_[node]);
+        visit(node);
+    start.push_back(static_cast<int>(neighbours.size()));
+  }
+  report_.pieces = find_pieces(problem_, start, neighbours);
+  treat_unheld(unheld);
+
+  order_ = fill_reducing_ordering(start, neighbours);
+  for (int k = 0; k < count; ++k)
+    rank_[order_[k]] = k;
+  column_start_.assign(1, 0);
+  column_rows_.clear();
+  for (int j = 0; j < count; ++j) {
+    const int node = order_[j];
+    for (int slot = start[node]; slot < start[node + 1]; ++slot)
+      if (const int i = rank_[neighbours[slot]]; i == j || (i > j && (dropped_.empty() || dropped_[node] == 0)))
+        column_rows_.push_back(i);
     std::sort(column_rows_.begin() + column_start_.back(), column_rows_.end());
     column_start_.push_back(static_cast<int>(column_rows_.size()));
+  }
+  CellEvaluator evaluator(spheres_);
+  for (CellShapes& cell : shapes_)
+    evaluator.renumber(rank_, cell);
+  list_by_rank();
+}
+
+void Galerkin::treat_unheld(UnheldPieces unheld) {
+  if (unheld == UnheldPieces::refuse)
+    require_held(report_.pieces);
+  for (const Piece& piece : report_.pieces) {
+    if (piece.held)
+      continue;
+    if (unheld == UnheldPieces::hold) {
+      const std::array<Anchor, 6> anchors = anchors_of(piece, problem_.nodes);
+      anchors_.insert(anchors_.end(), anchors.begin(), anchors.end());
+    } else {
+      dropped_.resize(problem_.nodes.size(), 0);
+      for (int node : piece.nodes)
+        dropped_[node] = 1;
+    }
   }
 }
 
@@ -374,12 +336,16 @@ void Galerkin::assemble() {
         for (int a = 0; a < 3; ++a)
           inner[offset + 3 * rows * b + 3 * k + a] = 3 * i + a;
     }
-    for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot) {
+    const bool is_dropped = !dropped_.empty() && dropped_[order_[j]] != 0;
+    if (is_dropped) // the unknowns stay, alone and without load
+      for (int c = 0; c < 3; ++c)
+        target[c][c] = problem_.material.young_modulus * problem_.nodes.spacings[order_[j]];
+    for (int slot = cells_start_[j]; slot < cells_start_[j + 1] && !is_dropped; ++slot) {
       const CellShapes& cell = shapes_[cells_of_rank_[2 * slot]];
-      const int own = cells_of_rank_[2 * slot + 1], size = static_cast<int>(cell.ranks.size());
+      const int own = cells_of_rank_[2 * slot + 1], size = static_cast<int>(cell.nodes.size());
       stiffness_column(cell.gradients.data(), cell.points, cell.stride, own, size, own, lambda, mu, column);
       for (int k = own; k < size; ++k) {
-        const int p = 3 * place[cell.ranks[k]];
+        const int p = 3 * place[cell.nodes[k]];
         if (p < 0)
           continue;
         for (int b = 0; b < 3; ++b)
@@ -402,6 +368,13 @@ void Galerkin::assemble() {
     for (int k = 0; k < rows; ++k)
       place[column_rows_[begin + k]] = -1;
   }
+  for (const Anchor& anchor : anchors_) {
+    const int j = rank_[anchor.node], first = 3 * column_start_[j], rows = column_start_[j + 1] - column_start_[j];
+    const double spring = problem_.material.young_modulus * problem_.nodes.spacings[anchor.node];
+    for (int b = 0; b < 3; ++b)
+      for (int a = 0; a < 3; ++a) // the diagonal block heads its column
+        values[3 * first + 3 * rows * b + a] += spring * anchor.direction[a] * anchor.direction[b];
+  }
 }
 
 void Galerkin::assemble_loads() {
@@ -418,11 +391,28 @@ void Galerkin::assemble_loads() {
     for (const QuadraturePoint& point : cells_.points)
       add(point.position, point.weight * problem_.loads.body_force(point.position));
   if (problem_.loads.traction)
-    for (const SurfacePoint& point : surface_quadrature(*problem_.domain, problem_.nodes)) {
+    for (const SurfacePoint& point :
+         surface_quadrature(*problem_.domain, problem_.nodes, 0.5, 0, problem_.incision.get())) {
       const Vector3 traction = problem_.loads.traction(point.position, point.normal);
       if (!traction.isZero(0))
         add(point.position, point.weight * traction);
     }
+  if (problem_.loads.lip_traction && problem_.incision != nullptr)
+    for (const SurfacePoint& point : lip_quadrature(*problem_.incision, problem_.nodes))
+      add(point.position, point.weight * problem_.loads.lip_traction(point.position, point.normal));
+  const Matrix3 initial = initial_stress(problem_);
+  if (!initial.isZero(0))
+    for (std::size_t c = 0; c < shapes_.size(); ++c) {
+      const CellShapes& cell = shapes_[c];
+      for (int q = 0; q < cell.points; ++q) {
+        const double root = std::sqrt(cells_.points[cells_.start[c] + q].weight);
+        const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
+        for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+          loads_.segment<3>(3 * static_cast<Eigen::Index>(order_[cell.nodes[k]])) +=
+              root * initial * Vector3(x[k], x[cell.stride + k], x[2 * cell.stride + k]);
+      }
+    }
+  clear_dropped(loads_);
 }
 
 std::vector<Vector3> Galerkin::constraint_forces(const Field& field) const {
@@ -445,6 +435,7 @@ double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nod
   const std::vector<Vector3> held = constraint_forces(field);
   const VectorX product = stiffness_.selfadjointView<Eigen::Lower>() * VectorX(ordered(field.coefficients));
   const VectorX rows = unordered(product) - constraint_loads(field.prescribed);
+  clear_dropped(applied);
   const double unbalanced = (rows - applied).lpNorm<Eigen::Infinity>();
   double largest = applied.lpNorm<Eigen::Infinity>();
   for (const Vector3& force : held)
@@ -453,6 +444,13 @@ double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nod
 }
 
 } // namespace
+
+OrderedStiffness stiffness_of(const Discretisation& body) {
+  const auto* galerkin = dynamic_cast<const Galerkin*>(&body);
+  if (galerkin == nullptr)
+    throw InputError(fmt::format("the stiffness matrix is that of method galerkin, not {}", to_string(body.method())));
+  return galerkin->stiffness();
+}
 
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
   require_domain(problem);

@@ -4,6 +4,7 @@
 #include "topology/point_tree.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 
 namespace spherecut::solvers {
@@ -53,6 +54,27 @@ DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::v
   return mean;
 }
 
+/// Index of the nearest position that the cut (may be null) does not hide from x; of the nearest when it hides all.
+int nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>& positions,
+                     const topology::Incision* incision, const Vector3& x) {
+  const topology::PointTree::Found nearest = tree.nearest(x);
+  const double distance = std::sqrt(nearest.squared_distance);
+  const auto hidden = [&](int k) { return incision->blocks(x, positions[k]); };
+  if (incision == nullptr || distance == 0 || !incision->near(x, distance) || !hidden(nearest.index))
+    return nearest.index;
+  std::vector<topology::PointTree::Found> found;
+  double reach = 2 * distance;
+  for (std::size_t seen = 0; seen < positions.size(); reach *= 2) {
+    found.clear();
+    tree.within(x, reach, found);
+    std::sort(found.begin(), found.end());
+    for (; seen < found.size(); ++seen)
+      if (!hidden(found[seen].index))
+        return found[seen].index;
+  }
+  return nearest.index;
+}
+
 } // namespace
 
 Vector3 DisplacementMean::of(const VectorX& coefficients) const {
@@ -70,28 +92,38 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
   return {shape.nodes, shape.value, x, 0};
 }
 
-SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes)
-    : nodes_(nodes), points_(surface_quadrature(domain, nodes, share_edge, share_centroid_below)),
+SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
+                               std::shared_ptr<const topology::Incision> incision)
+    : nodes_(nodes), incision_(std::move(incision)),
+      points_(surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision_.get())),
       points_of_node_(nodes.size()) {
-  std::vector<Vector3> positions;
-  std::vector<int> ids;
-  for (int i = 0; i < nodes.size(); ++i)
-    if (nodes.kinds[i] != NodeKind::interior) {
-      positions.push_back(nodes.positions[i]);
-      ids.push_back(i);
-    }
-  if (ids.empty())
-    return;
-  const topology::PointTree tree(positions);
-  for (int p = 0; p < std::ssize(points_); ++p)
-    points_of_node_[ids[tree.nearest(points_[p].position).index]].push_back(p);
+  faces_begin_ = static_cast<int>(points_.size());
+  if (incision_ != nullptr) {
+    const std::vector<SurfacePoint> faces = lip_quadrature(*incision_, nodes, share_edge, share_centroid_below);
+    points_.insert(points_.end(), faces.begin(), faces.end());
+  }
+  for (const bool lips : {false, true}) {
+    std::vector<Vector3> positions;
+    std::vector<int> ids;
+    for (int i = 0; i < nodes.size(); ++i)
+      if (nodes.kinds[i] != NodeKind::interior && (nodes.kinds[i] == NodeKind::lip) == lips) {
+        positions.push_back(nodes.positions[i]);
+        ids.push_back(i);
+      }
+    if (ids.empty())
+      continue;
+    const topology::PointTree tree(positions);
+    const int begin = lips ? faces_begin_ : 0, end = lips ? static_cast<int>(points_.size()) : faces_begin_;
+    for (int p = begin; p < end; ++p)
+      points_of_node_[ids[nearest_in_sight(tree, positions, incision_.get(), points_[p].position)]].push_back(p);
+  }
 }
 
 DisplacementMean SurfacePatches::mean(int node, const Spheres& spheres,
                                       const std::function<bool(const Vector3&, const Vector3&)>& held) const {
   std::vector<int> chosen;
   for (int p : points_of_node_[node])
-    if (!held || !held(points_[p].position, points_[p].normal))
+    if (!held || p >= faces_begin_ || !held(points_[p].position, points_[p].normal))
       chosen.push_back(p);
   return chosen.empty() ? value_at(spheres, nodes_.positions[node]) : mean_over(points_, chosen, spheres);
 }
@@ -105,9 +137,9 @@ SurfacePatches::means(const std::vector<int>& nodes, const Spheres& spheres,
     positions.push_back(nodes_.positions[node]);
   const topology::PointTree tree(positions);
   std::vector<std::vector<int>> chosen(nodes.size());
-  for (int p = 0; p < std::ssize(points_); ++p)
+  for (int p = 0; p < faces_begin_; ++p)
     if (held(points_[p].position, points_[p].normal))
-      chosen[tree.nearest(points_[p].position).index].push_back(p);
+      chosen[nearest_in_sight(tree, positions, incision_.get(), points_[p].position)].push_back(p);
   std::vector<DisplacementMean> result;
   result.reserve(nodes.size());
   for (std::size_t k = 0; k < nodes.size(); ++k)

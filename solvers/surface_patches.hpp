@@ -19,13 +19,15 @@ struct DisplacementMean {
 /// Value at one point. Throws NumericalError when no sound support covers it.
 DisplacementMean value_at(const Spheres& spheres, const Vector3& x);
 
-/// The surface, point by point, with the surface node that each point belongs to (the nearest one).
+/// The surface and the faces of the incision, point by point, with the node that each point belongs to: the nearest
+/// surface node or, on a face, lip node that it sees.
 class SurfacePatches {
  public:
-  SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes);
+  SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
+                 std::shared_ptr<const topology::Incision> incision = nullptr);
 
-  /// Mean over the share of `node` of the surface outside `held` (null: all of it); the node itself when it has no
-  /// share.
+  /// Mean over the share of `node` of the surface outside `held` (null: all of it) or, for a lip node, of its face; the
+  /// node itself when it has no share.
   [[nodiscard]] DisplacementMean mean(int node, const Spheres& spheres,
                                       const std::function<bool(const Vector3&, const Vector3&)>& held = nullptr) const;
 
@@ -37,7 +39,9 @@ class SurfacePatches {
 
  private:
   const NodeCloud& nodes_;
-  std::vector<SurfacePoint> points_;
+  std::shared_ptr<const topology::Incision> incision_;
+  std::vector<SurfacePoint> points_; // of the surface, then from faces_begin_ on of the faces
+  int faces_begin_ = 0;
   std::vector<std::vector<int>> points_of_node_;
 };
 

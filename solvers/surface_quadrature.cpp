@@ -1,0 +1,132 @@
+// Quadrature over the surface of the body and over the faces of a cut, see background_cells.hpp.
+#include "solvers/background_cells.hpp"
+#include "topology/point_tree.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace spherecut::solvers {
+
+namespace {
+
+using Corners = std::array<Vector3, 3>;
+
+double longest_edge(const Corners& t) {
+  return std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
+}
+
+void push_quarters(const Corners& t, std::vector<Corners>& pending) {
+  const Vector3 a = 0.5 * (t[0] + t[1]), b = 0.5 * (t[1] + t[2]), c = 0.5 * (t[2] + t[0]);
+  pending.push_back({t[0], a, c});
+  pending.push_back({a, t[1], b});
+  pending.push_back({c, b, t[2]});
+  pending.push_back({a, b, c});
+}
+
+/// Three points exact for quadratic functions, or the centroid alone.
+void push_points(const Corners& t, bool centroid_alone, std::vector<SurfacePoint>& points) {
+  const Vector3 centre = (t[0] + t[1] + t[2]) / 3, area = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]);
+  const double size = area.norm();
+  if (size > 0 && centroid_alone)
+    points.push_back({centre, area / size, size});
+  else if (size > 0)
+    for (const Vector3& corner : t)
+      points.push_back({0.5 * (centre + corner), area / size, size / 3});
+}
+
+/// The part of a triangle where `distance`, given at its corners and linear between them, is negative.
+void push_negative(const Corners& t, const std::array<double, 3>& distance, bool centroid_alone,
+                   std::vector<SurfacePoint>& points) {
+  std::array<Vector3, 4> kept;
+  int count = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int next = (k + 1) % 3;
+    if (distance[k] <= 0)
+      kept[count++] = t[k];
+    if ((distance[k] <= 0) != (distance[next] <= 0))
+      kept[count++] = t[k] + distance[k] / (distance[k] - distance[next]) * (t[next] - t[k]);
+  }
+  for (int k = 1; k + 1 < count; ++k)
+    push_points({kept[0], kept[k], kept[k + 1]}, centroid_alone, points);
+}
+
+/// Both parts of a triangle that the plane of the nearest sheet divides, so that no point stands for material on both
+/// sides of the cut.
+void push_divided(const Corners& t, const topology::Incision& incision, bool centroid_alone,
+                  std::vector<SurfacePoint>& points) {
+  const auto sheet = incision.closest((t[0] + t[1] + t[2]) / 3, longest_edge(t));
+  if (!sheet)
+    return push_points(t, centroid_alone, points);
+  std::array<double, 3> above, below;
+  for (int k = 0; k < 3; ++k) {
+    above[k] = sheet->normal.dot(t[k] - sheet->point);
+    below[k] = -above[k];
+  }
+  if (std::max({above[0], above[1], above[2]}) <= 0 || std::min({above[0], above[1], above[2]}) >= 0)
+    return push_points(t, centroid_alone, points);
+  push_negative(t, above, centroid_alone, points);
+  push_negative(t, below, centroid_alone, points);
+}
+
+std::array<double, 3> distances(const Corners& t, const topology::Domain& domain) {
+  return {domain.signed_distance(t[0]), domain.signed_distance(t[1]), domain.signed_distance(t[2])};
+}
+
+} // namespace
+
+std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes, double edge,
+                                             double centroid_below, const topology::Incision* incision) {
+  const topology::PointTree tree(nodes.positions);
+  const topology::SurfaceMesh& surface = domain.surface();
+  std::vector<SurfacePoint> points;
+  std::vector<Corners> pending;
+  for (const Triangle& triangle : surface.triangles) {
+    pending.push_back({surface.vertices[triangle[0]], surface.vertices[triangle[1]], surface.vertices[triangle[2]]});
+    while (!pending.empty()) {
+      const Corners t = pending.back();
+      pending.pop_back();
+      const double spacing = nodes.spacings[tree.nearest((t[0] + t[1] + t[2]) / 3).index], longest = longest_edge(t);
+      if (longest > edge * spacing)
+        push_quarters(t, pending);
+      else if (incision != nullptr && incision->near((t[0] + t[1] + t[2]) / 3, longest))
+        push_divided(t, *incision, longest < centroid_below * spacing, points);
+      else
+        push_points(t, longest < centroid_below * spacing, points);
+    }
+  }
+  return points;
+}
+
+std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge,
+                                         double centroid_below) {
+  const topology::PointTree tree(nodes.positions);
+  const topology::Domain& domain = *incision.domain();
+  std::vector<SurfacePoint> points, face;
+  std::vector<Corners> pending;
+  for (const topology::SurfaceMesh& sheet : incision.sheets())
+    for (const Triangle& triangle : sheet.triangles) {
+      pending.push_back({sheet.vertices[triangle[0]], sheet.vertices[triangle[1]], sheet.vertices[triangle[2]]});
+      while (!pending.empty()) {
+        const Corners t = pending.back();
+        pending.pop_back();
+        const Vector3 centre = (t[0] + t[1] + t[2]) / 3;
+        const double longest = longest_edge(t);
+        if (domain.signed_distance(centre) > longest)
+          continue;
+        const double spacing = nodes.spacings[tree.nearest(centre).index];
+        if (longest > edge * spacing) {
+          push_quarters(t, pending);
+          continue;
+        }
+        face.clear();
+        push_negative(t, distances(t, domain), longest < centroid_below * spacing, face);
+        for (const SurfacePoint& point : face)
+          for (const double side : {1.0, -1.0})
+            points.push_back(
+                {point.position + side * lip_offset * spacing * point.normal, -side * point.normal, point.weight});
+      }
+    }
+  return points;
+}
+
+} // namespace spherecut::solvers
