@@ -51,15 +51,24 @@ class Octree {
  private:
   double spacing_near(const Vector3& x) const { return nodes_.spacings[tree_.nearest(x).index]; }
 
+  /// Edge of a cell at x in units of the spacing there. The gradients grow without bound towards the front.
+  double size_wanted(const Vector3& x, double spacing) const {
+    double size = options_.cell_size;
+    if (incision_ != nullptr && options_.front_size < 1)
+      if (const auto front = incision_->front_frame(x, options_.front_reach * spacing))
+        size *= std::max(options_.front_size, front->distance / (options_.front_reach * spacing));
+    return size;
+  }
+
   void divide(const Vector3& lower, const Vector3& upper) {
     const Vector3 centre = 0.5 * (lower + upper), half = 0.5 * (upper - lower);
     const double distance = domain_.signed_distance(centre);
     const double radius = half.norm();
     if (distance > radius)
       return;
-    const double longest = 2 * half.maxCoeff();
+    const double longest = 2 * half.maxCoeff(), spacing = spacing_near(centre);
     // A coarse node may be nearest to the centre while fine ones sit in a corner: large cells always divide.
-    if (longest > slack * options_.cell_size * spacing_near(centre) || holds_finer_node(centre, half, longest)) {
+    if (longest > slack * size_wanted(centre, spacing) * spacing || holds_finer_node(centre, half, longest)) {
       std::array<int, 3> parts{};
       for (int c = 0; c < 3; ++c)
         parts[c] = half[c] > 0.3 * longest ? 2 : 1;

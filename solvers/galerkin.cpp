@@ -69,7 +69,7 @@ class Galerkin final : public ElasticBody {
     VectorX prescribed = prescribed_values(problem_);
     if (problem_.prescribed_field)
       for (std::size_t k = 0; k < held_.size(); ++k)
-        prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) = problem_.prescribed_field(held_[k].centroid);
+        prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) = held_[k].of(problem_.prescribed_field);
     return field_of(solve_ordered(loads_ + constraint_loads(prescribed)), 1, prescribed);
   }
 

@@ -29,6 +29,7 @@ DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::v
     }
     mean.area += points[p].weight;
     mean.centroid += points[p].weight * points[p].position;
+    mean.share.push_back({points[p].position, points[p].weight});
     for (int k = 0; k < shape.size(); ++k) {
       int& at = place[shape.nodes[k]];
       if (at < 0) {
@@ -40,6 +41,8 @@ DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::v
     }
   }
   mean.centroid /= mean.area;
+  for (QuadraturePoint& point : mean.share)
+    point.weight /= mean.area;
   std::vector<std::pair<int, double>> terms;
   terms.reserve(mean.nodes.size());
   for (std::size_t k = 0; k < mean.nodes.size(); ++k) {
@@ -84,12 +87,19 @@ Vector3 DisplacementMean::of(const VectorX& coefficients) const {
   return value;
 }
 
+Vector3 DisplacementMean::of(const std::function<Vector3(const Vector3& x)>& field) const {
+  Vector3 value = Vector3::Zero();
+  for (const QuadraturePoint& point : share)
+    value += point.weight * field(point.position);
+  return value;
+}
+
 DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
   ShapeFunctions shape;
   if (!evaluate(spheres, x, shape))
     throw NumericalError(
         fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
-  return {shape.nodes, shape.value, x, 0};
+  return {shape.nodes, shape.value, x, 0, {{x, 1}}};
 }
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,

@@ -1,0 +1,283 @@
+#include "solvers/stress_intensity.hpp"
+
+#include "solvers/elastic_body.hpp"
+#include "topology/errors.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+namespace spherecut::solvers {
+
+using topology::FrontFrame;
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+double plane_strain_modulus(const Material& material) {
+  return material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
+}
+
+double spacing_at(const Discretisation& body, const Vector3& x) {
+  const NodeCloud& nodes = body.problem().nodes;
+  int best = 0;
+  for (int i = 1; i < nodes.size(); ++i)
+    if ((nodes.positions[i] - x).squaredNorm() < (nodes.positions[best] - x).squaredNorm())
+      best = i;
+  return nodes.spacings[best];
+}
+
+const topology::Incision& incision_of(const Discretisation& body) {
+  if (body.problem().incision == nullptr)
+    throw InputError("stress intensity: the body has no cut");
+  return *body.problem().incision;
+}
+
+} // namespace
+
+TipField tip_field(const Material& material, const Intensities& k, double ahead, double above) {
+  TipField field;
+  const double r = std::hypot(ahead, above), theta = std::atan2(above, ahead);
+  if (!(r > 0))
+    return field;
+  const double mu = material.shear_modulus(), kappa = 3 - 4 * material.poisson_ratio;
+  const double c = std::cos(theta / 2), s = std::sin(theta / 2), size = std::sqrt(r / (2 * pi)) / (2 * mu);
+  // Angular functions of the three modes, and their derivatives.
+  const Vector3 f = k[0] * Vector3(c * (kappa - 1 + 2 * s * s), s * (kappa + 1 - 2 * c * c), 0) +
+                    k[1] * Vector3(s * (kappa + 1 + 2 * c * c), -c * (kappa - 1 - 2 * s * s), 0) +
+                    k[2] * Vector3(0, 0, 4 * s);
+  const Vector3 turn = k[0] * Vector3(-0.5 * s * (kappa - 1 + 2 * s * s) + 2 * s * c * c,
+                                      0.5 * c * (kappa + 1 - 2 * c * c) + 2 * s * s * c, 0) +
+                       k[1] * Vector3(0.5 * c * (kappa + 1 + 2 * c * c) - 2 * s * s * c,
+                                      0.5 * s * (kappa - 1 - 2 * s * s) + 2 * s * c * c, 0) +
+                       k[2] * Vector3(0, 0, 2 * c);
+  field.displacement = size * f;
+  const double ct = ahead / r, st = above / r;
+  field.gradient.col(0) = size / r * (0.5 * ct * f - st * turn);
+  field.gradient.col(1) = size / r * (0.5 * st * f + ct * turn);
+  return field;
+}
+
+double energy_release_rate(const Material& material, const Intensities& k) {
+  return (k[0] * k[0] + k[1] * k[1]) / plane_strain_modulus(material) + k[2] * k[2] / (2 * material.shear_modulus());
+}
+
+std::vector<FrontFrame> front_samples(const topology::Incision& incision, double spacing, double margin) {
+  if (!(spacing > 0))
+    throw InputError(fmt::format("front samples {} m apart: the distance must be positive", spacing));
+  std::vector<FrontFrame> samples;
+  double next = 0.5 * spacing, walked = 0;
+  for (const topology::FrontSegment& segment : incision.front()) {
+    const double length = (segment.to - segment.from).norm();
+    for (; next < walked + length; next += spacing) {
+      const Vector3 x = segment.from + (next - walked) / length * (segment.to - segment.from);
+      if (margin > 0 && incision.domain()->signed_distance(x) > -margin)
+        continue;
+      if (const auto frame = incision.front_frame(x, length))
+        samples.push_back(*frame);
+    }
+    walked += length;
+  }
+  return samples;
+}
+
+Intensities displacement_correlation(const Discretisation& body, const Field& field, const FrontFrame& front,
+                                     const CorrelationOptions& options) {
+  const topology::Incision& incision = incision_of(body);
+  const double h = spacing_at(body, front.point);
+  Eigen::Matrix2d normal_matrix = Eigen::Matrix2d::Zero();
+  Eigen::Matrix<double, 2, 3> right = Eigen::Matrix<double, 2, 3>::Zero();
+  for (int k = 0; k < options.samples; ++k) {
+    const double s = h * (options.from + (options.to - options.from) * (k + 0.5) / options.samples);
+    const auto face = incision.closest(front.point - s * front.ahead, 0.5 * s);
+    if (!face)
+      throw InputError(fmt::format("stress intensity: there is no sheet {:.3g} m behind the front at ({:.6g}, {:.6g}, "
+                                   "{:.6g}) m",
+                                   s, front.point.x(), front.point.y(), front.point.z()));
+    const Vector3 jump = body.at(face->point + lip_offset * h * face->normal, field).displacement -
+                         body.at(face->point - lip_offset * h * face->normal, field).displacement;
+    const Eigen::Vector2d terms(std::sqrt(s), s * std::sqrt(s));
+    const double weight = 1 / std::sqrt(s);
+    normal_matrix += weight * terms * terms.transpose();
+    right +=
+        weight * terms * Vector3(jump.dot(front.normal), jump.dot(front.ahead), jump.dot(front.tangent)).transpose();
+  }
+  const Vector3 leading = normal_matrix.inverse().row(0) * right;
+  const Material& material = body.problem().material;
+  const double plane = plane_strain_modulus(material) * std::sqrt(2 * pi) / 8;
+  return {plane * leading[0], plane * leading[1], material.shear_modulus() * std::sqrt(2 * pi) / 4 * leading[2]};
+}
+
+namespace {
+
+/// Coordinates about a front that is locally an arc in the plane of the cut: X ahead, Z above, s along.
+class Tube {
+ public:
+  Tube(const FrontFrame& front, double curvature) : front_(front), curvature_(curvature) {}
+
+  struct Place {
+    Vector3 position;
+    Matrix3 axes;   // columns ahead, normal, tangent at the place
+    double stretch; // length along the front out here over that on the front
+    [[nodiscard]] bool leaves(const topology::Domain& domain) const { return domain.signed_distance(position) > 0; }
+  };
+  [[nodiscard]] Place at(double ahead, double above, double along) const {
+    const double turn = curvature_ * along;
+    const Vector3 a = std::cos(turn) * front_.ahead + std::sin(turn) * front_.tangent;
+    const Vector3 t = std::cos(turn) * front_.tangent - std::sin(turn) * front_.ahead;
+    // sin(turn) / curvature and (1 - cos(turn)) / curvature, also where it is straight
+    const double chord = std::abs(turn) < 1e-4 ? along : std::sin(turn) / curvature_;
+    const double sag = std::abs(turn) < 1e-4 ? 0.5 * turn * along : (1 - std::cos(turn)) / curvature_;
+    Place place;
+    place.position = front_.point + chord * front_.tangent - sag * front_.ahead + ahead * a + above * front_.normal;
+    place.axes << a, front_.normal, t;
+    place.stretch = 1 + curvature_ * ahead;
+    return place;
+  }
+  /// Gradient, in the axes of the place, of a field of vectors given in them that does not change along the front.
+  [[nodiscard]] Matrix3 curved_gradient(const TipField& field, double ahead) const {
+    Matrix3 gradient = field.gradient;
+    const double c = curvature_ / (1 + curvature_ * ahead);
+    gradient.col(2) = c * Vector3(-field.displacement[2], 0, field.displacement[0]);
+    return gradient;
+  }
+  /// Divergence of a symmetric tensor field given in the axes of the place, by central differences.
+  template <class Tensor>
+  [[nodiscard]] Vector3 divergence(const Tensor& tensor, double ahead, double above, double step) const {
+    const Matrix3 d_ahead = (tensor(ahead + step, above) - tensor(ahead - step, above)) / (2 * step);
+    const Matrix3 d_above = (tensor(ahead, above + step) - tensor(ahead, above - step)) / (2 * step);
+    const Matrix3 here = tensor(ahead, above);
+    const double c = curvature_ / (1 + curvature_ * ahead);
+    return {d_ahead(0, 0) + d_above(0, 1) + c * (here(0, 0) - here(2, 2)),
+            d_ahead(1, 0) + d_above(1, 1) + c * here(1, 0), d_ahead(2, 0) + d_above(2, 1) + 2 * c * here(2, 0)};
+  }
+  [[nodiscard]] double curvature() const { return curvature_; }
+
+ private:
+  FrontFrame front_;
+  double curvature_;
+};
+
+/// Curvature of the front in the plane of the cut, 1/m: positive where the way ahead fans out.
+double curvature_of(const topology::Incision& incision, const FrontFrame& front, double h) {
+  const auto before = incision.front_frame(front.point - h * front.tangent, 2 * h);
+  const auto after = incision.front_frame(front.point + h * front.tangent, 2 * h);
+  if (!before || !after)
+    return 0;
+  const double length = (after->point - before->point).norm();
+  return length > 0.5 * h ? (after->ahead - before->ahead).dot(front.tangent) / length : 0;
+}
+
+struct GaussRule {
+  std::array<double, 2> place{-0.5773502691896257, 0.5773502691896257};
+};
+
+} // namespace
+
+// With xi = q e the virtual shift of the front (e ahead, q = 1 at the front and 0 on the outside of the tube),
+//   I Q = int [sigma_ij v_i,k + tau_ij u_i,k - sigma_mn v_m,n delta_kj] xi_k,j dV + int (tau_ij,j u_i,k - b_i v_i,k)
+//   xi_k dV
+//         - int_faces (t_i v_i,k + tau_ij n_j u_i,k) xi_k dS,          Q = int q ds along the front,
+// u, sigma the field, v, tau = C grad v the auxiliary one, b the body force, t the traction on the faces, n out of the
+// material. v keeps its components in axes that turn with the front: tau is not quite in equilibrium then.
+Intensities interaction_integral(const Discretisation& body, const Field& field, const FrontFrame& front,
+                                 const InteractionOptions& options) {
+  const topology::Incision& incision = incision_of(body);
+  const Problem& problem = body.problem();
+  const Material& material = problem.material;
+  const double h = spacing_at(body, front.point);
+  const double inner = options.inner * h, outer = options.outer * h, half_length = options.half_length * h;
+  const Tube tube(front, curvature_of(incision, front, h));
+  if (tube.curvature() * outer <= -0.9)
+    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
+                                 front.point.x(), front.point.y(), front.point.z()));
+  const auto fade = [&](double r) { // of the shift across the tube, with its derivative
+    const double t = std::clamp((outer - r) / (outer - inner), 0.0, 1.0);
+    return std::pair(t * t * (3 - 2 * t), r > inner && r < outer ? -6 * t * (1 - t) / (outer - inner) : 0.0);
+  };
+  const auto bump = [&](double s) { // and along it
+    const double t = s / half_length;
+    return std::pair((1 - t * t) * (1 - t * t), -4 * t * (1 - t * t) / half_length);
+  };
+  const double total = half_length * 16 / 15;
+  for (const double s : {-half_length, half_length})
+    for (int c = 0; c < 8; ++c)
+      if (tube.at(outer * std::cos(c * pi / 4), outer * std::sin(c * pi / 4), s).leaves(*problem.domain))
+        throw InputError(
+            fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
+                        "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
+                        outer, 2 * half_length, front.point.x(), front.point.y(), front.point.z()));
+  const std::array<Intensities, 3> modes{Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()};
+  Vector3 integral = Vector3::Zero();
+
+  const GaussRule gauss;
+  const int cells_along = std::max(1, options.along / 2), cells_radial = std::max(1, options.radial / 2);
+  // r = outer t^2: the singular products of the two fields are smooth in t.
+  const auto each_section = [&](const auto& visit) { // (s, weight ds, r, weight dr)
+    for (int a = 0; a < cells_along; ++a)
+      for (const double ga : gauss.place)
+        for (int b = 0; b < cells_radial; ++b)
+          for (const double gb : gauss.place) {
+            const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1),
+                         t = (b + 0.5 + 0.5 * gb) / cells_radial;
+            visit(s, half_length / cells_along, outer * t * t, outer * t / cells_radial);
+          }
+  };
+  each_section([&](double s, double ds, double r, double dr) {
+    const auto [q_r, dq_r] = fade(r);
+    const auto [q_s, dq_s] = bump(s);
+    for (int c = 0; c < options.around; ++c) {
+      const double theta = pi * ((2.0 * c + 1) / options.around - 1);
+      const double ahead = r * std::cos(theta), above = r * std::sin(theta);
+      const Tube::Place place = tube.at(ahead, above, s);
+      const PointState state = body.at(place.position, field);
+      const Matrix3 stress = place.axes.transpose() * state.stress * place.axes;
+      const Matrix3 gradient = place.axes.transpose() * state.gradient * place.axes;
+      const double weight = r * (2 * pi / options.around) * ds * dr * place.stretch;
+      // Gradient of xi = q e in the axes of the place; e turns along the front.
+      Matrix3 shift = Matrix3::Zero();
+      shift.row(0) = Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta), q_r * dq_s / place.stretch);
+      shift(2, 2) = q_r * q_s * tube.curvature() / place.stretch;
+      for (int m = 0; m < 3; ++m) {
+        const TipField local = tip_field(material, modes[m], ahead, above);
+        const Matrix3 v = tube.curved_gradient(local, ahead);
+        const auto tau_at = [&](double x, double z) {
+          return stress_from_gradient(material, tube.curved_gradient(tip_field(material, modes[m], x, z), x));
+        };
+        const Matrix3 tau = stress_from_gradient(material, v);
+        const Matrix3 flow =
+            v.transpose() * stress + gradient.transpose() * tau - stress.cwiseProduct(v).sum() * Matrix3::Identity();
+        double density = flow.cwiseProduct(shift).sum();
+        if (tube.curvature() != 0)
+          density += q_r * q_s * tube.divergence(tau_at, ahead, above, 1e-4 * r).dot(gradient.col(0));
+        if (problem.loads.body_force)
+          density -= q_r * q_s * field.load_factor *
+                     (place.axes.transpose() * problem.loads.body_force(place.position)).dot(v.col(0));
+        integral[m] += weight * density;
+      }
+    }
+    // Both faces.
+    for (const double side : {1.0, -1.0}) {
+      const Tube::Place place = tube.at(-r, side * std::min(lip_offset * h, 1e-3 * r), s);
+      const Vector3 outward = -side * front.normal;
+      Vector3 traction = Vector3::Zero();
+      if (problem.loads.lip_traction)
+        traction = field.load_factor * place.axes.transpose() * problem.loads.lip_traction(place.position, outward);
+      if (traction.isZero(0) && tube.curvature() == 0)
+        continue;
+      const Matrix3 gradient = place.axes.transpose() * body.at(place.position, field).gradient * place.axes;
+      for (int m = 0; m < 3; ++m) {
+        const Matrix3 v = tube.curved_gradient(tip_field(material, modes[m], -r, side * 1e-12 * r), -r);
+        const Vector3 pull = -side * stress_from_gradient(material, v).col(1);
+        integral[m] -= q_r * q_s * ds * dr * place.stretch * (traction.dot(v.col(0)) + pull.dot(gradient.col(0)));
+      }
+    }
+  });
+  integral /= total;
+  const double plane = plane_strain_modulus(material);
+  return {0.5 * plane * integral[0], 0.5 * plane * integral[1], material.shear_modulus() * integral[2]};
+}
+
+} // namespace spherecut::solvers
