@@ -26,6 +26,8 @@ const std::vector<Experiment>& all_experiments() {
       {"hemisphere_palpation", "the paper's Figure 3: surface displacement and force against finite elements",
        run_hemisphere_palpation},
       {"liver_palpation", "the paper's Figure 4: a laparoscopic instrument on a liver", run_liver_palpation},
+      {"closed_cut_compression", "lips under compression: a closed cut is as stiff as uncut tissue",
+       run_closed_cut_compression},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
   };
   return experiments;

@@ -23,33 +23,12 @@ double inside_fraction(double distance, const Vector3& normal, const Vector3& ha
   return std::clamp(0.5 - 0.5 * distance / reach, 0.0, 1.0);
 }
 
-class Octree {
+/// Quadrature points of one box after another.
+class BoxFiller {
  public:
-  Octree(const topology::Domain& domain, const NodeCloud& nodes, const BackgroundOptions& options,
-         const topology::Incision* incision)
-      : domain_(domain), nodes_(nodes), options_(options), incision_(incision), tree_(nodes.positions) {}
-
-  BackgroundCells build() {
-    // Roots as large as the coarsest spacing allows, fitted to the bounding box: a uniform cloud needs no division.
-    const BoundingBox box = domain_.bounds();
-    const double coarsest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
-    std::array<int, 3> roots{};
-    Vector3 size;
-    for (int c = 0; c < 3; ++c) {
-      roots[c] = std::max(1, static_cast<int>(std::ceil(box.extent()[c] / (options_.cell_size * coarsest) - 1e-6)));
-      size[c] = box.extent()[c] / roots[c];
-    }
-    for (int a = 0; a < roots[0]; ++a)
-      for (int b = 0; b < roots[1]; ++b)
-        for (int c = 0; c < roots[2]; ++c) {
-          const Vector3 corner = box.lower + size.cwiseProduct(Vector3(a, b, c));
-          divide(corner, corner + size);
-        }
-    return std::move(cells_);
-  }
-
- private:
-  double spacing_near(const Vector3& x) const { return nodes_.spacings[tree_.nearest(x).index]; }
+  BoxFiller(const topology::Domain& domain, const BackgroundOptions& options, const topology::Incision* incision,
+            BackgroundCells& cells)
+      : domain_(domain), options_(options), incision_(incision), cells_(cells) {}
 
   /// Edge of a cell at x in units of the spacing there. The gradients grow without bound towards the front.
   double size_wanted(const Vector3& x, double spacing) const {
@@ -60,28 +39,21 @@ class Octree {
     return size;
   }
 
-  void divide(const Vector3& lower, const Vector3& upper) {
-    const Vector3 centre = 0.5 * (lower + upper), half = 0.5 * (upper - lower);
+  /// Halves a box until it is small enough for the front, then fills its parts.
+  void divide(const Vector3& centre, const Vector3& half, double spacing) {
     const double distance = domain_.signed_distance(centre);
-    const double radius = half.norm();
-    if (distance > radius)
+    if (distance > half.norm())
       return;
-    const double longest = 2 * half.maxCoeff(), spacing = spacing_near(centre);
-    // A coarse node may be nearest to the centre while fine ones sit in a corner: large cells always divide.
-    if (longest > slack * size_wanted(centre, spacing) * spacing || holds_finer_node(centre, half, longest)) {
-      std::array<int, 3> parts{};
-      for (int c = 0; c < 3; ++c)
-        parts[c] = half[c] > 0.3 * longest ? 2 : 1;
-      const Vector3 size = (upper - lower).cwiseQuotient(Vector3(parts[0], parts[1], parts[2]));
-      for (int a = 0; a < parts[0]; ++a)
-        for (int b = 0; b < parts[1]; ++b)
-          for (int c = 0; c < parts[2]; ++c) {
-            const Vector3 corner = lower + size.cwiseProduct(Vector3(a, b, c));
-            divide(corner, corner + size);
-          }
-      return;
-    }
-    const bool inside = distance < -radius || corners_inside(centre, half);
+    if (2 * half.maxCoeff() <= slack * size_wanted(centre, spacing) * spacing)
+      return fill(centre, half, spacing, distance);
+    for (int octant = 0; octant < octants; ++octant)
+      divide(octant_centre(centre, half, octant), half / 2, spacing);
+  }
+
+  /// `spacing`: of the nodes about the box; `distance`: signed distance of its centre to the surface.
+  void fill(const Vector3& centre, const Vector3& half, double spacing, double distance) {
+    BackgroundBox box{centre, half, spacing, static_cast<int>(cells_.start.size()) - 1, 0};
+    const bool inside = distance < -half.norm() || corners_inside(centre, half);
     if (incision_ != nullptr && may_be_split(centre, half))
       add_split(centre, half, inside);
     else if (inside)
@@ -90,17 +62,12 @@ class Octree {
       add_cut(centre, half);
     if (std::ssize(cells_.points) > cells_.start.back())
       cells_.start.push_back(static_cast<int>(cells_.points.size()));
+    box.last_cell = static_cast<int>(cells_.start.size()) - 1;
+    if (box.last_cell > box.first_cell)
+      cells_.boxes.push_back(box);
   }
 
-  bool holds_finer_node(const Vector3& centre, const Vector3& half, double longest) {
-    found_.clear();
-    tree_.within(centre, half.norm(), found_);
-    return std::any_of(found_.begin(), found_.end(), [&](const topology::PointTree::Found& node) {
-      return ((nodes_.positions[node.index] - centre).cwiseAbs().array() <= half.array()).all() &&
-             longest > 1.3 * slack * options_.cell_size * nodes_.spacings[node.index];
-    });
-  }
-
+ private:
   bool corners_inside(const Vector3& centre, const Vector3& half) const {
     for (int k = 0; k < 8; ++k) {
       const Vector3 corner = centre + half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1));
@@ -263,13 +230,81 @@ class Octree {
   }
 
   const topology::Domain& domain_;
-  const NodeCloud& nodes_;
   BackgroundOptions options_;
   const topology::Incision* incision_;
+  BackgroundCells& cells_;
+  std::vector<Group> groups_;
+};
+
+class Octree {
+ public:
+  Octree(const topology::Domain& domain, const NodeCloud& nodes, const BackgroundOptions& options,
+         const topology::Incision* incision)
+      : domain_(domain), nodes_(nodes), options_(options), tree_(nodes.positions),
+        filler_(domain, options, incision, cells_) {}
+
+  BackgroundCells build() {
+    // Roots as large as the coarsest spacing allows, fitted to the bounding box: a uniform cloud needs no division.
+    const BoundingBox box = domain_.bounds();
+    const double coarsest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
+    std::array<int, 3> roots{};
+    Vector3 size;
+    for (int c = 0; c < 3; ++c) {
+      roots[c] = std::max(1, static_cast<int>(std::ceil(box.extent()[c] / (options_.cell_size * coarsest) - 1e-6)));
+      size[c] = box.extent()[c] / roots[c];
+    }
+    for (int a = 0; a < roots[0]; ++a)
+      for (int b = 0; b < roots[1]; ++b)
+        for (int c = 0; c < roots[2]; ++c) {
+          const Vector3 corner = box.lower + size.cwiseProduct(Vector3(a, b, c));
+          divide(corner, corner + size);
+        }
+    return std::move(cells_);
+  }
+
+ private:
+  double spacing_near(const Vector3& x) const { return nodes_.spacings[tree_.nearest(x).index]; }
+
+  void divide(const Vector3& lower, const Vector3& upper) {
+    const Vector3 centre = 0.5 * (lower + upper), half = 0.5 * (upper - lower);
+    const double distance = domain_.signed_distance(centre);
+    const double radius = half.norm();
+    if (distance > radius)
+      return;
+    const double longest = 2 * half.maxCoeff(), spacing = spacing_near(centre);
+    // A coarse node may be nearest to the centre while fine ones sit in a corner: large cells always divide.
+    if (longest > slack * filler_.size_wanted(centre, spacing) * spacing || holds_finer_node(centre, half, longest)) {
+      std::array<int, 3> parts{};
+      for (int c = 0; c < 3; ++c)
+        parts[c] = half[c] > 0.3 * longest ? 2 : 1;
+      const Vector3 size = (upper - lower).cwiseQuotient(Vector3(parts[0], parts[1], parts[2]));
+      for (int a = 0; a < parts[0]; ++a)
+        for (int b = 0; b < parts[1]; ++b)
+          for (int c = 0; c < parts[2]; ++c) {
+            const Vector3 corner = lower + size.cwiseProduct(Vector3(a, b, c));
+            divide(corner, corner + size);
+          }
+      return;
+    }
+    filler_.fill(centre, half, spacing, distance);
+  }
+
+  bool holds_finer_node(const Vector3& centre, const Vector3& half, double longest) {
+    found_.clear();
+    tree_.within(centre, half.norm(), found_);
+    return std::any_of(found_.begin(), found_.end(), [&](const topology::PointTree::Found& node) {
+      return ((nodes_.positions[node.index] - centre).cwiseAbs().array() <= half.array()).all() &&
+             longest > 1.3 * slack * options_.cell_size * nodes_.spacings[node.index];
+    });
+  }
+
+  const topology::Domain& domain_;
+  const NodeCloud& nodes_;
+  BackgroundOptions options_;
   topology::PointTree tree_;
   std::vector<topology::PointTree::Found> found_;
-  std::vector<Group> groups_;
   BackgroundCells cells_;
+  BoxFiller filler_;
 };
 
 } // namespace
@@ -283,6 +318,14 @@ BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud
   if (nodes.size() == 0)
     throw InputError("background cells need nodes: their spacings set the size");
   return Octree(domain, nodes, options, incision).build();
+}
+
+void refill_box(const topology::Domain& domain, const BackgroundBox& box, const BackgroundOptions& options,
+                const topology::Incision* incision, BackgroundCells& out) {
+  out.start.assign(1, 0);
+  out.points.clear();
+  out.boxes.clear();
+  BoxFiller(domain, options, incision, out).divide(box.centre, box.half, box.spacing);
 }
 
 } // namespace spherecut::solvers

@@ -3,6 +3,8 @@
 
 #include "solvers/nodes.hpp"
 
+#include <span>
+
 namespace spherecut::solvers {
 
 struct QuadraturePoint {
@@ -10,10 +12,21 @@ struct QuadraturePoint {
   double weight; // m3
 };
 
+/// A leaf of the octree, m. Cells first_cell .. last_cell - 1 share it out: one, or several where a sheet divides it.
+struct BackgroundBox {
+  Vector3 centre, half;
+  double spacing = 0; // of the nodes about it
+  int first_cell = 0, last_cell = 0;
+};
+
 /// Points of all cells; cell c owns points start[c] .. start[c+1]. The weights add up to the volume of the body.
 struct BackgroundCells {
   std::vector<int> start{0};
   std::vector<QuadraturePoint> points;
+  std::vector<BackgroundBox> boxes;
+  [[nodiscard]] std::span<const QuadraturePoint> of(int cell) const {
+    return std::span(points).subspan(start[cell], start[cell + 1] - start[cell]);
+  }
 };
 
 struct BackgroundOptions {
@@ -30,6 +43,11 @@ struct BackgroundOptions {
 /// see one another make cells of their own.
 BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
                                  const BackgroundOptions& options = {}, const topology::Incision* incision = nullptr);
+
+/// The cells of one box of an octree whose cut has changed since, as background_cells would make them (divided further
+/// where the front has come near); replaces what `out` held.
+void refill_box(const topology::Domain& domain, const BackgroundBox& box, const BackgroundOptions& options,
+                const topology::Incision* incision, BackgroundCells& out);
 
 /// Most points of one cell.
 inline constexpr int most_cell_points = 27;

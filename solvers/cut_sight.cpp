@@ -144,10 +144,17 @@ CutSight::CutSight(const Sight& sight, const std::vector<Vector3>& centres, cons
                                  "positive and the part in [0, 1)",
                                  sight_.blend, sight_.reach));
   if (sight_.rule != SightRule::visibility) {
-    const topology::PointTree tree(centres);
+    std::vector<Vector3> present;
+    std::vector<double> spacing_of;
+    for (std::size_t j = 0; j < centres.size(); ++j)
+      if (radii[j] > 0) {
+        present.push_back(centres[j]);
+        spacing_of.push_back(spacings[j]);
+      }
+    const topology::PointTree tree(present);
     double largest = 0;
     for (const topology::FrontSegment& segment : sight_.incision->front()) {
-      front_spacing_.push_back(spacings[tree.nearest(0.5 * (segment.from + segment.to)).index]);
+      front_spacing_.push_back(spacing_of[tree.nearest(0.5 * (segment.from + segment.to)).index]);
       largest = std::max(largest, front_spacing_.back());
     }
     longest_reach_ = sight_.reach * largest;
@@ -159,7 +166,10 @@ CutSight::CutSight(const Sight& sight, const std::vector<Vector3>& centres, cons
 
 void CutSight::update_radii(const std::vector<Vector3>& centres, const std::vector<double>& radii) {
   concern_.assign(centres.size(), 0);
-  smallest_radius_ = *std::min_element(radii.begin(), radii.end());
+  smallest_radius_ = std::numeric_limits<double>::infinity();
+  for (double radius : radii)
+    if (radius > 0) // a node without a sphere does not count
+      smallest_radius_ = std::min(smallest_radius_, radius);
   for (std::size_t j = 0; j < centres.size(); ++j) {
     if (sight_.incision->near(centres[j], radii[j]))
       concern_[j] |= touches_sheet;

@@ -10,8 +10,6 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double worst_moment_condition = 1e9;
-
 Problem checked(Problem problem) {
   check_problem(problem);
   return problem;

@@ -8,6 +8,9 @@
 
 namespace spherecut::solvers {
 
+/// Condition of a moment matrix beyond which a support is not sound.
+inline constexpr double worst_moment_condition = 1e9;
+
 /// Shape functions at every node in compressed rows: support of node i is entries start[i] .. start[i+1].
 struct NodalSupports {
   std::vector<int> start;

@@ -26,18 +26,10 @@ namespace {
 
 constexpr double penalty = 1e4;
 
-double default_support_radius(double poisson_ratio) {
-  // Larger supports carry more volume-preserving modes: they cure locking.
-  return poisson_ratio >= 0.45 ? 2.2 : 2.0;
-}
-
 class Galerkin final : public ElasticBody {
  public:
   Galerkin(Problem problem, const DiscretisationOptions& options)
-      : ElasticBody(std::move(problem),
-                    options.support_radius > 0 ? options.support_radius
-                                               : default_support_radius(problem.material.poisson_ratio),
-                    options.sight) {
+      : ElasticBody(std::move(problem), galerkin_support_radius(problem, options), options.sight) {
     const Stopwatch assembly;
     BackgroundOptions background;
     background.gauss = options.quadrature;
@@ -63,7 +55,7 @@ class Galerkin final : public ElasticBody {
   }
 
   Method method() const override { return Method::galerkin; }
-  OrderedStiffness stiffness() const { return {stiffness_, order_, anchors_}; }
+  OrderedStiffness stiffness() const { return {stiffness_, order_, anchors_, held_, cells_, spheres_}; }
 
   Field solve() const override {
     VectorX prescribed = prescribed_values(problem_);
@@ -120,9 +112,6 @@ class Galerkin final : public ElasticBody {
   void list_by_rank();
   void assemble();
   void assemble_loads();
-  [[nodiscard]] double constraint_stiffness(int node) const {
-    return penalty * problem_.material.young_modulus * problem_.nodes.spacings[node];
-  }
   /// The matrix is kept in elimination order; vectors outside are in node order.
   [[nodiscard]] MatrixX ordered(const MatrixX& by_node) const {
     MatrixX by_rank(by_node.rows(), by_node.cols());
@@ -159,7 +148,7 @@ class Galerkin final : public ElasticBody {
     VectorX right = VectorX::Zero(report_.unknowns);
     for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
       add_force(held_[k],
-                constraint_stiffness(problem_.prescribed[k].node) *
+                constraint_stiffness(problem_, problem_.prescribed[k].node) *
                     held_part(problem_.prescribed[k], prescribed.segment<3>(3 * static_cast<Eigen::Index>(k))),
                 right);
     return right;
@@ -359,7 +348,7 @@ void Galerkin::assemble() {
       std::size_t own = 0;
       while (rank_[mean.nodes[own]] != j)
         ++own;
-      const double factor = constraint_stiffness(entry.node) * mean.weights[own];
+      const double factor = constraint_stiffness(problem_, entry.node) * mean.weights[own];
       for (std::size_t k = 0; k < mean.nodes.size(); ++k)
         for (int c = 0; c < 3; ++c)
           if (entry.components[c] && rank_[mean.nodes[k]] >= j)
@@ -421,7 +410,7 @@ std::vector<Vector3> Galerkin::constraint_forces(const Field& field) const {
   for (std::size_t k = 0; k < problem_.prescribed.size(); ++k) {
     const Prescribed& entry = problem_.prescribed[k];
     const Vector3 gap = field.prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - held_[k].of(field.coefficients);
-    forces.emplace_back(constraint_stiffness(entry.node) * held_part(entry, gap));
+    forces.emplace_back(constraint_stiffness(problem_, entry.node) * held_part(entry, gap));
   }
   return forces;
 }
@@ -450,6 +439,17 @@ OrderedStiffness stiffness_of(const Discretisation& body) {
   if (galerkin == nullptr)
     throw InputError(fmt::format("the stiffness matrix is that of method galerkin, not {}", to_string(body.method())));
   return galerkin->stiffness();
+}
+
+double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options) {
+  if (options.support_radius > 0)
+    return options.support_radius;
+  // Larger supports carry more volume-preserving modes: they cure locking.
+  return problem.material.poisson_ratio >= 0.45 ? 2.2 : 2.0;
+}
+
+double constraint_stiffness(const Problem& problem, int node) {
+  return penalty * problem.material.young_modulus * problem.nodes.spacings[node];
 }
 
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {

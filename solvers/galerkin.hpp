@@ -3,14 +3,24 @@
 
 #include "solvers/factorisation.hpp"
 #include "solvers/pieces.hpp"
+#include "solvers/surface_patches.hpp"
 
 namespace spherecut::solvers {
 
 struct OrderedStiffness {
-  const SparseMatrix& lower;          // lower triangle in elimination order with full diagonal blocks, N/m
-  const std::vector<int>& order;      // node of every elimination rank
-  const std::vector<Anchor>& anchors; // springs E h on the coefficients that hold pieces, part of the matrix
+  const SparseMatrix& lower;                 // lower triangle in elimination order with full diagonal blocks, N/m
+  const std::vector<int>& order;             // node of every elimination rank
+  const std::vector<Anchor>& anchors;        // springs E h on the coefficients that hold pieces, part of the matrix
+  const std::vector<DisplacementMean>& held; // what each entry of Problem::prescribed holds
+  const BackgroundCells& cells;
+  const Spheres& spheres;
 };
+
+/// Support radius over spacing that the options ask for, or the default for this material.
+double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options);
+
+/// Penalty of a held mean displacement of a node, N/m per component.
+double constraint_stiffness(const Problem& problem, int node);
 
 /// Stiffness with the penalties of the prescribed displacements; lives as long as `body`. Throws InputError when `body`
 /// is of another method.

@@ -206,13 +206,14 @@ double quartic_spline(double s) {
 }
 
 Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis,
-                 double worst_condition, const Sight& sight)
+                 double worst_condition, const Sight& sight, const std::vector<char>& absent)
     : centres_(std::move(centres)), basis_(basis), worst_condition_(worst_condition) {
   check(centres_, spacings, rho, basis, worst_condition);
   const int n = size(), needed = basis_size(basis) + 2;
   std::vector<double> base(n);
+  const auto is_absent = [&](int i) { return !absent.empty() && absent[i] != 0; };
   for (int i = 0; i < n; ++i)
-    base[i] = rho * spacings[i];
+    base[i] = is_absent(i) ? 0 : rho * spacings[i];
   radii_ = base;
   grid_ = SphereGrid(centres_, radii_);
   if (sight.incision != nullptr) {
@@ -238,6 +239,8 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
   const auto unsound_nodes = [&] {
     std::vector<int> unsound;
     for (int i = 0; i < n; ++i) {
+      if (is_absent(i))
+        continue;
       const SphereGrid::Cell cell = grid_.find(centres_[i]);
       SupportMemory memory(cell.padded);
       kernel.collect(cell, centres_[i].data(), memory.support);

@@ -27,9 +27,9 @@ class Spheres {
   /// moment matrix worse conditioned than `worst_condition`, the spheres around it grow by 1.25 until it is sound.
   /// Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than basis + 2
   /// nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, or an incision is given with the
-  /// quadratic basis.
+  /// quadratic basis. Nodes marked in `absent` (may be empty) have no sphere, radius 0, and support nothing.
   Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis = Basis::linear,
-          double worst_condition = 1e9, const Sight& sight = {});
+          double worst_condition = 1e9, const Sight& sight = {}, const std::vector<char>& absent = {});
 
   [[nodiscard]] int size() const { return static_cast<int>(centres_.size()); }
   [[nodiscard]] const std::vector<Vector3>& centres() const { return centres_; }

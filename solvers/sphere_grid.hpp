@@ -23,7 +23,7 @@ class SphereGrid {
   };
 
   SphereGrid() = default;
-  /// Centres must be finite and radii positive (the caller checks).
+  /// Centres must be finite and radii positive, or 0 for a sphere that holds nothing (the caller checks).
   SphereGrid(const std::vector<Vector3>& centres, const std::vector<double>& radii);
 
   /// The cell of x. Outside the box of all spheres: the nearest cell (no sphere holds such a point).

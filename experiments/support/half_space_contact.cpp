@@ -20,7 +20,7 @@ double from_axis(const Vector3& x) {
 }
 
 solvers::SprinkleOptions sprinkle_options(const topology::Domain& domain, const HalfSpaceCase& half_space,
-                                          double fine) {
+                                          const std::shared_ptr<const topology::Incision>& incision, double fine) {
   constexpr double no_limit = 10 * half_width;
   solvers::SprinkleOptions options;
   options.random_seed = half_space.seed;
@@ -36,6 +36,7 @@ solvers::SprinkleOptions sprinkle_options(const topology::Domain& domain, const 
     options.spacing.centres = {Vector3::Zero()};
     options.seeds = {{Vector3::Zero()}};
   }
+  options.incision = incision;
   return options;
 }
 
@@ -47,10 +48,13 @@ HalfSpaceBody half_space_body(const HalfSpaceCase& half_space) {
   problem.domain = topology::make_box_domain({-half_width, -half_width, -half_width}, {half_width, half_width, 0},
                                              0.5 * contact_radius);
   problem.material = {1, half_space.poisson_ratio, 0};
+  if (!half_space.cut.empty())
+    problem.incision = std::make_shared<topology::Incision>(half_space.cut, problem.domain);
   const Stopwatch sprinkling;
   const double guess = contact_radius * 2.2 / std::cbrt(half_space.target_nodes);
   CountedSprinkling cloud = sprinkle_to_count(
-      *problem.domain, [&](double fine) { return sprinkle_options(*problem.domain, half_space, fine); },
+      *problem.domain,
+      [&](double fine) { return sprinkle_options(*problem.domain, half_space, problem.incision, fine); },
       half_space.target_nodes, guess);
   result.sprinkle_seconds = sprinkling.seconds();
   result.fine = cloud.fine;
@@ -60,7 +64,7 @@ HalfSpaceBody half_space_body(const HalfSpaceCase& half_space) {
   std::vector<int> candidates;
   for (int i = 0; i < problem.nodes.size(); ++i) {
     const Vector3& x = problem.nodes.positions[i];
-    if (problem.nodes.kinds[i] == solvers::NodeKind::interior)
+    if (problem.nodes.kinds[i] == solvers::NodeKind::interior || problem.nodes.kinds[i] == solvers::NodeKind::lip)
       continue;
     const double to_side = half_width - std::max(std::abs(x.x()), std::abs(x.y()));
     if (to_side < 1e-9 || x.z() < -half_width + 1e-9)

@@ -26,6 +26,7 @@ struct HalfSpaceCase {
   double poisson_ratio = 0.3;
   int target_nodes = 1200;
   std::uint64_t seed = 1;
+  std::vector<topology::SurfaceMesh> cut{}; // sheets of a buried cut
 };
 
 /// The body and its condensed patch. Seconds are processor time.

@@ -1,0 +1,787 @@
+#include "solvers/growing_cut.hpp"
+
+#include "solvers/cell_shapes.hpp"
+#include "solvers/elastic_body.hpp"
+#include "solvers/galerkin.hpp"
+#include "solvers/schur_window.hpp"
+#include "solvers/stiffness_kernel.hpp"
+#include "topology/errors.hpp"
+#include "topology/point_tree.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numeric>
+#include <utility>
+
+namespace spherecut::solvers {
+
+namespace {
+
+/// Rings of new nodes stand this far from the sheet or its front, and crowded nodes within it are removed; in units of
+/// the sphere radius. What their spheres covered or will cover changes too.
+constexpr double node_margin = 0.35;
+
+/// Points of a sheet no farther than `spacing` apart, m: corners and midpoints of its triangles, divided as needed.
+std::vector<Vector3> sample_points(const topology::SurfaceMesh& sheet, std::size_t first_triangle, double spacing) {
+  std::vector<Vector3> points;
+  std::vector<std::array<Vector3, 3>> pending;
+  for (std::size_t t = first_triangle; t < sheet.triangles.size(); ++t) {
+    const Triangle& triangle = sheet.triangles[t];
+    pending.push_back({sheet.vertices[triangle[0]], sheet.vertices[triangle[1]], sheet.vertices[triangle[2]]});
+    while (!pending.empty()) {
+      const std::array<Vector3, 3> corner = pending.back();
+      pending.pop_back();
+      const double longest =
+          std::max({(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(), (corner[0] - corner[2]).norm()});
+      if (longest <= spacing) {
+        points.insert(points.end(), corner.begin(), corner.end());
+        continue;
+      }
+      const std::array<Vector3, 3> middle = {0.5 * (corner[0] + corner[1]), 0.5 * (corner[1] + corner[2]),
+                                             0.5 * (corner[2] + corner[0])};
+      pending.push_back({corner[0], middle[0], middle[2]});
+      pending.push_back({middle[0], corner[1], middle[1]});
+      pending.push_back({middle[2], middle[1], corner[2]});
+      pending.push_back(middle);
+    }
+  }
+  return points;
+}
+
+/// Whether the sheets of `now` continue those of `before` triangle by triangle.
+bool continues(const topology::Incision* before, const topology::Incision& now) {
+  if (before == nullptr)
+    return true;
+  if (now.sheets().size() < before->sheets().size())
+    return false;
+  for (std::size_t s = 0; s < before->sheets().size(); ++s) {
+    const topology::SurfaceMesh &a = before->sheets()[s], &b = now.sheets()[s];
+    if (b.triangles.size() < a.triangles.size() || b.vertices.size() < a.vertices.size() ||
+        !std::equal(a.triangles.begin(), a.triangles.end(), b.triangles.begin()) ||
+        !std::equal(a.vertices.begin(), a.vertices.end(), b.vertices.begin()))
+      return false;
+  }
+  return true;
+}
+
+/// Where the cut differs: the new faces, and the front that was or has come.
+struct Changes {
+  std::vector<Vector3> faces, front;
+};
+
+Changes changes_between(const topology::Incision* before, const topology::Incision& now, double spacing) {
+  Changes changes;
+  for (std::size_t s = 0; s < now.sheets().size(); ++s) {
+    const std::size_t known =
+        before != nullptr && s < before->sheets().size() ? before->sheets()[s].triangles.size() : 0;
+    const std::vector<Vector3> points = sample_points(now.sheets()[s], known, spacing);
+    changes.faces.insert(changes.faces.end(), points.begin(), points.end());
+  }
+  using Ends = std::array<double, 6>;
+  const auto ends = [](const topology::FrontSegment& f) {
+    return Ends{f.from.x(), f.from.y(), f.from.z(), f.to.x(), f.to.y(), f.to.z()};
+  };
+  std::vector<Ends> old_front, new_front;
+  if (before != nullptr)
+    for (const topology::FrontSegment& segment : before->front())
+      old_front.push_back(ends(segment));
+  for (const topology::FrontSegment& segment : now.front())
+    new_front.push_back(ends(segment));
+  std::sort(old_front.begin(), old_front.end());
+  std::sort(new_front.begin(), new_front.end());
+  std::vector<Ends> different;
+  std::set_symmetric_difference(old_front.begin(), old_front.end(), new_front.begin(), new_front.end(),
+                                std::back_inserter(different));
+  for (const Ends& e : different) {
+    const Vector3 from(e[0], e[1], e[2]), to(e[3], e[4], e[5]);
+    const int parts = std::max(1, static_cast<int>(std::ceil((to - from).norm() / spacing)));
+    for (int k = 0; k <= parts; ++k)
+      changes.front.push_back(from + (to - from) * k / parts);
+  }
+  return changes;
+}
+
+/// Distance to the nearest of some points, infinite when there are none.
+class Nearness {
+ public:
+  explicit Nearness(const std::vector<Vector3>& points) {
+    if (!points.empty())
+      tree_.emplace(points);
+  }
+  [[nodiscard]] double operator()(const Vector3& x) const {
+    return tree_ ? std::sqrt(tree_->nearest(x).squared_distance) : std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  std::optional<topology::PointTree> tree_;
+};
+
+/// What each prescribed entry holds, as the ordinary discretisation takes it.
+std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& spheres) {
+  std::vector<int> nodes;
+  for (const Prescribed& entry : problem.prescribed)
+    nodes.push_back(entry.node);
+  if (problem.prescribed_region)
+    return SurfacePatches(*problem.domain, problem.nodes, problem.incision)
+        .means(nodes, spheres, problem.prescribed_region);
+  std::vector<DisplacementMean> means;
+  for (int node : nodes)
+    means.push_back(value_at(spheres, problem.nodes.positions[node]));
+  return means;
+}
+
+} // namespace
+
+struct GrowingCut::State {
+  struct Box {
+    BackgroundBox box;
+    std::vector<CellShapes> cells;                    // by node ids
+    std::vector<std::vector<QuadraturePoint>> points; // of each cell, kept where loads need them
+  };
+
+  Problem problem;
+  GrowthOptions options;
+  double rho = 2;
+  std::vector<char> removed;
+  std::unique_ptr<Spheres> spheres;
+  std::vector<Box> boxes;
+  std::vector<DisplacementMean> held;
+  std::unique_ptr<SchurWindow> window;
+  std::vector<int> far_order;   // node of every far rank
+  std::vector<int> slot;        // block of three slots of every node in the window, -1 outside
+  std::vector<int> window_node; // node of every block of slots, -1 for room
+  int next_room = 0;
+  VectorX cell_loads;    // 3N: body force and initial strain
+  VectorX first_loads;   // 3N at condensation, all loads
+  VectorX loads;         // 3N as they stand
+  MatrixX reduced_first; // by slots
+  std::unique_ptr<SurfacePatches> patches;
+  std::vector<DisplacementMean> contact;
+  MatrixX compliance;
+  VectorX base;
+
+  State(Problem p, GrowthOptions o) : problem(std::move(p)), options(std::move(o)) {
+    if (options.method.method != Method::galerkin)
+      throw InputError(
+          fmt::format("a growing cut is updated in method galerkin, not {}", to_string(options.method.method)));
+    for (int node : options.contact)
+      if (node < 0 || node >= problem.nodes.size())
+        throw InputError(
+            fmt::format("contact candidate {} does not exist; there are {} nodes", node, problem.nodes.size()));
+    if (options.way.triangles.empty())
+      throw InputError("the predicted way of the cut is empty");
+    rho = galerkin_support_radius(problem, options.method);
+    removed.assign(problem.nodes.size(), 0);
+  }
+
+  [[nodiscard]] BackgroundOptions background() const { return {options.method.cell_size, options.method.quadrature}; }
+  [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
+    return std::make_unique<Spheres>(problem.nodes.positions, problem.nodes.spacings, rho, Basis::linear,
+                                     worst_moment_condition, Sight{problem.incision, options.method.sight}, removed);
+  }
+  [[nodiscard]] double enrichment_reach() const {
+    return options.method.sight == SightRule::enriched ? Sight{}.reach / rho : 0; // in sphere radii
+  }
+  /// Largest sphere about a point, m.
+  [[nodiscard]] double radius_at(const Vector3& x) const {
+    double radius = 0;
+    for (int node : spheres->candidates(x))
+      radius = std::max(radius, spheres->radii()[node]);
+    return radius;
+  }
+  [[nodiscard]] bool has_cell_loads() const {
+    return problem.loads.body_force != nullptr || !problem.loads.initial_strain.isZero(0);
+  }
+
+  void evaluate(Box& box, const BackgroundCells& filled, CellEvaluator& evaluator) const {
+    box.cells.resize(filled.start.size() - 1);
+    box.points.resize(has_cell_loads() ? box.cells.size() : 0);
+    for (std::size_t c = 0; c < box.cells.size(); ++c) {
+      evaluator.evaluate(filled.of(static_cast<int>(c)), box.cells[c]);
+      if (has_cell_loads())
+        box.points[c].assign(filled.of(static_cast<int>(c)).begin(), filled.of(static_cast<int>(c)).end());
+    }
+  }
+
+  /// Adds sign times the stiffness of a cell, whose nodes are all in the window, to S.
+  void scatter(const CellShapes& by_node, double sign, CellEvaluator& evaluator, CellShapes& by_slot) {
+    by_slot = by_node;
+    evaluator.renumber(slot, by_slot);
+    const double mu = problem.material.shear_modulus(), lambda = problem.material.lame_lambda();
+    const int size = static_cast<int>(by_slot.nodes.size());
+    StiffnessColumn column;
+    for (int own = 0; own < size; ++own) {
+      stiffness_column(by_slot.gradients.data(), by_slot.points, by_slot.stride, own, size, own, lambda, mu, column);
+      const int first = 3 * by_slot.nodes[own];
+      for (int b = 0; b < 3; ++b) {
+        double* target = window->column(first + b);
+        for (int k = own; k < size; ++k)
+          for (int a = 0; a < 3; ++a)
+            target[3 * by_slot.nodes[k] + a] += sign * column.plane[3 * a + b][k];
+      }
+    }
+  }
+
+  /// The same of a held mean.
+  void scatter(const DisplacementMean& mean, const Prescribed& entry, double sign) {
+    const double factor = sign * constraint_stiffness(problem, entry.node);
+    for (std::size_t i = 0; i < mean.nodes.size(); ++i)
+      for (std::size_t j = 0; j < mean.nodes.size(); ++j)
+        if (slot[mean.nodes[i]] >= slot[mean.nodes[j]])
+          for (int c = 0; c < 3; ++c)
+            if (entry.components[c])
+              window->column(3 * slot[mean.nodes[j]] + c)[3 * slot[mean.nodes[i]] + c] +=
+                  factor * mean.weights[i] * mean.weights[j];
+  }
+
+  /// Body force and initial strain of a box, times `sign`.
+  void add_cell_loads(const Box& box, double sign, const Spheres& of, VectorX& into) const {
+    if (!has_cell_loads())
+      return;
+    const Matrix3 initial = initial_stress(problem);
+    ShapeFunctions shape;
+    for (std::size_t c = 0; c < box.cells.size(); ++c)
+      for (int q = 0; q < box.cells[c].points; ++q) {
+        const QuadraturePoint& point = box.points[c][q];
+        if (problem.loads.body_force && solvers::evaluate(of, point.position, shape)) {
+          const Vector3 force = sign * point.weight * problem.loads.body_force(point.position);
+          for (int k = 0; k < shape.size(); ++k)
+            into.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
+        }
+        const CellShapes& cell = box.cells[c];
+        const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
+        const double root = sign * std::sqrt(point.weight);
+        for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+          into.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) +=
+              root * initial * Vector3(x[k], x[cell.stride + k], x[2 * cell.stride + k]);
+      }
+  }
+
+  /// Tractions on the surface and the lips, and the prescribed displacements.
+  [[nodiscard]] VectorX surface_loads() const {
+    VectorX right = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
+    ShapeFunctions shape;
+    const auto add = [&](const SurfacePoint& point, const Vector3& traction) {
+      if (traction.isZero(0))
+        return;
+      if (!solvers::evaluate(*spheres, point.position, shape))
+        throw NumericalError(fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m",
+                                         point.position.x(), point.position.y(), point.position.z()));
+      for (int k = 0; k < shape.size(); ++k)
+        right.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += point.weight * shape.value[k] * traction;
+    };
+    const NodeCloud present = present_nodes();
+    if (problem.loads.traction)
+      for (const SurfacePoint& point : surface_quadrature(*problem.domain, present, 0.5, 0, problem.incision.get()))
+        add(point, problem.loads.traction(point.position, point.normal));
+    if (problem.loads.lip_traction && problem.incision != nullptr)
+      for (const SurfacePoint& point : lip_quadrature(*problem.incision, present))
+        add(point, problem.loads.lip_traction(point.position, point.normal));
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      const Prescribed& entry = problem.prescribed[k];
+      const Vector3 value = problem.prescribed_field ? problem.prescribed_field(held[k].centroid) : entry.value;
+      const Vector3 force = constraint_stiffness(problem, entry.node) * held_part(entry, value);
+      for (std::size_t j = 0; j < held[k].nodes.size(); ++j)
+        right.segment<3>(3 * static_cast<Eigen::Index>(held[k].nodes[j])) += held[k].weights[j] * force;
+    }
+    return right;
+  }
+
+  [[nodiscard]] NodeCloud present_nodes() const {
+    NodeCloud present;
+    for (int i = 0; i < problem.nodes.size(); ++i)
+      if (removed[i] == 0)
+        present.add(problem.nodes.positions[i], problem.nodes.spacings[i], problem.nodes.kinds[i],
+                    problem.nodes.normals[i]);
+    return present;
+  }
+
+  void find_contact() {
+    patches = std::make_unique<SurfacePatches>(*problem.domain, problem.nodes, problem.incision);
+    contact.clear();
+    for (int node : options.contact)
+      contact.push_back(patches->mean(node, *spheres, problem.prescribed_region));
+  }
+
+  void condense_all();
+  void condense_contact();
+  [[nodiscard]] VectorX window_right(const VectorX& right) const;
+};
+
+/// Builds everything from the problem as it stands. Removed nodes leave the arrays first: nothing refers to them yet
+/// but the ids of the caller, so they stay where they are and merely have no sphere.
+void GrowingCut::State::condense_all() {
+  // The system of the present nodes, compact, from the ordinary discretisation; ids are mapped back afterwards.
+  std::vector<int> id, compact(problem.nodes.size(), -1);
+  for (int i = 0; i < problem.nodes.size(); ++i)
+    if (removed[i] == 0) {
+      compact[i] = static_cast<int>(id.size());
+      id.push_back(i);
+    }
+  Problem present = problem;
+  present.nodes = present_nodes();
+  for (Prescribed& entry : present.prescribed)
+    entry.node = compact[entry.node];
+  DiscretisationOptions method = options.method;
+  method.estimate_condition = false;
+  const std::unique_ptr<Discretisation> body = discretise(std::move(present), method);
+  const OrderedStiffness stiffness = stiffness_of(*body);
+
+  spheres = make_spheres();
+  held = stiffness.held;
+  for (DisplacementMean& mean : held)
+    for (int& node : mean.nodes)
+      node = id[node]; // ascending still
+  boxes.clear();
+  CellEvaluator evaluator(*spheres);
+  const topology::Domain& domain = *problem.domain;
+  BackgroundCells filled;
+  std::vector<char> in_window(problem.nodes.size(), 0);
+  const double finest = *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
+  const Nearness way(sample_points(options.way, 0, 0.5 * finest));
+  cell_loads = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
+  for (const BackgroundBox& leaf : stiffness.cells.boxes) {
+    Box box{leaf, {}, {}};
+    const double radius = radius_at(leaf.centre);
+    const bool reached =
+        way(leaf.centre) - leaf.half.norm() - 0.5 * finest < radius * std::max(1 + node_margin, enrichment_reach());
+    if (reached || has_cell_loads()) {
+      refill_box(domain, leaf, background(), problem.incision.get(), filled);
+      evaluate(box, filled, evaluator);
+      add_cell_loads(box, 1, *spheres, cell_loads);
+      if (reached)
+        for (const CellShapes& cell : box.cells)
+          for (int node : cell.nodes)
+            in_window[node] = 1;
+    }
+    boxes.push_back(std::move(box));
+  }
+  find_contact();
+  std::vector<char> in_contact(problem.nodes.size(), 0);
+  for (const DisplacementMean& mean : contact)
+    for (int node : mean.nodes)
+      in_contact[node] = 1;
+
+  // Far nodes in the order that the ordinary factorisation found good, then the window, then the contact.
+  std::vector<int> order;
+  for (int place = 0; place < 3; ++place)
+    for (int rank = 0; rank < std::ssize(stiffness.order); ++rank) {
+      const int node = id[stiffness.order[rank]];
+      const int wanted = in_contact[node] != 0 ? 2 : in_window[node] != 0 ? 1 : 0;
+      if (wanted == place)
+        order.push_back(rank);
+    }
+  std::vector<int> new_rank(order.size());
+  for (int k = 0; k < std::ssize(order); ++k)
+    new_rank[order[k]] = k;
+  Eigen::PermutationMatrix<Eigen::Dynamic> permutation(3 * std::ssize(order));
+  for (Eigen::Index k = 0; k < std::ssize(order); ++k)
+    for (int c = 0; c < 3; ++c)
+      permutation.indices()[3 * k + c] = 3 * new_rank[static_cast<std::size_t>(k)] + c;
+  SparseMatrix permuted(stiffness.lower.rows(), stiffness.lower.cols());
+  permuted.selfadjointView<Eigen::Lower>() = stiffness.lower.selfadjointView<Eigen::Lower>().twistedBy(permutation);
+
+  const auto count = [&](const auto& wanted) {
+    int n = 0;
+    for (int rank : order)
+      n += wanted(id[stiffness.order[rank]]) ? 1 : 0;
+    return n;
+  };
+  const int contact_nodes = count([&](int node) { return in_contact[node] != 0; });
+  const int changing = count([&](int node) { return in_contact[node] == 0 && in_window[node] != 0; });
+  window = std::make_unique<SchurWindow>(permuted, 3 * changing, 3 * options.room, 3 * contact_nodes);
+  slot.assign(problem.nodes.size(), -1);
+  window_node.assign(static_cast<std::size_t>(window->slots() / 3), -1);
+  far_order.clear();
+  for (int k = 0; k < std::ssize(order); ++k) {
+    const int node = id[stiffness.order[order[k]]], s = window->slot_of(3 * k);
+    if (s < 0) {
+      far_order.push_back(node);
+    } else {
+      slot[node] = s / 3;
+      window_node[s / 3] = node;
+    }
+  }
+  next_room = changing;
+  loads = first_loads = cell_loads + surface_loads();
+  VectorX ordered(3 * std::ssize(order));
+  for (Eigen::Index k = 0; k < std::ssize(order); ++k)
+    ordered.segment<3>(3 * k) = first_loads.segment<3>(3 * id[stiffness.order[order[k]]]);
+  reduced_first = window->reduce(ordered);
+  window->factor();
+  condense_contact();
+}
+
+/// Right-hand side by slots under `right` (3N), which differs from the first loads in window nodes alone.
+VectorX GrowingCut::State::window_right(const VectorX& right) const {
+  VectorX by_slot = reduced_first.col(0);
+  for (Eigen::Index s = 0; s < std::ssize(window_node); ++s)
+    if (const int node = window_node[s]; node >= 0) {
+      by_slot.segment<3>(3 * s) += right.segment<3>(3 * node);
+      if (3 * node < first_loads.size())
+        by_slot.segment<3>(3 * s) -= first_loads.segment<3>(3 * node);
+    }
+  return by_slot;
+}
+
+void GrowingCut::State::condense_contact() {
+  const auto count = static_cast<Eigen::Index>(contact.size());
+  const int begin = window->contact_begin();
+  const bool inside = std::all_of(contact.begin(), contact.end(), [&](const DisplacementMean& mean) {
+    return std::all_of(mean.nodes.begin(), mean.nodes.end(), [&](int node) { return 3 * slot[node] >= begin; });
+  });
+  const int first = inside ? begin : 0;
+  MatrixX right = MatrixX::Zero(window->slots() - first, 3 * count);
+  for (Eigen::Index c = 0; c < count; ++c)
+    for (std::size_t k = 0; k < contact[c].nodes.size(); ++k)
+      for (int a = 0; a < 3; ++a)
+        right(3 * slot[contact[c].nodes[k]] + a - first, 3 * c + a) += contact[c].weights[k];
+  const MatrixX solution = inside ? window->solve_contact(right) : window->solve(right);
+  const VectorX resting = window->solve(window_right(loads)).col(0);
+  compliance.resize(3 * count, 3 * count);
+  base.resize(3 * count);
+  for (Eigen::Index c = 0; c < count; ++c) {
+    compliance.middleRows<3>(3 * c).setZero();
+    base.segment<3>(3 * c).setZero();
+    for (std::size_t k = 0; k < contact[c].nodes.size(); ++k) {
+      const int s = 3 * slot[contact[c].nodes[k]];
+      compliance.middleRows<3>(3 * c) += contact[c].weights[k] * solution.middleRows<3>(s - first);
+      base.segment<3>(3 * c) += contact[c].weights[k] * resting.segment<3>(s);
+    }
+  }
+}
+
+GrowingCut::GrowingCut(Problem problem, GrowthOptions options)
+    : state_(std::make_unique<State>(std::move(problem), std::move(options))) {
+  state_->condense_all();
+}
+
+GrowingCut::~GrowingCut() = default;
+
+GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
+  const Stopwatch watch;
+  auto fresh = std::make_unique<State>(state_->problem, state_->options);
+  fresh->options.way = std::move(way);
+  fresh->removed = state_->removed;
+  fresh->condense_all();
+  state_ = std::move(fresh);
+  GrowthReport report;
+  report.condensed_anew = true;
+  report.reason = "asked for";
+  report.window_nodes = state_->window->slots() / 3 - state_->options.room;
+  report.total_seconds = watch.seconds();
+  return report;
+}
+
+GrowthReport GrowingCut::grow(const NodeChange& change, std::shared_ptr<const topology::Incision> incision) {
+  const Stopwatch total;
+  GrowthReport report;
+  State& s = *state_;
+  if (incision == nullptr)
+    throw InputError("a growing cut needs an incision");
+  for (int node : change.removed)
+    if (node < 0 || node >= s.problem.nodes.size() || s.removed[node] != 0)
+      throw InputError(fmt::format("node {} cannot be removed: it is not there", node));
+
+  const auto anew = [&](const char* reason, Problem problem, std::vector<char> removed) {
+    auto fresh = std::make_unique<State>(std::move(problem), s.options);
+    fresh->removed = std::move(removed);
+    fresh->condense_all();
+    state_ = std::move(fresh);
+    report.condensed_anew = true;
+    report.reason = reason;
+    report.window_nodes = state_->window->slots() / 3 - state_->options.room;
+    report.total_seconds = total.seconds();
+    return report;
+  };
+
+  Problem next = s.problem;
+  std::vector<char> removed = s.removed;
+  for (int node : change.removed) {
+    removed[node] = 1;
+    next.nodes.kinds[node] = NodeKind::interior; // it has no share of the surface any more
+  }
+  for (int k = 0; k < change.added.size(); ++k)
+    next.nodes.add(change.added.positions[k], change.added.spacings[k], change.added.kinds[k], change.added.normals[k]);
+  removed.resize(next.nodes.size(), 0);
+  const std::shared_ptr<const topology::Incision> before = s.problem.incision;
+  next.incision = incision;
+  for (const Prescribed& entry : next.prescribed)
+    if (removed[entry.node] != 0)
+      throw InputError(fmt::format("node {} is prescribed; the cut cannot remove it", entry.node));
+  if (!continues(before.get(), *incision))
+    return anew("the sheets do not continue those before", std::move(next), std::move(removed));
+  if (s.next_room + change.added.size() > s.window->contact_begin() / 3)
+    return anew("no room for the added nodes", std::move(next), std::move(removed));
+  for (int node : change.removed)
+    if (s.slot[node] < 0)
+      return anew("a removed node lies outside the window", std::move(next), std::move(removed));
+
+  // New spheres; the state changes only when all touched cells are known to lie in the window.
+  const Stopwatch sphere_watch;
+  const std::vector<double> old_radii = s.spheres->radii();
+  const auto fresh_spheres =
+      std::make_unique<Spheres>(next.nodes.positions, next.nodes.spacings, s.rho, Basis::linear, worst_moment_condition,
+                                Sight{incision, s.options.method.sight}, removed);
+  std::vector<int> changed_nodes = change.removed;
+  for (int i = 0; i < next.nodes.size(); ++i)
+    if (i >= std::ssize(old_radii) || (removed[i] == 0 && old_radii[i] != fresh_spheres->radii()[i]))
+      changed_nodes.push_back(i);
+  report.spheres_seconds = sphere_watch.seconds();
+
+  const Stopwatch cell_watch;
+  const double finest = *std::min_element(next.nodes.spacings.begin(), next.nodes.spacings.end());
+  const double slack = 0.25 * finest;
+  const Changes changes = changes_between(before.get(), *incision, 2 * slack);
+  const Nearness to_faces(changes.faces), to_front(changes.front);
+  std::vector<int> new_slot = s.slot;
+  for (int k = 0; k < change.added.size(); ++k)
+    new_slot.push_back(s.next_room + k);
+  std::vector<std::pair<int, State::Box>> exchanged;
+  CellEvaluator evaluator(*fresh_spheres);
+  BackgroundCells filled;
+  BoundingBox touched{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
+  const auto include = [&](const Vector3& x, double reach) {
+    touched.lower = touched.lower.cwiseMin((x.array() - reach).matrix());
+    touched.upper = touched.upper.cwiseMax((x.array() + reach).matrix());
+  };
+  const double largest = std::max(*std::max_element(old_radii.begin(), old_radii.end()),
+                                  *std::max_element(fresh_spheres->radii().begin(), fresh_spheres->radii().end()));
+  for (const Vector3& x : changes.faces)
+    include(x, largest);
+  for (const Vector3& x : changes.front)
+    include(x, largest * std::max(1.0, s.enrichment_reach()));
+  std::vector<std::pair<Vector3, double>> balls;
+  for (int i : changed_nodes) {
+    const double radius = std::max(i < std::ssize(old_radii) ? old_radii[i] : 0.0, fresh_spheres->radii()[i]);
+    balls.emplace_back(next.nodes.positions[i], radius);
+    include(next.nodes.positions[i], radius);
+  }
+  const char* outside = nullptr;
+  for (int b = 0; b < std::ssize(s.boxes) && outside == nullptr; ++b) {
+    const BackgroundBox& leaf = s.boxes[b].box;
+    if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
+        ((touched.upper - leaf.centre).array() < -leaf.half.array()).any())
+      continue;
+    const double half = leaf.half.norm(), radius = s.radius_at(leaf.centre);
+    const bool is_touched = to_faces(leaf.centre) - half - slack < radius ||
+                            to_front(leaf.centre) - half - slack < radius * std::max(1.0, s.enrichment_reach()) ||
+                            std::any_of(balls.begin(), balls.end(), [&](const auto& ball) {
+                              return (ball.first - leaf.centre).norm() < ball.second + half;
+                            });
+    if (!is_touched)
+      continue;
+    State::Box box{leaf, {}, {}};
+    refill_box(*next.domain, leaf, s.background(), incision.get(), filled);
+    s.evaluate(box, filled, evaluator);
+    if (s.boxes[b].cells.empty())
+      outside = "the cut left the predicted way";
+    for (const State::Box* one : {&std::as_const(box), &std::as_const(s.boxes[b])})
+      for (const CellShapes& cell : one->cells)
+        for (int node : cell.nodes)
+          if (new_slot[node] < 0)
+            outside = "the cut left the predicted way";
+    exchanged.emplace_back(b, std::move(box));
+  }
+  // The same for means of the held surface whose points see the change.
+  const auto is_near = [&](const DisplacementMean& mean) {
+    const double radius = s.radius_at(mean.centroid), share = 0.5 * radius;
+    return to_faces(mean.centroid) < radius + share ||
+           to_front(mean.centroid) < radius * std::max(1.0, s.enrichment_reach()) + share ||
+           std::any_of(balls.begin(), balls.end(),
+                       [&](const auto& ball) { return (ball.first - mean.centroid).norm() < ball.second + share; });
+  };
+  std::vector<DisplacementMean> held = s.held;
+  if (std::any_of(held.begin(), held.end(), is_near)) {
+    held = held_means(next, *fresh_spheres);
+    for (std::size_t k = 0; k < held.size(); ++k)
+      if (held[k].nodes != s.held[k].nodes || held[k].weights != s.held[k].weights)
+        for (const DisplacementMean* one : {&held[k], &s.held[k]})
+          for (int node : one->nodes)
+            if (new_slot[node] < 0)
+              outside = "the cut came to the held region";
+  }
+  if (outside != nullptr)
+    return anew(outside, std::move(next), std::move(removed));
+
+  // Exchange.
+  const auto grown = static_cast<Eigen::Index>(3 * next.nodes.size());
+  s.cell_loads.conservativeResizeLike(VectorX::Zero(grown));
+  for (int k = 0; k < change.added.size(); ++k) {
+    const int block = s.next_room + k;
+    for (int c = 0; c < 3; ++c)
+      s.window->activate(3 * block + c);
+    s.window_node[block] = s.problem.nodes.size() + k;
+  }
+  s.next_room += change.added.size();
+  s.slot = std::move(new_slot);
+  CellEvaluator numbering(*fresh_spheres);
+  CellShapes by_slot;
+  for (auto& [b, box] : exchanged) {
+    s.add_cell_loads(s.boxes[b], -1, *s.spheres, s.cell_loads);
+    for (const CellShapes& cell : s.boxes[b].cells)
+      s.scatter(cell, -1, numbering, by_slot);
+    for (const CellShapes& cell : box.cells)
+      s.scatter(cell, 1, numbering, by_slot);
+    s.boxes[b] = std::move(box);
+    s.add_cell_loads(s.boxes[b], 1, *fresh_spheres, s.cell_loads);
+  }
+  for (std::size_t k = 0; k < held.size(); ++k)
+    if (held[k].nodes != s.held[k].nodes || held[k].weights != s.held[k].weights) {
+      s.scatter(s.held[k], next.prescribed[k], -1);
+      s.scatter(held[k], next.prescribed[k], 1);
+    }
+  s.held = std::move(held);
+  for (int node : change.removed) {
+    for (int c = 0; c < 3; ++c)
+      s.window->deactivate(3 * s.slot[node] + c);
+    s.window_node[s.slot[node]] = -1;
+    s.cell_loads.segment<3>(3 * static_cast<Eigen::Index>(node)).setZero();
+  }
+  Problem previous = std::move(s.problem);
+  std::vector<char> previously_removed = std::move(s.removed);
+  s.problem = std::move(next);
+  s.removed = std::move(removed);
+  *s.spheres = *fresh_spheres;
+  s.loads = s.cell_loads + s.surface_loads();
+  report.boxes = static_cast<int>(exchanged.size());
+  report.cells_seconds = cell_watch.seconds();
+
+  try {
+    const Stopwatch factor_watch;
+    s.window->factor();
+    report.factor_seconds = factor_watch.seconds();
+    const Stopwatch condense_watch;
+    if (std::any_of(s.contact.begin(), s.contact.end(), is_near))
+      s.find_contact();
+    s.condense_contact();
+    report.condense_seconds = condense_watch.seconds();
+  } catch (const NumericalError&) {
+    // A piece that nothing holds, or a support gone bad: the ordinary way deals with it or says what is wrong; then
+    // the body before is condensed again, for this one has been overwritten.
+    Problem wanted = s.problem;
+    std::vector<char> wanted_removed = s.removed;
+    try {
+      return anew("the window became singular", std::move(wanted), std::move(wanted_removed));
+    } catch (...) {
+      auto back = std::make_unique<State>(std::move(previous), s.options);
+      back->removed = std::move(previously_removed);
+      back->condense_all();
+      state_ = std::move(back);
+      throw;
+    }
+  }
+  report.window_nodes =
+      static_cast<int>(std::count_if(s.window_node.begin(), s.window_node.end(), [](int node) { return node >= 0; }));
+  report.total_seconds = total.seconds();
+  return report;
+}
+
+const Problem& GrowingCut::problem() const {
+  return state_->problem;
+}
+const std::vector<char>& GrowingCut::removed() const {
+  return state_->removed;
+}
+int GrowingCut::window_unknowns() const {
+  return 3 * static_cast<int>(std::count_if(state_->window_node.begin(), state_->window_node.end(),
+                                            [](int node) { return node >= 0; }));
+}
+const MatrixX& GrowingCut::compliance() const {
+  return state_->compliance;
+}
+const VectorX& GrowingCut::base_displacement() const {
+  return state_->base;
+}
+
+VectorX GrowingCut::coefficients(const std::vector<Vector3>& contact_forces) const {
+  const State& s = *state_;
+  VectorX right = s.loads;
+  for (std::size_t c = 0; c < contact_forces.size(); ++c)
+    for (std::size_t k = 0; k < s.contact[c].nodes.size(); ++k)
+      right.segment<3>(3 * static_cast<Eigen::Index>(s.contact[c].nodes[k])) +=
+          s.contact[c].weights[k] * contact_forces[c];
+  const MatrixX in_window = s.window->solve(s.window_right(right));
+  const int far = s.window->far();
+  VectorX ordered = VectorX::Zero(far + s.window->slots() - 3 * static_cast<Eigen::Index>(s.options.room));
+  for (Eigen::Index k = 0; k < std::ssize(s.far_order); ++k)
+    ordered.segment<3>(3 * k) = s.loads.segment<3>(3 * s.far_order[k]);
+  const MatrixX recovered = s.window->recover(in_window, ordered);
+  VectorX coefficients = VectorX::Zero(s.loads.size());
+  for (Eigen::Index k = 0; k < std::ssize(s.far_order); ++k)
+    coefficients.segment<3>(3 * s.far_order[k]) = recovered.col(0).segment<3>(3 * k);
+  for (Eigen::Index b = 0; b < std::ssize(s.window_node); ++b)
+    if (const int node = s.window_node[b]; node >= 0)
+      coefficients.segment<3>(3 * node) = in_window.col(0).segment<3>(3 * b);
+  return coefficients;
+}
+
+GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact_forces) const {
+  const State& s = *state_;
+  const Problem& problem = s.problem;
+  const std::unique_ptr<Spheres> spheres = s.make_spheres();
+  const auto size = static_cast<Eigen::Index>(3 * problem.nodes.size());
+  MatrixX k = MatrixX::Zero(size, size);
+  const double mu = problem.material.shear_modulus(), lambda = problem.material.lame_lambda();
+  CellEvaluator evaluator(*spheres);
+  BackgroundCells filled;
+  CellShapes cell;
+  StiffnessColumn column;
+  for (const State::Box& box : s.boxes) {
+    refill_box(*problem.domain, box.box, s.background(), problem.incision.get(), filled);
+    for (int c = 0; c + 1 < std::ssize(filled.start); ++c) {
+      evaluator.evaluate(filled.of(c), cell);
+      const int count = static_cast<int>(cell.nodes.size());
+      for (int own = 0; own < count; ++own) {
+        stiffness_column(cell.gradients.data(), cell.points, cell.stride, own, count, own, lambda, mu, column);
+        for (int i = own; i < count; ++i)
+          for (int a = 0; a < 3; ++a)
+            for (int b = 0; b < 3; ++b)
+              k(3 * cell.nodes[i] + a, 3 * cell.nodes[own] + b) += column.plane[3 * a + b][i];
+      }
+    }
+  }
+  const SurfacePatches patches(*problem.domain, problem.nodes, problem.incision);
+  const std::vector<DisplacementMean> held = held_means(problem, *spheres);
+  for (std::size_t p = 0; p < held.size(); ++p) {
+    const Prescribed& entry = problem.prescribed[p];
+    const double penalty = constraint_stiffness(problem, entry.node);
+    for (std::size_t i = 0; i < held[p].nodes.size(); ++i)
+      for (std::size_t j = 0; j <= i; ++j)
+        for (int c = 0; c < 3; ++c)
+          if (entry.components[c])
+            k(3 * held[p].nodes[i] + c, 3 * held[p].nodes[j] + c) += penalty * held[p].weights[i] * held[p].weights[j];
+  }
+  for (Eigen::Index i = 0; i < problem.nodes.size(); ++i)
+    if (s.removed[i] != 0)
+      k.diagonal().segment<3>(3 * i).setOnes();
+  const Eigen::LLT<MatrixX, Eigen::Lower> factor(k);
+  if (factor.info() != Eigen::Success)
+    throw NumericalError("the system from scratch is not positive definite");
+  const auto count = static_cast<Eigen::Index>(s.contact.size());
+  MatrixX right = MatrixX::Zero(size, 3 * count + 1);
+  std::vector<DisplacementMean> means;
+  for (int node : s.options.contact)
+    means.push_back(patches.mean(node, *spheres, problem.prescribed_region));
+  right.col(3 * count) = s.loads;
+  for (Eigen::Index c = 0; c < count; ++c)
+    for (std::size_t n = 0; n < means[c].nodes.size(); ++n) {
+      for (int a = 0; a < 3; ++a)
+        right(3 * means[c].nodes[n] + a, 3 * c + a) += means[c].weights[n];
+      if (static_cast<std::size_t>(c) < contact_forces.size())
+        right.col(3 * count).segment<3>(3 * static_cast<Eigen::Index>(means[c].nodes[n])) +=
+            means[c].weights[n] * contact_forces[c];
+    }
+  const MatrixX solution = factor.solve(right);
+  Scratch scratch;
+  scratch.compliance.resize(3 * count, 3 * count);
+  for (Eigen::Index c = 0; c < count; ++c)
+    for (Eigen::Index f = 0; f < 3 * count; ++f)
+      scratch.compliance.col(f).segment<3>(3 * c) = means[c].of(VectorX(solution.col(f)));
+  scratch.coefficients = solution.col(3 * count);
+  return scratch;
+}
+
+} // namespace spherecut::solvers

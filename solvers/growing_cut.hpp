@@ -1,0 +1,83 @@
+// A body whose cut grows increment by increment, in the weak form: instead of assembling and factoring anew, the parts
+// of the system near the increment are exchanged and a dense window of it is factored again (schur_window.hpp).
+//
+// The nodes far from the cut's way are eliminated once. The window holds every node that a cut along the predicted way
+// can touch: all nodes of the cells within one sphere radius of it (hidden and bent sight lines) or within reach of the
+// enrichment of its front. An increment evaluates the touched cells again, S += K_new - K_old, factors S and condenses
+// it to the contact.
+#pragma once
+
+#include "solvers/discretisation.hpp"
+
+#include <memory>
+
+namespace spherecut::solvers {
+
+/// Ids stay what they are: removed nodes keep their place without a sphere, added ones come at the end.
+struct NodeChange {
+  std::vector<int> removed;
+  NodeCloud added;
+};
+
+struct GrowthOptions {
+  DiscretisationOptions method; // galerkin
+  /// Where the faces of the cut may come to lie in the next increments (rest frame): the predicted way of the blade. A
+  /// cut that leaves it is handled all the same, by condensing anew along `way`.
+  topology::SurfaceMesh way;
+  std::vector<int> contact; // candidates of the tool: free surface nodes
+  int room = 200;           // nodes that may be added before the window is condensed anew
+};
+
+/// What one increment took. Seconds are wall clock.
+struct GrowthReport {
+  bool condensed_anew = false;
+  const char* reason = ""; // why it had to be
+  int boxes = 0;           // background boxes exchanged
+  int window_nodes = 0;    // nodes in the dense system
+  double spheres_seconds = 0, cells_seconds = 0, factor_seconds = 0, condense_seconds = 0, total_seconds = 0;
+};
+
+class GrowingCut {
+ public:
+  /// Assembles and condenses. Throws InputError when the method is not galerkin, a candidate does not exist or the way
+  /// is empty, else as discretise() does.
+  GrowingCut(Problem problem, GrowthOptions options);
+  ~GrowingCut();
+  GrowingCut(const GrowingCut&) = delete;
+  GrowingCut& operator=(const GrowingCut&) = delete;
+
+  /// The cut becomes `incision`, whose sheets continue those before it triangle by triangle (as topology::BladeSweep
+  /// appends them), and the nodes change with it. Whatever the window does not cover is condensed anew and said. Throws
+  /// as the constructor when the new body cannot be solved; the state is then the one before.
+  GrowthReport grow(const NodeChange& change, std::shared_ptr<const topology::Incision> incision);
+
+  /// Condenses anew about another predicted way (in the background of a real-time loop, from a copy of problem()).
+  GrowthReport condense_anew(topology::SurfaceMesh way);
+
+  /// The problem as it stands; removed nodes are still in its arrays.
+  [[nodiscard]] const Problem& problem() const;
+  /// Per node: 1 when it has been removed.
+  [[nodiscard]] const std::vector<char>& removed() const;
+  [[nodiscard]] int window_unknowns() const;
+
+  /// Displacement of the candidates (3 each, m) per unit force on them, m/N; and under the loads alone.
+  [[nodiscard]] const MatrixX& compliance() const;
+  [[nodiscard]] const VectorX& base_displacement() const;
+
+  /// Nodal coefficients (3N, zero for removed nodes) under the loads and the given forces on the candidates, N.
+  [[nodiscard]] VectorX coefficients(const std::vector<Vector3>& contact_forces) const;
+
+  /// Compliance and coefficients from a system that is assembled and factored from scratch (dense) on the same boxes
+  /// and nodes: what the updated ones must equal.
+  struct Scratch {
+    MatrixX compliance;
+    VectorX coefficients;
+  };
+  [[nodiscard]] Scratch from_scratch(const std::vector<Vector3>& contact_forces) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+} // namespace spherecut::solvers
