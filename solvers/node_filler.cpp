@@ -86,6 +86,7 @@ Filler::Filler(const topology::Domain& domain, const SprinkleOptions& options, c
     : domain_(domain), options_(options), spacing_(options.spacing), incision_(options.incision.get()), region_(region),
       local_surface_(region == nullptr ? topology::SurfaceMesh{} : part_of(domain.surface(), *region)),
       surface_(region == nullptr ? domain.surface() : local_surface_), grid_(spacing_.finest(), spacing_.slope),
+      removed_(spacing_.finest(), spacing_.slope),
       volume_samples_(sample_volume(domain, spacing_, sweep_fraction, options.maximum_nodes, region)),
       random_(options.random_seed), directions_(spiral_directions(interior_candidates)),
       features_(find_sharp_features(surface_, options.sharp_edge_degrees)) {
@@ -183,7 +184,7 @@ void Filler::place_seeds() {
 std::vector<int> Filler::front_starts() const {
   std::vector<int> starts;
   for (int i = 0; i < size(); ++i)
-    if (i >= std::ssize(settled_) || !settled_[i])
+    if (i >= std::ssize(settled_) || (!settled_[i] && region_ == nullptr))
       starts.push_back(i);
   return starts;
 }
@@ -304,7 +305,7 @@ void Filler::surface_front(std::vector<int> front) {
 void Filler::fill_surface() {
   surface_front(front_starts());
   for (const SurfaceSample& sample : sample_surface(surface_, spacing_, sweep_fraction, options_.maximum_nodes)) {
-    if (grid_.crowded(sample.point, sample.spacing, sweep_crowding))
+    if (!may_be_empty(sample.point, sample.spacing) || grid_.crowded(sample.point, sample.spacing, sweep_crowding))
       continue;
     const Vector3 x = domain_.closest_surface_point(sample.point);
     const double h = spacing_(x);
@@ -345,7 +346,7 @@ void Filler::interior_front(std::vector<int> front) {
 void Filler::fill_interior() {
   interior_front(front_starts());
   for (const auto& [x, h, expected] : volume_samples_) {
-    if (!fits_inside(x, h, sweep_crowding))
+    if (!may_be_empty(x, h) || !fits_inside(x, h, sweep_crowding))
       continue;
     add(x, h, NodeKind::interior, Vector3::Zero());
     interior_front({size() - 1});

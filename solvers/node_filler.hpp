@@ -59,10 +59,15 @@ class Filler {
     return has_room(x, h, crowding) && domain_.signed_distance(x) <= -options_.wall_clearance * h &&
            clear_of_sheets(x, options_.wall_clearance * h);
   }
+  /// In a region that was full: whether a node has gone from the surroundings of x.
+  [[nodiscard]] bool may_be_empty(const Vector3& x, double h) const {
+    return region_ == nullptr || removed_.crowded(x, h, sweep_crowding);
+  }
   /// Mean of the normals of the body on both sides of sharp edges at x, with the given mesh triangles.
   [[nodiscard]] Vector3 edge_normal(const Vector3& x, double h, std::span<const int> triangles) const;
   [[nodiscard]] Vector3 normal_of_edge_seed(const Vector3& x, double h) const;
   void place_along(int curve);
+  /// All nodes; where some have been kept those near which something has changed, in a region the new ones alone.
   [[nodiscard]] std::vector<int> front_starts() const;
   void surface_front(std::vector<int> front);
   void interior_front(std::vector<int> front);
@@ -80,7 +85,7 @@ class Filler {
   const BoundingBox* region_;
   topology::SurfaceMesh local_surface_; // triangles in the region
   const topology::SurfaceMesh& surface_;
-  NodeGrid grid_;
+  NodeGrid grid_, removed_;
   NodeCloud nodes_;
   std::vector<int> kept_from_;
   std::vector<bool> settled_; // kept nodes around which nothing has changed

@@ -70,6 +70,7 @@ void Filler::keep_others(const NodeCloud& previous, std::vector<bool> stays) {
   for (int j : removed) {
     const Vector3& x = previous.positions[j];
     const double h = spacing_(x);
+    removed_.add(x, h);
     grid_.for_each_within(x, h, 2 * h, [&](int i, double) { settled_[i] = false; });
   }
 }

@@ -9,9 +9,9 @@ NodeGrid::NodeGrid(double smallest_spacing, double slope)
     : smallest_(smallest_spacing), slope_(slope), heads_(1024, -1) {}
 
 std::array<int, 3> NodeGrid::cell_of(const Vector3& x, int level) const {
-  const double size = cell_size(level);
-  return {static_cast<int>(std::floor(x.x() / size)), static_cast<int>(std::floor(x.y() / size)),
-          static_cast<int>(std::floor(x.z() / size))};
+  const double scale = levels_[level].per_cell;
+  return {static_cast<int>(std::floor(scale * x.x())), static_cast<int>(std::floor(scale * x.y())),
+          static_cast<int>(std::floor(scale * x.z()))};
 }
 
 std::size_t NodeGrid::bucket(const std::array<int, 3>& cell, int level) const {
@@ -37,8 +37,8 @@ void NodeGrid::rehash(std::size_t buckets) {
 
 void NodeGrid::add(const Vector3& position, double spacing) {
   const int level = std::max(0, static_cast<int>(std::floor(std::log2(spacing / smallest_))));
-  if (level >= std::ssize(levels_))
-    levels_.resize(level + 1);
+  for (int next = static_cast<int>(levels_.size()); next <= level; ++next)
+    levels_.push_back({0, 1 / std::ldexp(smallest_, next + 1), 0});
   levels_[level].largest = std::max(levels_[level].largest, spacing);
   ++levels_[level].nodes;
   entries_.push_back({position, spacing, cell_of(position, level), level, -1});

@@ -43,11 +43,11 @@ class NodeGrid {
     int next; // in the chain of its bucket
   };
   struct Level {
-    double largest = 0; // m, largest spacing of its nodes
+    double largest = 0;  // m, largest spacing of its nodes
+    double per_cell = 0; // 1/m, inverse of its cell size, twice the smallest spacing of its octave
     int nodes = 0;
   };
 
-  [[nodiscard]] double cell_size(int level) const { return std::ldexp(smallest_, level + 1); }
   [[nodiscard]] std::array<int, 3> cell_of(const Vector3& x, int level) const;
   [[nodiscard]] std::size_t bucket(const std::array<int, 3>& cell, int level) const;
   void link(int node);
@@ -79,9 +79,12 @@ bool NodeGrid::visit_level(int level, const Vector3& x, double radius, Visitor&&
   for (cell[2] = lower[2]; cell[2] <= upper[2]; ++cell[2])
     for (cell[1] = lower[1]; cell[1] <= upper[1]; ++cell[1])
       for (cell[0] = lower[0]; cell[0] <= upper[0]; ++cell[0])
-        for (int j = heads_[bucket(cell, level)]; j >= 0; j = entries_[j].next)
-          if (entries_[j].level == level && entries_[j].cell == cell && visit(j))
+        for (int j = heads_[bucket(cell, level)]; j >= 0; j = entries_[j].next) {
+          const Entry& entry = entries_[j];
+          if (entry.cell[0] == cell[0] && entry.cell[1] == cell[1] && entry.cell[2] == cell[2] &&
+              entry.level == level && visit(j))
             return true;
+        }
   return false;
 }
 

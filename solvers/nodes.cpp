@@ -34,19 +34,23 @@ double SpacingField::operator()(const Vector3& x) const {
 std::vector<std::array<Vector3, 2>> front_segments(const topology::Incision& incision, double length) {
   if (!(length > 0))
     throw InputError(fmt::format("front_segments: pieces of {} m are asked for; the length must be positive", length));
-  // A run is cut short where it turns by 20 degrees or doubles the length: the chord stays within a tenth of it.
+  // A straight run stays whole; another ends where it turns by 20 degrees or its chord exceeds the length.
   std::vector<std::array<Vector3, 2>> result;
   const topology::FrontSegment* last = nullptr;
   Vector3 start = Vector3::Zero();
+  bool straight = true;
   for (const topology::FrontSegment& piece : incision.front()) {
     const Vector3 direction = (piece.to - piece.from).normalized();
-    const bool joined = last != nullptr && last->to == piece.from && last->sheet == piece.sheet &&
-                        direction.dot(start) > 0.94 && (piece.to - result.back()[0]).norm() <= length;
-    if (joined)
+    const double turn = direction.dot(start);
+    const bool goes_on = last != nullptr && last->to == piece.from && last->sheet == piece.sheet;
+    const bool still_straight = straight && turn > 1 - 1e-9;
+    if (goes_on && (still_straight || (turn > 0.94 && (piece.to - result.back()[0]).norm() <= length))) {
       result.back()[1] = piece.to;
-    else {
+      straight = still_straight;
+    } else {
       result.push_back({piece.from, piece.to});
       start = direction;
+      straight = true;
     }
     last = &piece;
   }

@@ -49,7 +49,7 @@ struct SpacingField {
 };
 
 /// The front of an incision as segments of a SpacingField: runs that turn by little are joined to pieces of at most
-/// `length` m, so that the field stays cheap.
+/// `length` m, straight ones whatever their length, so that the field stays cheap.
 std::vector<std::array<Vector3, 2>> front_segments(const topology::Incision& incision, double length);
 
 /// A node that must be where it is put (tool tip, contact rings, lips), with its kind and normal.
