@@ -1,11 +1,12 @@
 #include "topology/cut_fields.hpp"
 
 #include "topology/errors.hpp"
-#include "topology/proximity.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <map>
 #include <openvdb/openvdb.h>
 #include <utility>
@@ -46,34 +47,71 @@ void for_leaves(const VoxelBox& box, const Visit& visit) {
               openvdb::Coord::minComponent(box.upper, origin.offsetBy(leaf_side - 1)));
 }
 
-/// A triangle and the disc in its plane that covers it, whose distance is cheap and never larger.
-struct CoveredTriangle {
-  std::array<Vector3, 3> corners;
-  Vector3 middle, normal;
-  double radius; // m
+/// Distances from a triangle to the voxels of a leaf, eight at a time along z, in the triangle's own plane coordinates
+/// u, v and height h about its middle. Single precision: all lengths are of the order of the band.
+class TriangleRows {
+ public:
+  using Row = Eigen::Array<float, leaf_side, 1>;
 
-  explicit CoveredTriangle(const std::array<Vector3, 3>& p) : corners(p), middle((p[0] + p[1] + p[2]) / 3), radius(0) {
-    normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
-    for (const Vector3& corner : p)
-      radius = std::max(radius, (corner - middle).norm());
+  TriangleRows(const std::array<Vector3, 3>& p, double voxel) : middle_((p[0] + p[1] + p[2]) / 3) {
+    axes_.row(0) = (p[1] - p[0]).normalized();
+    axes_.row(2) = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+    axes_.row(1) = axes_.row(2).cross(axes_.row(0));
+    std::array<Eigen::Vector2d, 3> corners;
+    for (int c = 0; c < 3; ++c)
+      corners[c] = (axes_ * (p[c] - middle_)).head<2>();
+    double radius = 0;
+    for (int e = 0; e < 3; ++e) {
+      const Eigen::Vector2d along = corners[(e + 1) % 3] - corners[e];
+      corner_[e] = corners[e].cast<float>();
+      along_[e] = along.cast<float>();
+      share_[e] = (along / along.squaredNorm()).cast<float>();
+      radius = std::max(radius, corners[e].norm());
+    }
+    radius_ = static_cast<float>(radius * (1 + 1e-4));
+    steps_ = (axes_ * voxel).cast<float>();
+    const Row k = Row::LinSpaced(0, leaf_side - 1);
+    for (int d = 0; d < 3; ++d)
+      along_z_[d] = k * steps_(d, 2);
   }
 
-  /// Whether no point of the triangle is nearer to x than `limit` m.
-  [[nodiscard]] bool clear_of(const Vector3& x, double limit) const {
-    const Vector3 away = x - middle;
-    const double height = away.dot(normal), squared = height * height, room = limit * limit - squared;
-    if (room <= 0)
-      return true;
-    const double lateral = away.squaredNorm() - squared; // squared
-    if (lateral <= radius * radius)
+  void enter_leaf(const Vector3& origin) { origin_ = (axes_ * (origin - middle_)).cast<float>(); }
+
+  /// Squared distances of the row at voxel i, j of the leaf; false when none is below those given.
+  bool lower(int i, int j, const Row& squared_limits, Row& squared) const {
+    const Eigen::Vector3f start =
+        origin_ + static_cast<float>(i) * steps_.col(0) + static_cast<float>(j) * steps_.col(1);
+    const Row height = start[2] + along_z_[2], squared_height = height * height;
+    // The plane, then a disc that covers the triangle: never farther, and cheap.
+    constexpr float rounding = 1 - 1e-4F;
+    if ((squared_height * rounding - squared_limits).minCoeff() >= 0)
       return false;
-    const double beyond = std::sqrt(lateral) - radius;
-    return beyond * beyond * (1 - 1e-6) > room;
+    const Row u = start[0] + along_z_[0], v = start[1] + along_z_[1];
+    const Row beyond = ((u * u + v * v).sqrt() - radius_).max(0.0F);
+    if (((squared_height + beyond * beyond) * rounding - squared_limits).minCoeff() >= 0)
+      return false;
+    Row to_border = Row::Constant(std::numeric_limits<float>::max());
+    Row outside = -to_border; // positive beyond some edge
+    for (int e = 0; e < 3; ++e) {
+      const Row from_u = u - corner_[e][0], from_v = v - corner_[e][1];
+      const Row s = (from_u * share_[e][0] + from_v * share_[e][1]).max(0.0F).min(1.0F);
+      const Row off_u = from_u - s * along_[e][0], off_v = from_v - s * along_[e][1];
+      to_border = to_border.min(off_u * off_u + off_v * off_v);
+      outside = outside.max(from_u * along_[e][1] - from_v * along_[e][0]);
+    }
+    for (int k = 0; k < leaf_side; ++k)
+      squared[k] = outside[k] > 0 ? squared_height[k] + to_border[k] : squared_height[k];
+    return true;
   }
 
-  [[nodiscard]] double distance(const Vector3& x) const {
-    return (closest_on_triangle(x, corners[0], corners[1], corners[2]).point - x).norm();
-  }
+ private:
+  Vector3 middle_;
+  Matrix3 axes_; // rows: u, v, normal
+  std::array<Eigen::Vector2f, 3> corner_, along_, share_;
+  float radius_ = 0;
+  Eigen::Matrix3f steps_; // of u, v, h per voxel along x, y, z
+  std::array<Row, 3> along_z_;
+  Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
 };
 
 /// All that the frames along a segment of the front depend on.
@@ -119,33 +157,37 @@ struct CutFields::Impl {
   }
 
   /// Lowers the distances near one triangle. Voxels that enter the band start behind all fronts.
-  void add_triangle(const CoveredTriangle& triangle) {
-    const auto& [a, b, c] = triangle.corners;
-    for_leaves(around(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)),
-               [&](const openvdb::Coord& origin, const openvdb::Coord& from, const openvdb::Coord& to) {
-                 Leaf* leaf = distance_cache.probeLeaf(origin);
-                 Leaf* ahead_leaf = leaf ? ahead_cache.probeLeaf(origin) : nullptr;
-                 openvdb::Coord at;
-                 for (at.x() = from.x(); at.x() <= to.x(); ++at.x())
-                   for (at.y() = from.y(); at.y() <= to.y(); ++at.y())
-                     for (at.z() = from.z(); at.z() <= to.z(); ++at.z()) {
-                       const openvdb::Index offset = Leaf::coordToOffset(at);
-                       const float known = leaf ? leaf->getValue(offset) : static_cast<float>(band);
-                       const Vector3 x = centre(at, voxel);
-                       if (triangle.clear_of(x, known))
-                         continue;
-                       const auto value = static_cast<float>(triangle.distance(x));
-                       if (value >= known)
-                         continue;
-                       if (!leaf) {
-                         leaf = distance_cache.touchLeaf(origin);
-                         ahead_leaf = ahead_cache.touchLeaf(origin);
-                       }
-                       if (!leaf->isValueOn(offset))
-                         ahead_leaf->setValueOn(offset, -static_cast<float>(band));
-                       leaf->setValueOn(offset, value);
-                     }
-               });
+  void add_triangle(const std::array<Vector3, 3>& p) {
+    using Row = TriangleRows::Row;
+    const float widest = static_cast<float>(band);
+    TriangleRows rows(p, voxel);
+    const VoxelBox box = around(p[0].cwiseMin(p[1]).cwiseMin(p[2]), p[0].cwiseMax(p[1]).cwiseMax(p[2]));
+    for_leaves(box, [&](const openvdb::Coord& origin, const openvdb::Coord& from, const openvdb::Coord& to) {
+      Leaf* leaf = distance_cache.probeLeaf(origin);
+      Leaf* ahead_leaf = leaf ? ahead_cache.probeLeaf(origin) : nullptr;
+      rows.enter_leaf(centre(origin, voxel));
+      for (int i = from.x() - origin.x(); i <= to.x() - origin.x(); ++i)
+        for (int j = from.y() - origin.y(); j <= to.y() - origin.y(); ++j) {
+          const int offset = leaf_side * (leaf_side * i + j);
+          Row known = Row::Constant(widest), squared;
+          if (leaf)
+            known = Eigen::Map<const Row>(leaf->buffer().data() + offset);
+          if (!rows.lower(i, j, known * known, squared))
+            continue;
+          for (int k = 0; k < leaf_side; ++k) {
+            const float value = std::sqrt(squared[k]);
+            if (value >= known[k])
+              continue;
+            if (!leaf) {
+              leaf = distance_cache.touchLeaf(origin);
+              ahead_leaf = ahead_cache.touchLeaf(origin);
+            }
+            if (!leaf->isValueOn(offset + k))
+              ahead_leaf->setValueOn(offset + k, -widest);
+            leaf->setValueOn(offset + k, value);
+          }
+        }
+    });
   }
 
   /// Marks the voxels of the band that a segment of the front decides or decided.
@@ -189,37 +231,48 @@ struct CutFields::Impl {
     marked.clear();
   }
 
-  void require_memory(const Incision& incision) const {
-    double area = 0; // m2, of whole sheets
-    for (const SurfaceMesh& sheet : incision.sheets())
-      area += topology::area(sheet);
+  /// Area of the triangles of `next` that were not there before, m2. Throws when the fields would grow too large.
+  [[nodiscard]] double new_area(const Incision& next, bool grows) const {
+    double added = 0;
+    for_new_triangles(next, grows,
+                      [&](const std::array<Vector3, 3>& p) { added += 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm(); });
     // Leaves are filled to about a third around a surface.
-    const double bytes = 3 * area * 2 * band / std::pow(voxel, 3) * 2 * sizeof(float);
+    const double total = added + (grows ? sheet_area : 0);
+    const double bytes = 3 * total * 2 * band / std::pow(voxel, 3) * 2 * sizeof(float);
     constexpr double most_bytes = 2e9;
     if (bytes > most_bytes)
       throw InputError(fmt::format("cut fields: sheets of {:.3g} m2 with voxels of {} m would need {:.2g} GB, at most "
                                    "{:.2g} GB are allowed",
-                                   area, voxel, bytes / 1e9, most_bytes / 1e9));
+                                   total, voxel, bytes / 1e9, most_bytes / 1e9));
+    return added;
+  }
+
+  template <class Visit>
+  void for_new_triangles(const Incision& next, bool grows, const Visit& visit) const {
+    for (std::size_t s = 0; s < next.sheets().size(); ++s) {
+      const SurfaceMesh& sheet = next.sheets()[s];
+      const bool known = grows && s < current->sheets().size();
+      for (std::size_t t = known ? current->sheets()[s].triangles.size() : 0; t < sheet.triangles.size(); ++t) {
+        const Triangle& corners = sheet.triangles[t];
+        visit(
+            std::array<Vector3, 3>{sheet.vertices[corners[0]], sheet.vertices[corners[1]], sheet.vertices[corners[2]]});
+      }
+    }
   }
 
   void update(const std::shared_ptr<const Incision>& next) {
     const bool grows = current && extends(current->sheets(), next->sheets());
+    const double added = new_area(*next, grows);
     if (!grows) {
       distance_cache.clear();
       ahead_cache.clear();
       distances.clear();
       aheads.clear();
       front.clear();
+      sheet_area = 0;
     }
-    for (std::size_t s = 0; s < next->sheets().size(); ++s) {
-      const SurfaceMesh& sheet = next->sheets()[s];
-      const bool known = grows && s < current->sheets().size();
-      for (std::size_t t = known ? current->sheets()[s].triangles.size() : 0; t < sheet.triangles.size(); ++t) {
-        const Triangle& corners = sheet.triangles[t];
-        add_triangle(
-            CoveredTriangle({sheet.vertices[corners[0]], sheet.vertices[corners[1]], sheet.vertices[corners[2]]}));
-      }
-    }
+    sheet_area += added;
+    for_new_triangles(*next, grows, [this](const std::array<Vector3, 3>& p) { add_triangle(p); });
     std::vector<FrontKey> keys;
     for (int i = 0; i < std::ssize(next->front()); ++i)
       keys.push_back(key_of(*next, i));
@@ -256,6 +309,7 @@ struct CutFields::Impl {
   openvdb::tree::ValueAccessor<Tree> distance_cache{distances}, ahead_cache{aheads};
   std::map<openvdb::Coord, Leaf::NodeMaskType> marked; // by leaf
   std::vector<FrontKey> front;                         // sorted
+  double sheet_area = 0;                               // m2, of all triangles added
   std::shared_ptr<const Incision> current;
 };
 
@@ -274,7 +328,6 @@ CutFields& CutFields::operator=(CutFields&&) noexcept = default;
 void CutFields::update(std::shared_ptr<const Incision> incision) {
   if (!incision)
     throw InputError("cut fields: no incision is given");
-  impl_->require_memory(*incision);
   impl_->update(incision);
 }
 
