@@ -140,6 +140,16 @@ int LevelSet::near_triangle(const Vector3& x) const {
   return Impl::representable(p) ? impl_->triangles->tree().getValue(openvdb::Coord::round(p)) : -1;
 }
 
+void LevelSet::visit_inside(
+    const std::function<void(const std::array<int, 3>&, const std::array<int, 3>&)>& visit) const {
+  const auto as_array = [](const openvdb::Coord& c) { return std::array<int, 3>{c.x(), c.y(), c.z()}; };
+  for (auto it = impl_->distances->cbeginValueAll(); it; ++it)
+    if (*it < 0) {
+      const openvdb::CoordBBox box = it.getBoundingBox();
+      visit(as_array(box.min()), as_array(box.max()));
+    }
+}
+
 double LevelSet::voxel_size() const {
   return impl_->voxel_size;
 }

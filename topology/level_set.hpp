@@ -4,6 +4,7 @@
 #include "topology/surface_mesh.hpp"
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 
 namespace spherecut::topology {
@@ -36,6 +37,10 @@ class LevelSet {
 
   /// A triangle close to the one nearest to x, -1 outside the band: a starting point for an exact search.
   [[nodiscard]] int near_triangle(const Vector3& x) const;
+
+  /// Calls visit(lower, upper) for boxes of voxel indices, inclusive, that together hold every voxel with a distance
+  /// below zero once. A voxel's centre is at index * voxel_size().
+  void visit_inside(const std::function<void(const std::array<int, 3>&, const std::array<int, 3>&)>& visit) const;
 
   [[nodiscard]] double voxel_size() const;        // m
   [[nodiscard]] double outside_band() const;      // m
