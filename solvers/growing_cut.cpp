@@ -621,10 +621,18 @@ GrowthReport GrowingCut::grow(const NodeChange& change, std::shared_ptr<const to
   CellShapes by_slot;
   for (auto& [b, box] : exchanged) {
     s.add_cell_loads(s.boxes[b], -1, *s.spheres, s.cell_loads);
-    for (const CellShapes& cell : s.boxes[b].cells)
-      s.scatter(cell, -1, numbering, by_slot);
-    for (const CellShapes& cell : box.cells)
-      s.scatter(cell, 1, numbering, by_slot);
+    // A cell that came out as it was cancels itself.
+    const std::vector<CellShapes>& old_cells = s.boxes[b].cells;
+    const auto is_same = [&](std::size_t c) {
+      return c < old_cells.size() && c < box.cells.size() && old_cells[c].nodes == box.cells[c].nodes &&
+             old_cells[c].gradients == box.cells[c].gradients;
+    };
+    for (std::size_t c = 0; c < old_cells.size(); ++c)
+      if (!is_same(c))
+        s.scatter(old_cells[c], -1, numbering, by_slot);
+    for (std::size_t c = 0; c < box.cells.size(); ++c)
+      if (!is_same(c))
+        s.scatter(box.cells[c], 1, numbering, by_slot);
     s.boxes[b] = std::move(box);
     s.add_cell_loads(s.boxes[b], 1, *fresh_spheres, s.cell_loads);
   }

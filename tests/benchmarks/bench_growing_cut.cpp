@@ -1,0 +1,175 @@
+// One 2 mm increment of a growing cut: a block of 60 x 60 x 30 mm, base held, an upright blade 15 mm deep that runs in
+// from the side along a slanted line, off every axis and cell. Times are those of the update with real sight lines,
+// including the condensation to the contact; the window covers the next `ahead` increments of the known path, or a fan
+// of +-45 degrees for an unknown one. Beside it: condensing anew (the background's work) and a full rebuild.
+// BM_cholesky_900 (bench_rebuild) is the yardstick of the machine.
+#include "solvers/growing_cut.hpp"
+#include "topology/blade.hpp"
+#include "topology/cut_sheets.hpp"
+
+#include <benchmark/benchmark.h>
+#include <chrono>
+#include <cmath>
+
+namespace {
+
+using namespace spherecut;
+using namespace spherecut::solvers;
+
+constexpr double step = 0.002, depth = 0.0153;
+const Vector3 heading = Vector3(1, 0.083, 0).normalized();
+
+struct Scene {
+  std::shared_ptr<const topology::Domain> domain =
+      topology::make_box_domain({-0.03, -0.03, -0.03}, {0.03, 0.03, 0}, 0.004);
+  topology::BladeSweep sweep;
+  SprinkleOptions sprinkling;
+  NodeCloud nodes;
+  std::vector<bool> retired;
+  double travelled = 0, time = 0;
+
+  explicit Scene(int target) : sweep({{{0, 0, -depth}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.002}) {
+    for (int k = 0; k < 24; ++k) // from outside to 15 mm inside
+      advance();
+    sprinkling.incision = sweep.incision();
+    double low = 0.002, high = 0.02;
+    for (int trial = 0; trial < 12; ++trial) {
+      sprinkling.spacing.fine = sprinkling.spacing.coarse = std::sqrt(low * high);
+      nodes = sprinkle(*domain, sprinkling).nodes;
+      if (std::abs(nodes.size() - target) < 0.02 * target)
+        break;
+      (nodes.size() > target ? low : high) = sprinkling.spacing.fine;
+    }
+    retired.assign(nodes.size(), false);
+  }
+
+  void advance() {
+    sweep.move_to({time += 1, Vector3(-0.0619, 0.0013, 0) + travelled * heading});
+    travelled += step;
+  }
+  [[nodiscard]] Vector3 tip() const { return Vector3(-0.0619, 0.0013, 0) + (travelled - step) * heading; }
+
+  [[nodiscard]] Problem problem() const {
+    Problem p;
+    p.domain = domain;
+    p.incision = sweep.incision();
+    p.nodes = nodes;
+    p.material = {5000, 0.45, 1000};
+    for (int i = 0; i < nodes.size(); ++i)
+      if (nodes.kinds[i] != NodeKind::interior && nodes.positions[i].z() < -0.03 + 1e-9)
+        p.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+    p.prescribed_region = [](const Vector3& x, const Vector3& normal) { return normal.z() < -0.5 && x.z() < -0.029; };
+    return p;
+  }
+
+  [[nodiscard]] GrowthOptions options(int ahead, bool fan, SightRule sight) const {
+    GrowthOptions o;
+    o.method.sight = sight;
+    o.method.estimate_condition = false;
+    const double length = ahead * step;
+    const Vector3 across = Vector3::UnitZ().cross(heading);
+    // Known path: the strip ahead. Unknown: a fan of directions, sampled by three strips.
+    for (double angle : fan ? std::vector<double>{-0.785, 0, 0.785} : std::vector<double>{0}) {
+      const Vector3 way = std::cos(angle) * heading + std::sin(angle) * across;
+      const topology::SurfaceMesh strip =
+          topology::make_rectangle_sheet(tip() + 0.5 * length * way - 0.5 * depth * Vector3::UnitZ(),
+                                         way.cross(Vector3::UnitZ()), Vector3::UnitZ(), length, depth, 0.001);
+      const int offset = static_cast<int>(o.way.vertices.size());
+      o.way.vertices.insert(o.way.vertices.end(), strip.vertices.begin(), strip.vertices.end());
+      for (const Triangle& t : strip.triangles)
+        o.way.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
+    }
+    for (int i = 0; i < nodes.size(); ++i)
+      if (nodes.kinds[i] == NodeKind::surface && nodes.positions[i].z() > -1e-9 &&
+          (nodes.positions[i] - tip() - 0.006 * heading).norm() < 0.009)
+        o.contact.push_back(i);
+    return o;
+  }
+};
+
+void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
+  constexpr int increments = 3;
+  GrowthReport sum;
+  double worst = 0, sprinkle_seconds = 0, anew = 0;
+  int count = 0, unknowns = 0, condensed = 0, nodes = 0;
+  for (auto _ : state) {
+    Scene scene(static_cast<int>(state.range(0)));
+    const auto start = std::chrono::steady_clock::now();
+    GrowingCut cut(scene.problem(), scene.options(ahead, fan, sight));
+    anew += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    nodes = scene.nodes.size();
+    double seconds = 0;
+    for (int k = 0; k < increments; ++k) {
+      const auto before = scene.sweep.incision();
+      scene.advance();
+      const auto sprinkle_start = std::chrono::steady_clock::now();
+      scene.sprinkling.incision = scene.sweep.incision();
+      const SprinkleIncrement increment =
+          extend_sprinkling(*scene.domain, scene.sprinkling, scene.nodes, before.get(), scene.retired);
+      sprinkle_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - sprinkle_start).count();
+      for (int node : increment.removed)
+        scene.retired[node] = true;
+      for (int j = 0; j < increment.added.size(); ++j)
+        scene.nodes.add(increment.added.positions[j], increment.added.spacings[j], increment.added.kinds[j],
+                        increment.added.normals[j]);
+      scene.retired.resize(scene.nodes.size(), false);
+      const GrowthReport report = cut.grow({increment.removed, increment.added}, scene.sweep.incision());
+      condensed += report.condensed_anew ? 1 : 0;
+      seconds += report.total_seconds;
+      worst = std::max(worst, report.total_seconds);
+      sum.boxes += report.boxes;
+      sum.spheres_seconds += report.spheres_seconds;
+      sum.cells_seconds += report.cells_seconds;
+      sum.factor_seconds += report.factor_seconds;
+      sum.condense_seconds += report.condense_seconds;
+      unknowns = cut.window_unknowns();
+      ++count;
+    }
+    state.SetIterationTime(seconds / increments);
+  }
+  state.counters["nodes"] = nodes;
+  state.counters["window"] = unknowns;
+  state.counters["boxes"] = static_cast<double>(sum.boxes) / count;
+  state.counters["spheres_ms"] = 1e3 * sum.spheres_seconds / count;
+  state.counters["cells_ms"] = 1e3 * sum.cells_seconds / count;
+  state.counters["factor_ms"] = 1e3 * sum.factor_seconds / count;
+  state.counters["condense_ms"] = 1e3 * sum.condense_seconds / count;
+  state.counters["worst_ms"] = 1e3 * worst;
+  state.counters["sprinkle_ms"] = 1e3 * sprinkle_seconds / count;
+  state.counters["anew_ms"] = 1e3 * anew * increments / count;
+  state.counters["left_window"] = condensed;
+}
+
+void BM_growing_cut_enriched(benchmark::State& state) {
+  growth(state, 3, false, SightRule::enriched);
+}
+void BM_growing_cut_diffraction(benchmark::State& state) {
+  growth(state, 3, false, SightRule::diffraction);
+}
+void BM_growing_cut_diffraction_unknown_path(benchmark::State& state) {
+  growth(state, 3, true, SightRule::diffraction);
+}
+
+} // namespace
+
+BENCHMARK(BM_growing_cut_enriched)
+    ->Arg(300)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->UseManualTime()
+    ->Iterations(2)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_growing_cut_diffraction)
+    ->Arg(300)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->UseManualTime()
+    ->Iterations(2)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_growing_cut_diffraction_unknown_path)
+    ->Arg(300)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->UseManualTime()
+    ->Iterations(2)
+    ->Unit(benchmark::kMillisecond);
