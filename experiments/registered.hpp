@@ -13,5 +13,6 @@ std::vector<Check> run_hemisphere_palpation(const ExperimentContext& context);
 std::vector<Check> run_method_comparison(const ExperimentContext& context);
 std::vector<Check> run_liver_palpation(const ExperimentContext& context);
 std::vector<Check> run_closed_cut_compression(const ExperimentContext& context);
+std::vector<Check> run_reprojection(const ExperimentContext& context);
 
 } // namespace spherecut::experiments

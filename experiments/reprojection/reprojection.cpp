@@ -1,0 +1,186 @@
+// Problem:   a blade cuts a block of 60 x 60 x 30 mm, 15 mm deep and 32 mm long, in 20 increments. At every increment
+//            the nodes near the cut are exchanged and the others kept, the wound's surface is grown, and the system is
+//            updated in its window. The block is held at its base and pulled apart at two faces.
+// Reference: the same cut made at once: nodes sprinkled around the finished cut, the surface cut once, the system built
+//            from scratch.
+// Command:   spherecut experiment run reprojection --out DIR
+#include "experiments/registered.hpp"
+#include "experiments/support/statistics.hpp"
+#include "solvers/growing_cut.hpp"
+#include "src/figure.hpp"
+#include "topology/blade.hpp"
+#include "topology/wound.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::experiments {
+
+namespace {
+
+using solvers::Method;
+
+constexpr double depth = 0.0153, step = 0.0016, spacing = 0.006;
+constexpr int increments = 20;
+const Vector3 start(-0.0419, 0.0013, 0);
+const Vector3 heading = Vector3(1, 0.083, 0).normalized();
+
+std::shared_ptr<const topology::Domain> block() {
+  return topology::make_box_domain({-0.03, -0.03, -0.03}, {0.03, 0.03, 0}, 0.004);
+}
+
+solvers::SprinkleOptions sprinkle_options(const std::shared_ptr<const topology::Incision>& incision, int seed) {
+  solvers::SprinkleOptions options;
+  options.spacing.fine = options.spacing.coarse = spacing;
+  options.incision = incision;
+  options.random_seed = static_cast<std::uint64_t>(seed);
+  return options;
+}
+
+/// Held at the base, pulled apart at the faces y = +-30 mm.
+solvers::Problem pulled(const std::shared_ptr<const topology::Domain>& domain,
+                        const std::shared_ptr<const topology::Incision>& incision, const solvers::NodeCloud& nodes) {
+  solvers::Problem problem;
+  problem.domain = domain;
+  problem.incision = incision;
+  problem.nodes = nodes;
+  problem.material = {5000, 0.4, 0};
+  for (int i = 0; i < nodes.size(); ++i)
+    if (nodes.kinds[i] != solvers::NodeKind::interior && nodes.kinds[i] != solvers::NodeKind::lip &&
+        nodes.positions[i].z() < -0.03 + 1e-9)
+      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  problem.prescribed_region = [](const Vector3& x, const Vector3& normal) {
+    return normal.z() < -0.5 && x.z() < -0.029;
+  };
+  problem.loads.traction = [](const Vector3& x, const Vector3& normal) -> Vector3 {
+    return std::abs(normal.y()) > 0.9 && std::abs(x.y()) > 0.029 ? Vector3(100 * normal) : Vector3(Vector3::Zero());
+  };
+  return problem;
+}
+
+/// Points of the block off the cut's plane, the same for all clouds.
+std::vector<Vector3> sample_points() {
+  std::vector<Vector3> points;
+  for (int a = 0; a < 9; ++a)
+    for (int b = 0; b < 10; ++b)
+      for (int c = 0; c < 5; ++c)
+        points.emplace_back(-0.027 + 0.0067 * a, -0.0275 + 0.0061 * b, -0.0285 + 0.0068 * c);
+  return points;
+}
+
+struct Grown {
+  solvers::NodeCloud nodes; // without the removed ones
+  std::shared_ptr<const topology::Incision> incision;
+  bool same_surface = false;
+  int condensed_anew = 0;
+  double update_error = 0; // of the coefficients against a system from scratch
+  int kept = 0;            // nodes of the first cloud that are still there
+};
+
+Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, int seed, bool update) {
+  topology::BladeSweep sweep({{{0, 0, -depth}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.0016});
+  double time = 0;
+  const auto move_to = [&](double travelled) { sweep.move_to({time += 1, start + travelled * heading}); };
+  move_to(0);
+  move_to(0.0125); // the first piece, at the side of the block
+  solvers::NodeCloud nodes = solvers::sprinkle(*domain, sprinkle_options(sweep.incision(), seed)).nodes;
+  const int first_count = nodes.size();
+  std::vector<bool> retired(nodes.size(), false);
+  topology::IncrementalWound wound(domain->surface());
+  wound.grow(sweep.sheets());
+  std::optional<solvers::GrowingCut> body;
+  if (update) {
+    solvers::GrowthOptions options;
+    options.way = sweep.sheets().front(); // grows with the cut: what leaves it is condensed anew
+    body.emplace(pulled(domain, sweep.incision(), nodes), options);
+  }
+  Grown grown;
+  for (int k = 1; k <= increments; ++k) {
+    const auto before = sweep.incision();
+    move_to(0.0125 + k * step);
+    const solvers::SprinkleIncrement change =
+        solvers::extend_sprinkling(*domain, sprinkle_options(sweep.incision(), seed), nodes, before.get(), retired);
+    for (int node : change.removed)
+      retired[node] = true;
+    for (int j = 0; j < change.added.size(); ++j)
+      nodes.add(change.added.positions[j], change.added.spacings[j], change.added.kinds[j], change.added.normals[j]);
+    retired.resize(nodes.size(), false);
+    wound.grow(sweep.sheets());
+    if (body)
+      grown.condensed_anew += body->grow({change.removed, change.added}, sweep.incision()).condensed_anew ? 1 : 0;
+  }
+  if (body) {
+    const VectorX updated = body->coefficients({}), scratch = body->from_scratch({}).coefficients;
+    grown.update_error = (updated - scratch).norm() / scratch.norm();
+  }
+  for (int i = 0; i < nodes.size(); ++i)
+    if (!retired[i]) {
+      grown.nodes.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+      grown.kept += i < first_count ? 1 : 0;
+    }
+  grown.incision = sweep.incision();
+  grown.same_surface = topology::surface_hash(wound.wound().surface) ==
+                       topology::surface_hash(topology::cut_surface(domain->surface(), sweep.sheets()).surface);
+  return grown;
+}
+
+} // namespace
+
+std::vector<Check> run_reprojection(const ExperimentContext& context) {
+  const int seeds = context.quick ? 1 : 10;
+  const auto domain = block();
+  const std::vector<Vector3> points = sample_points();
+  app::Table table({"method", "seed", "nodes_grown", "nodes_at_once", "kept", "difference"});
+  app::Figure figure{"A cut grown in 20 increments against the cut made at once",
+                     "seed",
+                     "relative difference of the field",
+                     false,
+                     false,
+                     {}};
+  std::vector<std::vector<double>> differences(2);
+  bool same_surface = true;
+  double update_error = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Grown grown = grow_cut(domain, seed, seed == 1);
+    same_surface = same_surface && grown.same_surface;
+    update_error = std::max(update_error, grown.update_error);
+    const solvers::NodeCloud direct = solvers::sprinkle(*domain, sprinkle_options(grown.incision, seed)).nodes;
+    for (Method method : {Method::galerkin, Method::collocation}) {
+      solvers::DiscretisationOptions options;
+      options.method = method;
+      const auto a = solvers::discretise(pulled(domain, grown.incision, grown.nodes), options);
+      const auto b = solvers::discretise(pulled(domain, grown.incision, direct), options);
+      const solvers::Field field_a = a->solve(), field_b = b->solve();
+      double difference = 0, size = 0;
+      for (const Vector3& x : points) {
+        const Vector3 ua = a->at(x, field_a).displacement, ub = b->at(x, field_b).displacement;
+        difference += (ua - ub).squaredNorm();
+        size += ub.squaredNorm();
+      }
+      differences[method == Method::galerkin ? 0 : 1].push_back(std::sqrt(difference / size));
+      table.add({std::string(solvers::to_string(method)), fmt::format("{}", seed),
+                 fmt::format("{}", grown.nodes.size()), fmt::format("{}", direct.size()), fmt::format("{}", grown.kept),
+                 fmt::format("{:.5f}", std::sqrt(difference / size))});
+    }
+  }
+  std::vector<Check> checks;
+  for (int m = 0; m < 2; ++m) {
+    const std::string name(solvers::to_string(m == 0 ? Method::galerkin : Method::collocation));
+    context.say(fmt::format("{}: difference of the field {:.4f} (worst seed {:.4f})", name, median(differences[m]),
+                            largest(differences[m])));
+    checks.push_back({"reprojection_" + name, median(differences[m]), "<=", 0.02});
+    checks.push_back({"reprojection_" + name + "_worst_seed", largest(differences[m]), "<=", 0.04});
+    app::Series series{name, {}, differences[m], app::SeriesStyle::points};
+    for (int seed = 1; seed <= seeds; ++seed)
+      series.x.push_back(seed);
+    figure.series.push_back(series);
+  }
+  checks.push_back({"reprojection_same_surface", same_surface ? 1.0 : 0.0, ">=", 1});
+  checks.push_back({"reprojection_update_equals_scratch", update_error, "<=", 1e-9});
+  table.write(context.out / "runs.csv");
+  app::write_png(figure, context.out / "difference.png");
+  return checks;
+}
+
+} // namespace spherecut::experiments
