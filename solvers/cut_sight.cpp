@@ -4,6 +4,7 @@
 #include "solvers/cut_sight.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/lip_lift.hpp"
 #include "topology/point_tree.hpp"
 
 #include <Eigen/Cholesky>
@@ -23,6 +24,8 @@ constexpr int plain_size = 4, enriched_size = 8;
 constexpr int enriched_spare = 2;        // nodes beyond the basis functions that an enriched support must have
 constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nearer to the sheet a point lies on it
 constexpr double largest_growth = 2.5;   // of a sphere at a point, 1.25^4
+constexpr double face_height = 0.02;     // in radii: nearer to a sheet a point stands on its face
+constexpr double eye_lift = 0.05;        // in radii: so far off the face a point looks over its bulge
 
 /// Everything about the support of one point, node by node.
 struct Scratch {
@@ -193,6 +196,19 @@ Vector3 CutSight::off_the_sheet(const Vector3& x) const {
   return x;
 }
 
+bool CutSight::hides(const Vector3& x, const Vector3& y, double radius) const {
+  const topology::Incision& incision = *sight_.incision;
+  if (!incision.blocks(x, y))
+    return false;
+  // Only points at a face can be hidden by its bulge: the eyes are lifted off it and look again.
+  const double at_face = face_height * radius;
+  if (!incision.near(x, at_face) && !incision.near(y, at_face))
+    return true;
+  const Vector3 from = topology::lift_off(incision, x, at_face, eye_lift * radius);
+  const Vector3 to = topology::lift_off(incision, y, at_face, eye_lift * radius);
+  return incision.blocks(from, to);
+}
+
 bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Support& support, bool grown, bool second,
                         int spare, double worst_condition, Enrich enrich, ShapeFunctions& out) const {
   if (support.count == 0)
@@ -220,7 +236,7 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
     const double q = support.q[k];
     Vector3 direction = -d; // gradient of the way, times its length
     double way = 0;         // 0: straight
-    if (may_hide && (grown || (concern_[id] & touches_sheet) != 0) && incision.blocks(x, x + d)) {
+    if (may_hide && (grown || (concern_[id] & touches_sheet) != 0) && hides(x, x + d, 1 / std::sqrt(q))) {
       const double radius = 1 / std::sqrt(q);
       if (!front || front->distance + front_distance_[id] >= radius)
         continue;

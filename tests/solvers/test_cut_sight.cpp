@@ -225,3 +225,52 @@ TEST_CASE("Second derivatives exist for visibility alone", "[cut_sight]") {
   REQUIRE(evaluate(spheres, x, plain));
   CHECK(plain.nodes == shape.nodes);
 }
+
+TEST_CASE("On a curved sheet the nodes of one face support one another, and never those of the other face",
+          "[cut_sight]") {
+  // A sheet rolled about the y axis with radius 10 h; lip nodes h apart on both faces.
+  constexpr double h = 0.01, radius = 10 * h;
+  const auto domain = topology::make_box_domain({-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}, 0.02);
+  const auto on_sheet = [&](double angle, double y, double off) {
+    return Vector3((radius + off) * std::sin(angle), y, (radius + off) * std::cos(angle) - radius);
+  };
+  topology::SurfaceMesh sheet;
+  constexpr int n = 24;
+  for (int i = 0; i <= n; ++i)
+    for (int k = 0; k <= n; ++k)
+      sheet.vertices.push_back(on_sheet(0.6 * (2.0 * i / n - 1), 0.06 * (2.0 * k / n - 1), 0));
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < n; ++k) {
+      const int a = i * (n + 1) + k;
+      sheet.triangles.push_back({a, a + n + 1, a + n + 2});
+      sheet.triangles.push_back({a, a + n + 2, a + 1});
+    }
+  const auto incision = std::make_shared<topology::Incision>(std::vector<topology::SurfaceMesh>{sheet}, domain);
+  std::vector<Vector3> centres;
+  std::vector<int> side; // +1 outside, -1 inside
+  for (int layer = -2; layer <= 2; ++layer)
+    for (int i = -3; i <= 3; ++i)
+      for (int k = -3; k <= 3; ++k)
+        for (int s : {1, -1})
+          if (layer == 0 || s == 1) {
+            const double off = layer == 0 ? s * lip_offset * h : layer * h;
+            centres.push_back(on_sheet(0.1 * i, h * k, off));
+            side.push_back(off > 0 ? 1 : -1);
+          }
+  const Spheres spheres(centres, std::vector<double>(centres.size(), h), 2.0, Basis::linear, 1e9,
+                        {incision, SightRule::visibility});
+  ShapeFunctions shape;
+  for (std::size_t i = 0; i < centres.size(); ++i) {
+    const double off = Vector3(centres[i].x(), 0, centres[i].z() + radius).norm() - radius;
+    if (std::abs(off) > 0.1 * h || std::abs(centres[i].x()) > 2.1 * h || std::abs(centres[i].y()) > 2.1 * h)
+      continue;
+    REQUIRE(evaluate(spheres, centres[i], shape));
+    int neighbours_on_face = 0;
+    for (int node : shape.nodes) {
+      CHECK(side[node] == side[i]);
+      const double other = Vector3(centres[node].x(), 0, centres[node].z() + radius).norm() - radius;
+      neighbours_on_face += std::abs(other) < 0.1 * h ? 1 : 0;
+    }
+    CHECK(neighbours_on_face >= 9); // itself and the eight around it
+  }
+}
