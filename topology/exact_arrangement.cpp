@@ -494,6 +494,7 @@ std::vector<ExactArrangement::RayCrossing> ExactArrangement::ray_from(int facet,
     std::sort(crossings.begin(), crossings.end(),
               [&](const auto& a, const auto& b) { return d.points.compare(a.first, b.first) * forward > 0; });
     std::vector<RayCrossing> result;
+    result.reserve(crossings.size());
     for (const auto& [point, crossed] : crossings)
       result.push_back(crossed);
     return result;

@@ -164,7 +164,7 @@ int WoundAssembly::half_running(int facet, int from, int to) const {
 void WoundAssembly::pair_halves(Region& region) {
   std::vector<int> facets;
   for (std::size_t k = 0; k < region.edges.size(); ++k) {
-    const auto [u, v] = region.edges[k];
+    const int u = region.edges[k].first, v = region.edges[k].second;
     facets.clear();
     arrangement_.facets_at_edge(u, v, facets);
     arrangement_.sort_about_edge(u, v, facets);

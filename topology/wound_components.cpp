@@ -88,7 +88,8 @@ bool WoundAssembly::keep_components(const std::vector<int>& halves) {
       patches[label[i]].push_back(i);
     }
   // Searches from all patches with one label take turns until they have met, or one has nowhere left to go.
-  for (const auto& [shared, roots] : patches) {
+  for (const auto& patch_list : patches) {
+    const std::vector<int>& roots = patch_list.second;
     if (roots.size() < 2)
       continue;
     std::vector<int> met(roots.size());
