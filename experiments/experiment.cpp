@@ -28,6 +28,8 @@ const std::vector<Experiment>& all_experiments() {
       {"liver_palpation", "the paper's Figure 4: a laparoscopic instrument on a liver", run_liver_palpation},
       {"closed_cut_compression", "lips under compression: a closed cut is as stiff as uncut tissue",
        run_closed_cut_compression},
+      {"cut_fuzz", "random and degenerate blades leave every wound closed, manifold and of the same volume",
+       run_cut_fuzz},
       {"reprojection", "a cut grown in 20 increments gives the field and the surface of the cut made at once",
        run_reprojection},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},

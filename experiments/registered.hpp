@@ -12,6 +12,7 @@ std::vector<Check> run_hertz(const ExperimentContext& context);
 std::vector<Check> run_hemisphere_palpation(const ExperimentContext& context);
 std::vector<Check> run_method_comparison(const ExperimentContext& context);
 std::vector<Check> run_liver_palpation(const ExperimentContext& context);
+std::vector<Check> run_cut_fuzz(const ExperimentContext& context);
 std::vector<Check> run_closed_cut_compression(const ExperimentContext& context);
 std::vector<Check> run_reprojection(const ExperimentContext& context);
 

@@ -1,0 +1,52 @@
+// Problem:   random and degenerate blades against three organs: swept, flat, waved, crossing, closed, through vertices,
+//            along edges, coplanar, grazing, cut twice. Every cut grows stage by stage.
+// Reference: the wound's own invariants, recounted by other means than those that made it (closed, manifold, volume,
+//            components, Euler characteristics), and the same cut made at once, triangle by triangle.
+// Command:   spherecut experiment run cut_fuzz --out DIR
+#include "experiments/cut_fuzz/fuzz.hpp"
+#include "experiments/registered.hpp"
+#include "src/figure.hpp"
+
+#include <fmt/format.h>
+
+namespace spherecut::experiments {
+
+std::vector<Check> run_cut_fuzz(const ExperimentContext& context) {
+  const int blades_an_organ = context.quick ? 13 : 700; // 13: every kind once
+  FuzzOutcome total;
+  app::Table table({"organ", "blades", "stages", "opened", "severed", "refused", "most_pieces", "worst_volume",
+                    "worst_piece_volume", "failures"});
+  app::Figure figure{"Blades of each kind, all organs", "kind", "blades", false, false, {}};
+  for (const FuzzOrgan& organ : fuzz_organs()) {
+    const FuzzOutcome outcome = cut_fuzz(organ, 0, blades_an_organ);
+    table.add({organ.name, fmt::format("{}", outcome.blades), fmt::format("{}", outcome.stages),
+               fmt::format("{}", outcome.opened), fmt::format("{}", outcome.severed),
+               fmt::format("{}", outcome.refused), fmt::format("{}", outcome.most_pieces),
+               fmt::format("{:.1e}", outcome.worst_volume), fmt::format("{:.1e}", outcome.worst_piece),
+               fmt::format("{}", outcome.failures.size())});
+    context.say(fmt::format("{}: {} blades in {} stages, {} opened, {} severed, {} failures", organ.name,
+                            outcome.blades, outcome.stages, outcome.opened, outcome.severed, outcome.failures.size()));
+    for (const std::string& failure : outcome.failures)
+      context.say(failure);
+    add(total, outcome);
+  }
+  app::Series kinds{"blades", {}, {}, app::SeriesStyle::points};
+  app::Table kind_table({"kind", "blades"});
+  for (const auto& [kind, count] : total.kinds) {
+    kinds.x.push_back(static_cast<double>(kinds.x.size() + 1));
+    kinds.y.push_back(count);
+    kind_table.add({kind, fmt::format("{}", count)});
+  }
+  figure.series.push_back(kinds);
+  table.write(context.out / "organs.csv");
+  kind_table.write(context.out / "kinds.csv");
+  app::write_png(figure, context.out / "kinds.png");
+  return {{"cut_fuzz_blades", static_cast<double>(total.blades), ">=", context.quick ? 39.0 : 2000.0},
+          {"cut_fuzz_failures", static_cast<double>(total.failures.size()), "<=", 0},
+          {"cut_fuzz_refused", static_cast<double>(total.refused), "<=", 0},
+          {"cut_fuzz_volume", total.worst_volume, "<=", 1e-9},
+          {"cut_fuzz_piece_volume_grown_against_at_once", total.worst_piece, "<=", 1e-12},
+          {"cut_fuzz_opened", static_cast<double>(total.opened) / total.blades, ">=", 0.5}};
+}
+
+} // namespace spherecut::experiments
