@@ -115,6 +115,7 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
 
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model) {
   solvers::DiscretisationOptions options = scenario.method;
+  options.unheld = scenario.cut.unheld;
   if (scenario.cut.sight)
     options.sight = *scenario.cut.sight;
   model.body = solvers::discretise(problem_of(scenario, domain, model), options);

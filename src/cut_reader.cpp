@@ -22,12 +22,6 @@ RectangleSheet rectangle(const Section& section, const std::string& name, Offenc
   return sheet;
 }
 
-UnheldRule unheld_rule(const std::string& name) {
-  if (name == "refuse")
-    return UnheldRule::refuse;
-  return name == "drop" ? UnheldRule::drop : UnheldRule::hold;
-}
-
 std::vector<BladePoint> blade_path(const Section& blade, Offences& offences) {
   std::vector<BladePoint> path;
   for (const Section& section : blade.tables("path")) {
@@ -80,7 +74,7 @@ CutSettings cut(const Section& section) {
   if (section.has("sight"))
     cut.sight = solvers::sight_rule_from_string(section.text("sight"));
   cut.lips = solvers::lip_condition_from_string(section.text("lips"));
-  cut.unheld = unheld_rule(section.text("unheld"));
+  cut.unheld = solvers::unheld_pieces_from_string(section.text("unheld"));
   cut.front_spacing = section.optional_number("front_spacing").value_or(0);
   return cut;
 }

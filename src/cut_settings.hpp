@@ -33,18 +33,11 @@ struct PrecutSettings {
   int line = 0;        // of the scenario file
 };
 
-/// What becomes of a piece that no fixed region holds.
-enum class UnheldRule {
-  refuse, // the cut that would sever it is refused
-  hold,   // it stays where it is at rest
-  drop,   // it leaves the computation
-};
-
 struct CutSettings {
   std::optional<solvers::SightRule> sight; // empty: the method's own
   solvers::LipCondition lips = solvers::LipCondition::frictionless;
-  UnheldRule unheld = UnheldRule::hold;
-  double front_spacing = 0; // m, 0: derived
+  solvers::UnheldPieces unheld = solvers::UnheldPieces::hold; // a piece that no fixed region holds
+  double front_spacing = 0;                                   // m, 0: derived
 };
 
 /// Where the frame of the blade is at a time.

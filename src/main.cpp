@@ -1,6 +1,7 @@
 // The command line. Exit status: 0 done, 1 a check of an experiment failed, 2 unusable input or command line,
 // 3 numerical failure, 130 interrupted.
 #include "experiments/experiment.hpp"
+#include "src/blas_threads.hpp"
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
 #include "src/version.hpp"
@@ -108,6 +109,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN); // a run goes on when nobody reads its progress
+  app::use_one_blas_thread();
   try {
     return run(argc, argv);
   } catch (const InputError& error) {

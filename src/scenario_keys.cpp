@@ -244,14 +244,15 @@ constexpr std::array keys = {
                 "Contact between the faces of a cut: none (they may go through one another), sliding, or sticking.",
                 {},
                 "open, frictionless, sticking"},
-    ScenarioKey{"cut.unheld",
-                choice,
-                "",
-                "\"hold\"",
-                "A severed piece that no fixed region holds: the cut is refused, the piece stays where it was at rest, "
-                "or it leaves the computation.",
-                {},
-                "refuse, hold, drop"},
+    ScenarioKey{
+        "cut.unheld",
+        choice,
+        "",
+        "\"hold\"",
+        "A severed piece that no fixed region holds: the cut is refused, soft springs hold the piece, or it leaves the "
+        "computation.",
+        {},
+        "refuse, hold, drop"},
     ScenarioKey{
         "cut.front_spacing", number, "m", "",
         "Node spacing at the cuts and along the way of the blade, where it is finer than nodes.fine_spacing; left "

@@ -1,5 +1,6 @@
 #include "src/session.hpp"
 
+#include "src/blas_threads.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -16,6 +17,9 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
+constexpr double rest_tolerance = 1e-4;     // of the fine spacing: of a place carried back to rest
+constexpr double coarse_tolerance = 0.02;   // the same where the field jumps by a little, as ahead of a front
+constexpr double gap_reach = 1;             // fine spacings from a sheet: a place without material lies in its opening
 
 // Adds its lifetime to a stage of the profile.
 class StageTimer {
@@ -40,6 +44,7 @@ Organ timed_organ(const OrganSettings& settings, double& seconds) {
 Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     : scenario_(std::move(scenario)), say_(std::move(say)), organ_(timed_organ(scenario_.organ, profile_.organ)),
       query_(organ_.domain->surface()) {
+  use_one_blas_thread();
   for (const std::string& remark : organ_.remarks)
     warn(remark, remark);
   zone_ = fine_zone(scenario_, *organ_.domain);
@@ -272,19 +277,28 @@ std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pos
   return missed;
 }
 
-// Where the material that is now at x was at rest. A place in the opening of a cut, where there is none, belongs to the
-// sheet.
+// Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
+// its surface. A place in the opening of a cut, where there is no material, belongs to the sheet.
 Vector3 Session::rest_position(const Vector3& x) const {
-  const auto displacement = [this](const Vector3& rest) { return at(rest).displacement; };
-  try {
-    return topology::rest_position(x, displacement, 1e-6 * zone_.spacing.fine);
-  } catch (const NumericalError&) {
-    const Vector3 guess = x - displacement(x);
-    if (model_.incision != nullptr)
-      if (const auto on = model_.incision->closest(guess, 4 * zone_.spacing.fine))
-        return on->point;
-    throw;
-  }
+  const topology::Domain& domain = *organ_.domain;
+  const auto displacement = [&](const Vector3& rest) {
+    return at(domain.signed_distance(rest) <= 0 ? rest : domain.closest_surface_point(rest)).displacement;
+  };
+  for (const double tolerance : {rest_tolerance, coarse_tolerance})
+    try {
+      return topology::rest_position(x, displacement, tolerance * zone_.spacing.fine);
+    } catch (const NumericalError&) {
+      if (tolerance == rest_tolerance)
+        continue;
+      const Vector3 guess = x - displacement(x);
+      if (model_.incision != nullptr)
+        if (const auto on = model_.incision->closest(guess, gap_reach * zone_.spacing.fine))
+          return on->point;
+      if (domain.signed_distance(guess) <= 0) // outside no material is cut
+        throw;
+      return guess;
+    }
+  return x;
 }
 
 // Moves the blade; true when that cut something and the body with the new cut is built and solved. A refusal leaves
@@ -362,12 +376,12 @@ void Session::check_pieces(double time) {
   const double volume = wound.pieces[static_cast<std::size_t>(unheld.front())].volume;
   const std::string what = fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region",
                                        unheld.size(), wound.pieces.size(), volume, unheld.size() == 1 ? "is" : "are");
-  if (scenario_.cut.unheld == UnheldRule::refuse)
+  if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
     throw InputError(fmt::format("{}; allowed by cut.unheld = \"refuse\": none", what));
   warn(fmt::format("unheld {}", unheld.size()),
        fmt::format("t = {:g} s: {}: {}", time, what,
-                   scenario_.cut.unheld == UnheldRule::hold ? "it stays where it was at rest"
-                                                            : "it leaves the computation"));
+                   scenario_.cut.unheld == solvers::UnheldPieces::hold ? "soft springs hold it"
+                                                                       : "it leaves the computation"));
 }
 
 void Session::report_cut(CutReport& report) const {

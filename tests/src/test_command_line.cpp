@@ -136,6 +136,69 @@ TEST_CASE("A run leaves rows, frames, series, figures and a summary that agree")
   }
 }
 
+TEST_CASE(
+    "A run that cuts leaves rows, wound, sheets, figures and a summary that agree, the same on one thread and two") {
+  const TemporaryFolder folder;
+  const auto scenario = write_file(
+      folder.path() / "case.toml",
+      replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]") +
+          replaced(small_scenario.substr(small_scenario.find("[tool]")), "figures = false", "figures = true") +
+          "[blade]\nedge = [[0, -0.04, 0], [0, 0.04, 0]]\nstep = 0.5\n"
+          "[[blade.path]]\ntime = 1\nposition = [0.022, 0, 0.036]\n"
+          "[[blade.path]]\ntime = 2\nposition = [0.020, 0, 0.018]\n");
+  const auto without_times = [](const std::filesystem::path& file) {
+    std::istringstream rows(read_file(file));
+    std::string kept;
+    std::string header;
+    std::getline(rows, header);
+    std::vector<bool> is_time;
+    std::istringstream names(header);
+    for (std::string name; std::getline(names, name, ',');)
+      is_time.push_back(name == "seconds" || (name != "time_s" && name.size() > 2 && name.ends_with("_s")));
+    for (std::string row; std::getline(rows, row);) {
+      std::istringstream cells(row);
+      std::size_t column = 0;
+      for (std::string cell; std::getline(cells, cell, ','); ++column)
+        kept += column < is_time.size() && is_time[column] ? "," : cell + ",";
+      kept += '\n';
+    }
+    return kept;
+  };
+  std::string forces;
+  std::string cuts;
+  nlohmann::json cut;
+  for (const std::string threads : {"1", "2"}) {
+    const auto out = folder.path() / ("out" + threads);
+    const ProgramResult result = run_shell("OPENBLAS_NUM_THREADS=" + threads + " OMP_NUM_THREADS=" + threads + " " +
+                                           spherecut_command({"run", scenario, "--out", out}));
+    INFO(result.err);
+    REQUIRE(result.status == 0);
+    CHECK_THAT(result.out, Contains("peak force") && Contains("cut of") && Contains("1 piece"));
+    const auto summary = nlohmann::json::parse(read_file(out / "summary.json"));
+    CHECK(summary["cut"]["pieces"] == 1);
+    CHECK(summary["cut"]["opening_m"].get<double>() > 1e-5);
+    CHECK(summary["cut"]["area_m2"].get<double>() == Approx(0.06 * 0.012).epsilon(0.05));
+    const std::string rows = read_file(out / "cuts.csv");
+    CHECK_THAT(rows, Contains(summary["cut"]["surface_hash"].get<std::string>()));
+    if (threads == "1") {
+      forces = without_times(out / "forces.csv");
+      cuts = without_times(out / "cuts.csv");
+      cut = summary["cut"];
+    }
+    CHECK(without_times(out / "forces.csv") == forces);
+    CHECK(without_times(out / "cuts.csv") == cuts);
+    CHECK(summary["cut"] == cut);
+    for (const std::string name : {"force.png", "profile.png", "opening.png", "cut.png"})
+      CHECK_THAT(read_file(out / name), StartsWith("\x89PNG"));
+    const std::string series = read_file(out / "series.pvd");
+    for (const auto& entry : std::filesystem::directory_iterator(out / "frames"))
+      CHECK_THAT(series, Contains("file=\"frames/" + entry.path().filename().string() + "\""));
+    const std::string wound = read_file(out / "frames/surface_00006.vtp");
+    CHECK_THAT(wound, Contains("Name=\"part\"") && Contains("Name=\"piece\"") && Contains("displacement [m]"));
+    CHECK_THAT(read_file(out / "frames/incision_00006.vtp"), Contains("NumberOfLines=") && Contains("Name=\"sheet\""));
+  }
+}
+
 TEST_CASE("Bad scenarios and surface files exit with 2, a clear line, and leave nothing behind") {
   const TemporaryFolder folder;
   const topology::SurfaceMesh block = small_block();

@@ -1,0 +1,235 @@
+#include "src/session.hpp"
+#include "tests/src/scenario_text.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "topology/errors.hpp"
+#include "topology/surface_io.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <numeric>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+using Catch::Contains;
+
+namespace {
+
+Session session_of(const std::string& text) {
+  const TemporaryFolder folder;
+  return Session(read_scenario(write_file(folder.path() / "case.toml", text)));
+}
+
+std::vector<StepResult> run(Session& session) {
+  std::vector<StepResult> results;
+  for (const StepSample& sample : session.steps())
+    results.push_back(session.step(sample));
+  return results;
+}
+
+// A blade with its edge along y, from pose to pose.
+std::string blade(const std::vector<std::string>& positions, double half_length, const std::string& step) {
+  std::string text = "[blade]\nedge = [[0, " + std::to_string(-half_length) + ", 0], [0, " +
+                     std::to_string(half_length) + ", 0]]\nstep = " + step + "\n";
+  int time = 0;
+  for (const std::string& position : positions)
+    text += "[[blade.path]]\ntime = " + std::to_string(time++) + "\nposition = " + position + "\n";
+  return text;
+}
+
+// Down through the block beside its middle, askew to everything.
+const std::string slice = blade({"[0.004, 0, 0.036]", "[0.002, 0, -0.006]"}, 0.04, "0.2");
+// Across the block above its base: what is above is held by nothing.
+const std::string topping = blade({"[-0.036, 0, 0.0151]", "[0.036, 0, 0.0153]"}, 0.04, "0.25");
+
+std::string stretched(const std::string& text) {
+  return replaced(text, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]");
+}
+
+double total(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+constexpr double block_volume = 0.06 * 0.06 * 0.03;
+
+} // namespace
+
+TEST_CASE("A pressurised disc opens, by about as much as in an infinite body, and keeps the volume of the block") {
+  Session session = session_of(replaced(cut_block, "fine_spacing = 0.005", "fine_spacing = 0.0035") + disc_precut +
+                               "pressure = 100\n");
+  REQUIRE(session.steps().size() == 1);
+  const StepResult result = session.step(session.steps().front());
+  REQUIRE(result.cut);
+  CHECK(result.cut->pieces == 1);
+  CHECK(total(result.cut->volumes) == Approx(block_volume).epsilon(1e-9));
+  CHECK(result.cut->area == Approx(3.14159265 * 1e-4).epsilon(0.03)); // a polygon on the circle
+  // Sneddon: volume 16 (1 - nu^2) p a^3 / (3 E), opening 8 (1 - nu^2) p a / (pi E). The block is three discs wide and
+  // its free faces are near: it opens more.
+  const double volume = 16 * 0.91 * 100 * 1e-6 / (3 * 1e4);
+  CHECK(result.cut->opening_volume > 0.9 * volume);
+  CHECK(result.cut->opening_volume < 1.5 * volume);
+  CHECK(result.cut->opening > 0.8 * 8 * 0.91 * 100 * 0.01 / (3.14159265 * 1e4));
+  CHECK(result.cut->closed_pairs == 0);
+  CHECK(result.residual < 1e-9);
+}
+
+TEST_CASE("A disc that is drawn together closes and does not go through itself") {
+  const std::string text = cut_block + disc_precut + "pressure = -100\n";
+  for (const std::string lips : {"frictionless", "sticking"}) {
+    Session session = session_of(text + "[cut]\nlips = \"" + lips + "\"\n");
+    const StepResult result = session.step(session.steps().front());
+    CHECK(result.cut->closed_pairs == result.cut->lip_pairs);
+    CHECK(result.cut->opening < 1e-9);
+    CHECK(std::abs(result.cut->opening_volume) < 1e-9);
+    CHECK(result.cut->lips_converged);
+    CHECK(result.residual < 1e-8);
+  }
+  Session open = session_of(text + "[cut]\nlips = \"open\"\n");
+  CHECK(open.step(open.steps().front()).cut->opening_volume < -1e-8);
+}
+
+TEST_CASE("A blade that comes down through a stretched block leaves two pieces that draw apart") {
+  Session session = session_of(stretched(cut_block) + slice);
+  const std::vector<StepResult> results = run(session);
+  double area = 0;
+  for (const StepResult& result : results) {
+    REQUIRE(result.cut);
+    CHECK_FALSE(result.cut->refused);
+    CHECK(result.cut->area >= area);
+    area = result.cut->area;
+    CHECK(total(result.cut->volumes) == Approx(block_volume).epsilon(1e-9));
+    CHECK(result.residual < 1e-8);
+  }
+  CHECK(results.front().cut->pieces == 1);
+  const CutReport& last = *results.back().cut;
+  CHECK(last.pieces == 2);
+  CHECK(last.unheld == 0);
+  CHECK(last.front_length == 0);
+  CHECK(last.area == Approx(0.06 * 0.03).epsilon(0.01)); // tilted by 3 degrees
+  CHECK(last.opening > 1e-4);
+  CHECK(last.opening_volume > 0);
+  CHECK(results[3].cut->kept_nodes > results[3].cut->nodes / 2);
+  // The block narrows towards the cut on both sides.
+  CHECK(session.at({0.008, 0, 0.029}).displacement.x() > 0);
+  CHECK(session.at({-0.002, 0, 0.029}).displacement.x() < 0);
+}
+
+TEST_CASE("A severed piece that nothing holds is held, dropped or refused as the scenario asks, and said") {
+  SECTION("hold") {
+    Session session = session_of(cut_block + topping + "[cut]\nunheld = \"hold\"\n");
+    const std::vector<StepResult> results = run(session);
+    CHECK(results.back().cut->pieces == 2);
+    CHECK(results.back().cut->unheld == 1);
+    REQUIRE(session.warnings().size() == 1);
+    CHECK_THAT(session.warnings().front(), Contains("1 of 2 pieces") && Contains("held by no fixed region"));
+  }
+  SECTION("drop") {
+    Session session = session_of(cut_block + topping + "[cut]\nunheld = \"drop\"\n");
+    CHECK(run(session).back().cut->pieces == 2);
+    CHECK_THAT(session.warnings().front(), Contains("leaves the computation"));
+    CHECK(session.at({0, 0, 0.025}).displacement.norm() == 0);
+  }
+  SECTION("refuse") {
+    Session session = session_of(cut_block + topping + "[cut]\nunheld = \"refuse\"\n");
+    const std::vector<StepResult> results = run(session);
+    CHECK(results.back().cut->pieces == 1);
+    CHECK(std::any_of(results.begin(), results.end(), [](const StepResult& r) { return r.cut->refused; }));
+    CHECK_THAT(session.warnings().front(), Contains("refused") && Contains("held by no fixed region"));
+  }
+}
+
+TEST_CASE("A cut that would leave a piece smaller than the node spacing is refused and changes nothing") {
+  Session session =
+      session_of(stretched(cut_block) + blade({"[0.0288, 0, 0.036]", "[0.0288, 0, -0.006]"}, 0.04, "0.5"));
+  const StepResult before = session.step(session.steps()[0]);
+  StepResult last = session.step(session.steps()[1]);
+  const CutReport partial = *last.cut;
+  const auto nodes = session.sprinkling().nodes.positions;
+  const VectorX coefficients = session.field().coefficients;
+  last = session.step(session.steps()[2]);
+  REQUIRE(last.cut->refused);
+  CHECK_THAT(last.cut->reason, Contains("smaller than the node spacing"));
+  CHECK(last.cut->surface_hash == partial.surface_hash);
+  CHECK(last.cut->area == partial.area);
+  CHECK(last.cut->pieces == 1);
+  CHECK(session.sprinkling().nodes.positions == nodes);
+  CHECK(session.field().coefficients == coefficients);
+  static_cast<void>(before);
+}
+
+TEST_CASE("A cut where the tool is pressing is refused with the way out, a node spacing away it is made") {
+  const std::string tool = R"([tool]
+shape = "sphere_tip"
+radius = 0.01
+[[tool.path]]
+time = 0
+position = [0, 0, 0.031]
+[[tool.path]]
+time = 1
+position = [0, 0, 0.028]
+)";
+  // Through the contact, one second after the tool has come to rest.
+  const auto at = [&](const std::string& x) {
+    return replaced(
+        replaced(blade({"[" + x + ", 0, 0.034]", "[" + x + ", 0, 0.02]"}, 0.04, "0.5"), "time = 1", "time = 3"),
+        "time = 0", "time = 2");
+  };
+  Session under = session_of(cut_block + replaced(tool, "radius = 0.01", "radius = 0.01\nstep = 0.25") + at("0.0005"));
+  const std::vector<StepResult> refused = run(under);
+  CHECK(refused.back().cut->refused);
+  CHECK_THAT(under.warnings().back(), Contains("where the tool is pressing") && Contains("lift the tool"));
+  CHECK(refused.back().cut->area == 0);
+  CHECK(refused.back().force.z() > 0);
+  Session beside = session_of(cut_block + replaced(tool, "radius = 0.01", "radius = 0.01\nstep = 0.25") + at("0.02"));
+  const std::vector<StepResult> cut = run(beside);
+  CHECK_FALSE(cut.back().cut->refused);
+  CHECK(cut.back().cut->area > 0);
+  CHECK(cut.back().force.z() == Approx(refused.back().force.z()).epsilon(0.05)); // a shallow cut two radii away
+}
+
+TEST_CASE("A blade starts from the tissue as it is deformed: the cut at rest is where the material was") {
+  // Stretched along x and free at its sides, the block has drawn in; a cut at a place in space meets material that was
+  // farther out at rest.
+  const std::string text = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.1, 0, 0]");
+  Session session = session_of(text + blade({"[0.02, 0, 0.036]", "[0.02, 0, 0.02]"}, 0.04, "0.5"));
+  run(session);
+  REQUIRE(session.incision() != nullptr);
+  const auto on = session.incision()->closest({0.022, 0, 0.027}, 0.01);
+  REQUIRE(on);
+  CHECK(on->point.x() > 0.0203);
+  CHECK(on->point.x() < 0.024);
+}
+
+TEST_CASE("Precuts that cannot be made are refused with file and line") {
+  CHECK_THROWS_WITH(session_of(cut_block + replaced(disc_precut, "0.016]", "0.3]")),
+                    Contains("case.toml:15") && Contains("precut[1]") && Contains("outside"));
+  const TemporaryFolder folder;
+  topology::SurfaceMesh fin; // three triangles on one edge
+  fin.vertices = {{0, 0, 0.01}, {0, 0, 0.02}, {0.01, 0, 0.015}, {-0.01, 0.001, 0.015}, {0, 0.01, 0.015}};
+  fin.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
+  topology::write_surface(folder.path() / "fin.obj", fin);
+  const auto scenario =
+      write_file(folder.path() / "case.toml", cut_block + "[[precut]]\nshape = \"file\"\nfile = \"fin.obj\"\n");
+  CHECK_THROWS_WITH(Session(read_scenario(scenario)), Contains("case.toml:15") && Contains("fin.obj"));
+}
+
+TEST_CASE("More increments than memory allows are refused before the run") {
+  CHECK_THROWS_WITH(
+      session_of(cut_block + replaced(blade({"[0, 0, 9000]", "[0, 0, -9000]"}, 0.04, "0.5"), "step = 0.5\n", "")),
+      Contains("case.toml:15") && Contains("triangles of cut") && Contains("500000"));
+}
+
+TEST_CASE("The same cuts give the same bits") {
+  const std::string text = stretched(cut_block) + slice;
+  Session a = session_of(text);
+  Session b = session_of(text);
+  const std::vector<StepResult> first = run(a);
+  const std::vector<StepResult> second = run(b);
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    CHECK(first[i].cut->surface_hash == second[i].cut->surface_hash);
+    CHECK(first[i].cut->opening == second[i].cut->opening);
+    CHECK(first[i].cut->opening_volume == second[i].cut->opening_volume);
+  }
+  CHECK(a.field().coefficients == b.field().coefficients);
+}
