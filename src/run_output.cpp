@@ -2,6 +2,7 @@
 
 #include "src/summary.hpp"
 #include "topology/errors.hpp"
+#include "topology/voxel_pieces.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -196,6 +197,16 @@ void RunOutput::keep_profile(const Session& session, const StepResult& step) {
   profile_.x_label = "distance from the contact [mm]";
   profile_.y_label = "height over the contact [mm]";
   profile_.series = {std::move(rest), std::move(deformed), std::move(tool)};
+}
+
+void RunOutput::check_pieces(const Session& session) {
+  if (session.incision() == nullptr)
+    return;
+  const topology::LevelSet organ(session.organ().domain->surface());
+  findings_.voxel_volumes = topology::count_pieces(organ, *session.incision()).volumes;
+  if (const auto pieces = static_cast<int>(findings_.voxel_volumes.size()); pieces != findings_.cut.pieces)
+    remarks_.push_back(fmt::format("the wound has {} pieces, voxels of {:.2g} m tell {}", findings_.cut.pieces,
+                                   organ.voxel_size(), pieces));
 }
 
 void RunOutput::draw_figures(const Session& session) {

@@ -21,6 +21,7 @@ struct RunFindings {
   CutReport cut;                                      // of the last step
   double largest_opening = 0;                         // m
   int increments = 0, refused_cuts = 0;
+  std::vector<double> voxel_volumes; // m3, of the pieces by flooding voxels, largest first; empty: not counted
 };
 
 class RunOutput {
@@ -31,6 +32,10 @@ class RunOutput {
 
   /// Adds the row, and the frame when one is due, of the step that the session has just done.
   void add(const Session& session, const StepResult& step);
+
+  /// Counts the pieces of the cut body once more, by flooding voxels of the organ's level set. A count that differs
+  /// from that of the wound is a remark.
+  void check_pieces(const Session& session);
 
   /// Draws the figures. What stops gnuplot is a remark in the summary, the numbers are safe by then.
   void draw_figures(const Session& session);

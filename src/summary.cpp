@@ -94,6 +94,7 @@ Json cut(const Session& session, const RunFindings& findings) {
           {"pieces", last.pieces},
           {"unheld_pieces", last.unheld},
           {"volumes_m3", last.volumes},
+          {"voxel_volumes_m3", findings.voxel_volumes},
           {"opening_m", last.opening},
           {"largest_opening_m", findings.largest_opening},
           {"opening_volume_m3", last.opening_volume},
