@@ -32,6 +32,12 @@ const std::vector<Experiment>& all_experiments() {
        run_cut_fuzz},
       {"reprojection", "a cut grown in 20 increments gives the field and the surface of the cut made at once",
        run_reprojection},
+      {"precut_straight", "opening and stress intensity of a straight crack in modes I, II and III",
+       run_precut_straight},
+      {"precut_penny", "a disc-shaped crack under pressure and under tilted tension", run_precut_penny},
+      {"precut_edge", "stress intensity of an edge-notched strip", run_precut_edge},
+      {"precut_beam", "compliance of a double cantilever", run_precut_beam},
+      {"sever", "a body cut in two: no coupling, rigid motions", run_sever},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
   };
   return experiments;

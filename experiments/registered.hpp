@@ -15,5 +15,10 @@ std::vector<Check> run_liver_palpation(const ExperimentContext& context);
 std::vector<Check> run_cut_fuzz(const ExperimentContext& context);
 std::vector<Check> run_closed_cut_compression(const ExperimentContext& context);
 std::vector<Check> run_reprojection(const ExperimentContext& context);
+std::vector<Check> run_precut_straight(const ExperimentContext& context);
+std::vector<Check> run_precut_penny(const ExperimentContext& context);
+std::vector<Check> run_precut_edge(const ExperimentContext& context);
+std::vector<Check> run_precut_beam(const ExperimentContext& context);
+std::vector<Check> run_sever(const ExperimentContext& context);
 
 } // namespace spherecut::experiments

@@ -62,7 +62,7 @@ class Galerkin final : public ElasticBody {
     if (problem_.prescribed_field)
       for (std::size_t k = 0; k < held_.size(); ++k)
         prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) = held_[k].of(problem_.prescribed_field);
-    return field_of(solve_ordered(loads_ + constraint_loads(prescribed)), 1, prescribed);
+    return field_of(solve_refined(loads_, prescribed), 1, prescribed);
   }
 
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
@@ -81,7 +81,7 @@ class Galerkin final : public ElasticBody {
 
   Field prescribed_response(const std::vector<Vector3>& values) const override {
     const VectorX prescribed = prescribed_values(problem_, values);
-    return field_of(solve_ordered(constraint_loads(prescribed)), 0, prescribed);
+    return field_of(solve_refined(VectorX::Zero(report_.unknowns), prescribed), 0, prescribed);
   }
 
   std::vector<Vector3> constraint_points() const override {
@@ -129,6 +129,32 @@ class Galerkin final : public ElasticBody {
     clear_dropped(right);
     return unordered(factorisation_->solve(ordered(right)));
   }
+  /// Forces of the prescribed means on the rows, N.
+  [[nodiscard]] VectorX holding_forces(const VectorX& coefficients, const VectorX& prescribed) const {
+    VectorX right = VectorX::Zero(report_.unknowns);
+    for (std::size_t k = 0; k < held_.size(); ++k)
+      add_force(held_[k], constraint_force(k, coefficients, prescribed), right);
+    return right;
+  }
+  [[nodiscard]] Vector3 constraint_force(std::size_t k, const VectorX& coefficients, const VectorX& prescribed) const {
+    const Prescribed& entry = problem_.prescribed[k];
+    const Vector3 gap = prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - held_[k].of(coefficients);
+    return constraint_stiffness(problem_, entry.node) * held_part(entry, gap);
+  }
+  /// Stiffness without the prescribed means times the coefficients, both in node order.
+  [[nodiscard]] VectorX elastic_forces(const VectorX& coefficients) const {
+    const Eigen::Map<const SparseMatrix> elastic(stiffness_.rows(), stiffness_.cols(), stiffness_.nonZeros(),
+                                                 stiffness_.outerIndexPtr(), stiffness_.innerIndexPtr(),
+                                                 elastic_.data());
+    return unordered(elastic.selfadjointView<Eigen::Lower>() * VectorX(ordered(coefficients)));
+  }
+  /// The large penalties round off the elastic entries they are added to. One correction, from a residual that keeps
+  /// the two apart, takes that back.
+  [[nodiscard]] VectorX solve_refined(const VectorX& loads, const VectorX& prescribed) const {
+    VectorX coefficients = solve_ordered(loads + constraint_loads(prescribed));
+    coefficients += solve_ordered(loads + holding_forces(coefficients, prescribed) - elastic_forces(coefficients));
+    return coefficients;
+  }
   template <typename Rows>
   void clear_dropped(Rows& rows) const {
     for (int i = 0; i < std::ssize(dropped_); ++i)
@@ -171,6 +197,7 @@ class Galerkin final : public ElasticBody {
   std::vector<int> constraints_start_, constraints_of_rank_; // prescribed entries whose mean holds the node
   std::vector<int> column_start_, column_rows_;              // lower block pattern in ranks, rows >= column, ascending
   SparseMatrix stiffness_;                                   // lower triangle (diagonal blocks full), in ranks
+  std::vector<double> elastic_; // entries of stiffness_ without the penalties of the prescribed means
   VectorX loads_;
   std::unique_ptr<Factorisation> factorisation_;
 };
@@ -342,18 +369,6 @@ void Galerkin::assemble() {
             target[b][p + a] += column.plane[3 * a + b][k];
       }
     }
-    for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot) {
-      const Prescribed& entry = problem_.prescribed[constraints_of_rank_[slot]];
-      const DisplacementMean& mean = held_[constraints_of_rank_[slot]];
-      std::size_t own = 0;
-      while (rank_[mean.nodes[own]] != j)
-        ++own;
-      const double factor = constraint_stiffness(problem_, entry.node) * mean.weights[own];
-      for (std::size_t k = 0; k < mean.nodes.size(); ++k)
-        for (int c = 0; c < 3; ++c)
-          if (entry.components[c] && rank_[mean.nodes[k]] >= j)
-            target[c][3 * place[rank_[mean.nodes[k]]] + c] += factor * mean.weights[k];
-    }
     for (int k = 0; k < rows; ++k)
       place[column_rows_[begin + k]] = -1;
   }
@@ -363,6 +378,25 @@ void Galerkin::assemble() {
     for (int b = 0; b < 3; ++b)
       for (int a = 0; a < 3; ++a) // the diagonal block heads its column
         values[3 * first + 3 * rows * b + a] += spring * anchor.direction[a] * anchor.direction[b];
+  }
+  elastic_.assign(values, values + 9 * blocks);
+  for (std::size_t p = 0; p < held_.size(); ++p) {
+    const Prescribed& entry = problem_.prescribed[p];
+    const DisplacementMean& mean = held_[p];
+    for (std::size_t own = 0; own < mean.nodes.size(); ++own) {
+      const int j = rank_[mean.nodes[own]], begin = column_start_[j], rows = column_start_[j + 1] - begin;
+      const auto first = column_rows_.begin() + begin;
+      const double factor = constraint_stiffness(problem_, entry.node) * mean.weights[own];
+      for (std::size_t k = 0; k < mean.nodes.size(); ++k) {
+        const int i = rank_[mean.nodes[k]];
+        if (i < j)
+          continue;
+        const auto row = std::lower_bound(first, first + rows, i) - first;
+        for (int c = 0; c < 3; ++c)
+          if (entry.components[c])
+            values[9L * begin + 3L * rows * c + 3 * row + c] += factor * mean.weights[k];
+      }
+    }
   }
 }
 
@@ -407,11 +441,8 @@ void Galerkin::assemble_loads() {
 std::vector<Vector3> Galerkin::constraint_forces(const Field& field) const {
   std::vector<Vector3> forces;
   forces.reserve(problem_.prescribed.size());
-  for (std::size_t k = 0; k < problem_.prescribed.size(); ++k) {
-    const Prescribed& entry = problem_.prescribed[k];
-    const Vector3 gap = field.prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - held_[k].of(field.coefficients);
-    forces.emplace_back(constraint_stiffness(problem_, entry.node) * held_part(entry, gap));
-  }
+  for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
+    forces.push_back(constraint_force(k, field.coefficients, field.prescribed));
   return forces;
 }
 
@@ -420,14 +451,11 @@ double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nod
   VectorX applied = field.load_factor * loads_;
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
     add_force(contact_mean(loaded_nodes[k]), nodal_forces[k], applied);
-  // The penalty terms stand on both sides; as forces they are of the size of the others.
-  const std::vector<Vector3> held = constraint_forces(field);
-  const VectorX product = stiffness_.selfadjointView<Eigen::Lower>() * VectorX(ordered(field.coefficients));
-  const VectorX rows = unordered(product) - constraint_loads(field.prescribed);
   clear_dropped(applied);
+  const VectorX rows = elastic_forces(field.coefficients) - holding_forces(field.coefficients, field.prescribed);
   const double unbalanced = (rows - applied).lpNorm<Eigen::Infinity>();
   double largest = applied.lpNorm<Eigen::Infinity>();
-  for (const Vector3& force : held)
+  for (const Vector3& force : constraint_forces(field))
     largest = std::max(largest, force.lpNorm<Eigen::Infinity>());
   return largest > 0 ? unbalanced / largest : 0;
 }

@@ -91,3 +91,23 @@ TEST_CASE("Quick liver palpation: the force settles and both methods agree on it
 TEST_CASE("Quick cut fuzz: every kind of blade on three organs") {
   require_quick_run_passes("cut_fuzz");
 }
+
+TEST_CASE("Quick straight crack: opening and intensities in three modes") {
+  require_quick_run_passes("precut_straight");
+}
+
+TEST_CASE("Quick penny crack: opening volume, displacement and intensities") {
+  require_quick_run_passes("precut_penny");
+}
+
+TEST_CASE("Quick edge-notched strip: intensity") {
+  require_quick_run_passes("precut_edge");
+}
+
+TEST_CASE("Quick double cantilever: compliance") {
+  require_quick_run_passes("precut_beam");
+}
+
+TEST_CASE("Quick severed cube: no coupling, rigid motions") {
+  require_quick_run_passes("sever");
+}

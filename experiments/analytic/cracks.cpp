@@ -1,0 +1,112 @@
+#include "experiments/analytic/cracks.hpp"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+namespace spherecut::experiments {
+
+constexpr double pi = std::numbers::pi;
+
+Vector3 CutFrame::local(const Vector3& x) const {
+  const Vector3 d = x - origin;
+  return {d.dot(ahead), d.dot(normal), d.dot(tangent)};
+}
+
+Vector3 CutFrame::global(const Vector3& v) const {
+  return v[0] * ahead + v[1] * normal + v[2] * tangent;
+}
+
+CutFrame tilted_frame(const Vector3& origin, const Vector3& tilt) {
+  const double angle = tilt.norm();
+  const Matrix3 turn = angle > 0 ? Eigen::AngleAxisd(angle, tilt / angle).toRotationMatrix() : Matrix3::Identity();
+  return {origin, turn.col(0), turn.col(2), turn.col(1)};
+}
+
+Vector3 straight_crack_displacement(const solvers::Material& material, const CutFrame& frame,
+                                    const solvers::Intensities& k, const Vector3& x) {
+  const Vector3 at = frame.local(x);
+  return frame.global(solvers::tip_field(material, k, at[0], at[1]).displacement);
+}
+
+// Harmonic potential phi of the half-space z >= 0 with s = z + i a, R = sqrt(r^2 + s^2), L = ln(s + R), c = -2 p / pi:
+//   2 mu u_r = (1 - 2 nu) phi_r + z phi_rz,  2 mu u_z = -2 (1 - nu) phi_z + z phi_zz.
+Vector3 penny_displacement(const solvers::Material& material, const CutFrame& frame, double radius, double pressure,
+                           const Vector3& x) {
+  using Complex = std::complex<double>;
+  const Vector3 d = x - frame.origin;
+  const double height = d.dot(frame.normal), side = height >= 0 ? 1 : -1;
+  const Vector3 in_plane = d - height * frame.normal;
+  const double z = std::max(std::abs(height), 1e-12 * radius), r = std::max(in_plane.norm(), 1e-9 * radius);
+  const double nu = material.poisson_ratio, mu = material.shear_modulus(), c = -2 * pressure / pi;
+  const Complex i(0, 1), s(z, radius);
+  Complex root = std::sqrt(r * r + s * s);
+  if (root.real() < 0)
+    root = -root;
+  const Complex log = std::log(s + root);
+  const double phi_z = c * std::imag(root - z * log), phi_zz = c * std::imag(i * radius / root - log);
+  const double phi_r = c / r * std::imag((s * root + r * r * log) / 2.0 - z * z / 2 - i * radius * root);
+  const double phi_rz = c * std::imag(root / r - i * radius * s / (r * root));
+  const double u_r = ((1 - 2 * nu) * phi_r + z * phi_rz) / (2 * mu);
+  const double u_z = (-2 * (1 - nu) * phi_z + z * phi_zz) / (2 * mu);
+  return u_r / r * in_plane + side * u_z * frame.normal;
+}
+
+// A unit force along k at x makes, at the distance R from it (R counted from the force),
+//   sigma_ij = -[3 R_i R_j R_k / R^3 + (1 - 2 nu)(delta_ik R_j + delta_jk R_i - delta_ij R_k)/R] / (8 pi (1 - nu) R^2);
+// by reciprocity u_k(x) is the work of these stresses on the jump of the faces.
+Vector3 loaded_penny_displacement(const solvers::Material& material, const CutFrame& frame, double radius,
+                                  const Matrix3& stress, const Vector3& x) {
+  constexpr int rings = 16, sectors = 24;
+  const double nu = material.poisson_ratio, mu = material.shear_modulus();
+  const Vector3 n = frame.normal, load = stress * n;
+  const Vector3 across = load.dot(n) * n, along = load - across;
+  // Jump of the faces at the centre over the radius.
+  const Vector3 jump = 4 * (1 - nu) / (pi * mu) * across + 8 * (1 - nu) / (pi * mu * (2 - nu)) * along;
+  Vector3 u = Vector3::Zero();
+  double volume = 0; // of the ellipsoid under a unit jump: the rule is scaled to have it right
+  for (int a = 0; a < rings; ++a)
+    for (int b = 0; b < sectors; ++b) {
+      // r = radius sin t: jump sqrt(radius^2 - r^2) r dr is smooth in t.
+      const double t = 0.5 * pi * (a + 0.5) / rings, w = 2 * pi * (b + 0.5) / sectors;
+      const double r = radius * std::sin(t), depth = radius * std::cos(t);
+      const double area = r * depth * (0.5 * pi / rings) * (2 * pi / sectors);
+      volume += area * depth;
+      const Vector3 to = frame.origin + r * (std::cos(w) * frame.ahead + std::sin(w) * frame.tangent) - x;
+      const double distance = to.norm();
+      const Vector3 e = to / distance, d = depth * jump;
+      u += area / (8 * pi * (1 - nu) * distance * distance) *
+           (3 * e.dot(d) * e.dot(n) * e + (1 - 2 * nu) * (d * e.dot(n) + n * e.dot(d) - e * d.dot(n)));
+    }
+  return -2 * pi / 3 * radius * radius * radius / volume * u;
+}
+
+double penny_opening(const solvers::Material& material, double radius, double pressure, double r) {
+  const double nu = material.poisson_ratio;
+  return 8 * (1 - nu * nu) * pressure * std::sqrt(std::max(0.0, radius * radius - r * r)) /
+         (pi * material.young_modulus);
+}
+
+double penny_opening_volume(const solvers::Material& material, double radius, double pressure) {
+  const double nu = material.poisson_ratio;
+  return 16 * (1 - nu * nu) * pressure * radius * radius * radius / (3 * material.young_modulus);
+}
+
+// The + face slides over the - face along the shear, which lies along frame.ahead for tension tilted towards it.
+solvers::Intensities tilted_penny_intensities(const solvers::Material& material, double radius, double tension,
+                                              double tilt, double w) {
+  const double nu = material.poisson_ratio, root = std::sqrt(radius / pi);
+  const double normal = tension * std::cos(tilt) * std::cos(tilt), shear = tension * std::sin(tilt) * std::cos(tilt);
+  return {2 * normal * root, 4 * shear * std::cos(w) * root / (2 - nu),
+          -4 * (1 - nu) * shear * std::sin(w) * root / (2 - nu)};
+}
+
+double edge_notched_strip_intensity(double tension, double crack, double width) {
+  const double x = crack / width, half = pi * x / 2;
+  const double shape =
+      std::sqrt(std::tan(half) / half) * (0.752 + 2.02 * x + 0.37 * std::pow(1 - std::sin(half), 3)) / std::cos(half);
+  return tension * std::sqrt(pi * crack) * shape;
+}
+
+} // namespace spherecut::experiments

@@ -1,0 +1,50 @@
+// Exact fields and intensities of cracks in linear elasticity.
+#pragma once
+
+#include "solvers/stress_intensity.hpp"
+
+namespace spherecut::experiments {
+
+/// Axes of a plane cut: the front runs along `tangent` = normal x ahead through `origin`, or around it.
+struct CutFrame {
+  Vector3 origin = Vector3::Zero();
+  Vector3 ahead = Vector3::UnitX(), normal = Vector3::UnitZ(), tangent = Vector3::UnitY();
+  /// (ahead, normal, tangent) components of x - origin.
+  [[nodiscard]] Vector3 local(const Vector3& x) const;
+  [[nodiscard]] Vector3 global(const Vector3& v) const;
+};
+
+/// Frame whose normal is (0, 0, 1) and whose way ahead is (1, 0, 0), tilted by the rotation vector `tilt` (rad) and
+/// moved.
+CutFrame tilted_frame(const Vector3& origin, const Vector3& tilt);
+
+/// Field of a half-plane crack behind the straight front of `frame` (mode I, II, III) [Williams 1957], m.
+Vector3 straight_crack_displacement(const solvers::Material& material, const CutFrame& frame,
+                                    const solvers::Intensities& k, const Vector3& x);
+
+/// Crack of radius a about frame.origin in the plane across frame.normal in an infinite body, faces under pressure p
+/// [Sneddon 1946], m. On the crack itself the face is that of the side x lies on.
+Vector3 penny_displacement(const solvers::Material& material, const CutFrame& frame, double radius, double pressure,
+                           const Vector3& x);
+/// Opening u+ - u- along the normal at distance r < a from the centre, 8 (1 - nu^2) p sqrt(a^2 - r^2) / (pi E), m.
+double penny_opening(const solvers::Material& material, double radius, double pressure, double r);
+/// Its volume, 16 (1 - nu^2) p a^3 / (3 E), m3.
+double penny_opening_volume(const solvers::Material& material, double radius, double pressure);
+
+/// Displacement around the same crack when its faces carry the traction -stress n (n out of the material), as remote
+/// stress does to the part of the field that the crack adds: opening and sliding of the faces are ellipsoids, and the
+/// field is theirs by the formula for dislocation loops [Volterra 1907]. Good from 0.2 a off the crack on, to 1e-4.
+Vector3 loaded_penny_displacement(const solvers::Material& material, const CutFrame& frame, double radius,
+                                  const Matrix3& stress, const Vector3& x);
+
+/// Intensities of the penny crack under remote tension s whose direction is tilted by `tilt` (rad) from the normal
+/// towards `frame.ahead`, at the front point in the direction w (rad) from frame.ahead; the tangent there is normal x
+/// outward. K_I = 2 s_n sqrt(a/pi), K_II and K_III of the shear s sin cos [Kassir and Sih 1966].
+solvers::Intensities tilted_penny_intensities(const solvers::Material& material, double radius, double tension,
+                                              double tilt, double w);
+
+/// K_I of a single-edge-notched strip of width W under remote tension s, crack length b (plane strain or stress), to
+/// 0.5 % [Tada, Paris and Irwin].
+double edge_notched_strip_intensity(double tension, double crack, double width);
+
+} // namespace spherecut::experiments

@@ -1,0 +1,66 @@
+// Problem:   a strip 1 m wide and 3 m long, 0.4 m thick between sliding sides (plane strain), cut in from one side over
+//            0.4 of its width, and pulled at its ends by the stress s. It stands askew between the axes.
+// Reference: K_I of the single-edge-notched strip, to 0.5 % [Tada, Paris and Irwin].
+// Command:   spherecut experiment run precut_edge --out DIR
+#include "experiments/registered.hpp"
+#include "experiments/support/precut_series.hpp"
+#include "experiments/support/statistics.hpp"
+#include "experiments/support/tilted_strip.hpp"
+
+#include "src/figure.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::experiments {
+
+std::vector<Check> run_precut_edge(const ExperimentContext& context) {
+  const int seeds = context.quick ? 1 : 10;
+  const std::vector<int> sizes = context.quick ? std::vector<int>{700} : std::vector<int>{700, 1400};
+  constexpr double width = 1, depth = 0.4, tension = 1;
+  // The strip lies along `ahead`: its length is the way of the cut, its height the direction of the pull.
+  const TiltedStrip strip = tilted_strip(width, 3, 0.4, 0.2);
+  const CutFrame& frame = strip.frame;
+  const double wanted = edge_notched_strip_intensity(tension, depth, width);
+  std::vector<Check> checks;
+  app::Table table({"nodes", "seed", "spacing", "k_correlation", "k_interaction", "k_exact"});
+  app::Series points{"galerkin, enriched", {}, {}, app::SeriesStyle::points};
+  for (int size : sizes) {
+    ErrorSeries errors;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0.07, 0.1)}, 4, 0.35,
+                      size,         static_cast<std::uint64_t>(seed)};
+      CutBody body = cut_body(cut);
+      body.problem.material = {1, 0.3, 0};
+      hold_sides(body.problem, strip);
+      body.problem.loads.traction = [frame](const Vector3&, const Vector3& n) -> Vector3 {
+        const double pull = n.dot(frame.normal);
+        return std::abs(pull) > 0.9 ? Vector3((pull > 0 ? tension : -tension) * frame.normal) : Vector3::Zero();
+      };
+      const auto discretisation = solvers::discretise(body.problem, {});
+      const solvers::Field field = discretisation->solve();
+      const auto front = body.problem.incision->front_frame(
+          frame.origin + (depth - 0.5 * width) * frame.ahead + 0.07 * frame.normal, 0.1);
+      const double by_jump = solvers::displacement_correlation(*discretisation, field, *front)[0];
+      const double by_integral = solvers::interaction_integral(*discretisation, field, *front)[0];
+      errors.add("k_correlation", std::abs(by_jump / wanted - 1));
+      errors.add("k_interaction", std::abs(by_integral / wanted - 1));
+      table.add({static_cast<double>(body.problem.nodes.size()), static_cast<double>(seed), body.fine, by_jump,
+                 by_integral, wanted});
+      points.x.push_back(body.problem.nodes.size());
+      points.y.push_back(by_integral / wanted);
+    }
+    context.say(fmt::format("galerkin, enriched, {} nodes, medians (worst): {}", size, errors.text()));
+    if (size == sizes.back()) {
+      errors.check("precut_edge_galerkin", "k_correlation", 0.04, checks);
+      errors.check("precut_edge_galerkin", "k_interaction", 0.04, checks);
+    }
+  }
+  table.write(context.out / "runs.csv");
+  app::write_png({"Edge-notched strip: intensity over Tada's", "nodes", "K_I / exact", false, false, {points}},
+                 context.out / "intensity.png");
+  return checks;
+}
+
+} // namespace spherecut::experiments

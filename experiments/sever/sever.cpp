@@ -1,0 +1,150 @@
+// Problem:   a cube cut through by a tilted sheet. First its lower part is held still and its upper part moved as a
+// rigid
+//            body by the surface furthest from the cut; then nothing holds the upper part.
+// Reference: no coupling; one part follows the rigid motion, the other stays; six free motions of the part not held.
+// Command:   spherecut experiment run sever --out DIR
+#include "experiments/analytic/cracks.hpp"
+#include "experiments/registered.hpp"
+#include "experiments/support/cut_body.hpp"
+
+#include "solvers/galerkin.hpp"
+#include "src/figure.hpp"
+#include "topology/cut_sheets.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::experiments {
+
+namespace {
+
+const CutFrame cut_plane = tilted_frame({0.03, -0.02, 0.06}, {0.21, -0.16, 0.1});
+
+bool is_above(const Vector3& x) {
+  return cut_plane.local(x)[1] > 0;
+}
+
+Vector3 rigid_motion(const Vector3& x) {
+  return Vector3(0.1, -0.2, 0.3) + Vector3(0.4, 0.1, -0.5).cross(x);
+}
+
+double largest_coupling(const solvers::Discretisation& body) {
+  const solvers::OrderedStiffness stiffness = solvers::stiffness_of(body);
+  const std::vector<Vector3>& positions = body.problem().nodes.positions;
+  double coupling = 0;
+  for (int column = 0; column < stiffness.lower.outerSize(); ++column)
+    for (solvers::SparseMatrix::InnerIterator entry(stiffness.lower, column); entry; ++entry)
+      if (is_above(positions[stiffness.order[entry.row() / 3]]) != is_above(positions[stiffness.order[column / 3]]))
+        coupling = std::max(coupling, std::abs(entry.value()));
+  return coupling;
+}
+
+/// Eigenvalues of the free stiffness of a piece below 1e-11 of the largest; the springs that hold it are taken off.
+int free_motions(const solvers::Discretisation& body, const solvers::Piece& piece) {
+  const solvers::OrderedStiffness stiffness = solvers::stiffness_of(body);
+  const solvers::Problem& problem = body.problem();
+  std::vector<int> place(problem.nodes.size(), -1);
+  for (std::size_t k = 0; k < piece.nodes.size(); ++k)
+    place[piece.nodes[k]] = static_cast<int>(k);
+  MatrixX matrix = MatrixX::Zero(3 * std::ssize(piece.nodes), 3 * std::ssize(piece.nodes));
+  for (int column = 0; column < stiffness.lower.outerSize(); ++column)
+    for (solvers::SparseMatrix::InnerIterator entry(stiffness.lower, column); entry; ++entry) {
+      const int i = place[stiffness.order[entry.row() / 3]], j = place[stiffness.order[column / 3]];
+      if (i >= 0 && j >= 0) {
+        matrix(3 * i + entry.row() % 3, 3 * j + column % 3) = entry.value();
+        matrix(3 * j + column % 3, 3 * i + entry.row() % 3) = entry.value();
+      }
+    }
+  for (const solvers::Anchor& anchor : stiffness.anchors)
+    matrix.block<3, 3>(3 * place[anchor.node], 3 * place[anchor.node]) -=
+        problem.material.young_modulus * problem.nodes.spacings[anchor.node] * anchor.direction *
+        anchor.direction.transpose();
+  const VectorX values = Eigen::SelfAdjointEigenSolver<MatrixX>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
+  int count = 0;
+  for (double value : values)
+    count += std::abs(value) < 1e-11 * values[values.size() - 1] ? 1 : 0;
+  return count;
+}
+
+struct Severed {
+  int nodes = 0, pieces = 0, free_motions = 0;
+  double coupling = 0, rigid_error = 0, still_error = 0;
+};
+
+Severed sever_cube(std::uint64_t seed) {
+  CutBodyCase cut;
+  cut.domain = topology::make_box_domain({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, 0.2);
+  cut.sheets = {topology::make_rectangle_sheet(cut_plane.origin, cut_plane.normal, cut_plane.ahead, 2, 2, 0.25)};
+  cut.coarse = 1;
+  cut.nodes = 350;
+  cut.seed = seed;
+  CutBody body = cut_body(cut);
+  body.problem.material = {1, 0.3, 0};
+  solvers::Problem moved = body.problem, loose = body.problem;
+  hold_surface(
+      moved, [](const Vector3& x, const Vector3& n) { return std::abs(n.z()) > 0.5 && std::abs(x.z()) > 0.49; },
+      [](const Vector3& x) { return is_above(x) ? rigid_motion(x) : Vector3(Vector3::Zero()); });
+  hold_surface(
+      loose, [](const Vector3& x, const Vector3& n) { return x.z() < 0 && n.z() < -0.5; },
+      [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
+
+  Severed severed;
+  severed.nodes = moved.nodes.size();
+  const auto discretisation = solvers::discretise(moved, {});
+  const VectorX u = discretisation->nodal_displacements(discretisation->solve());
+  for (int i = 0; i < moved.nodes.size(); ++i) {
+    const Vector3& x = moved.nodes.positions[i];
+    if (is_above(x))
+      severed.rigid_error = std::max(severed.rigid_error, (u.segment<3>(3 * i) - rigid_motion(x)).norm());
+    else
+      severed.still_error = std::max(severed.still_error, u.segment<3>(3 * i).norm());
+  }
+  solvers::DiscretisationOptions hold;
+  hold.unheld = solvers::UnheldPieces::hold;
+  const auto held = solvers::discretise(loose, hold);
+  severed.pieces = static_cast<int>(held->report().pieces.size());
+  for (const solvers::Piece& piece : held->report().pieces)
+    if (!piece.held)
+      severed.free_motions += free_motions(*held, piece);
+  severed.coupling = std::max(largest_coupling(*discretisation), largest_coupling(*held));
+  return severed;
+}
+
+} // namespace
+
+std::vector<Check> run_sever(const ExperimentContext& context) {
+  const int seeds = context.quick ? 2 : 10;
+  app::Table table({"seed", "nodes", "pieces", "largest_coupling", "rigid_error", "still_error", "free_motions"});
+  app::Series rigid{"moved half, off the rigid motion", {}, {}, app::SeriesStyle::points};
+  Severed worst;
+  int fewest = 1000, most = 0, wrong_pieces = 0;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const Severed severed = sever_cube(static_cast<std::uint64_t>(seed));
+    wrong_pieces += severed.pieces == 2 ? 0 : 1;
+    worst.coupling = std::max(worst.coupling, severed.coupling);
+    worst.rigid_error = std::max(worst.rigid_error, severed.rigid_error);
+    worst.still_error = std::max(worst.still_error, severed.still_error);
+    fewest = std::min(fewest, severed.free_motions);
+    most = std::max(most, severed.free_motions);
+    rigid.x.push_back(seed);
+    rigid.y.push_back(severed.rigid_error);
+    table.add({static_cast<double>(seed), static_cast<double>(severed.nodes), static_cast<double>(severed.pieces),
+               severed.coupling, severed.rigid_error, severed.still_error, static_cast<double>(severed.free_motions)});
+  }
+  context.say(fmt::format("galerkin: coupling {}, rigid {:.1e}, still {:.1e}, free motions {} to {}", worst.coupling,
+                          worst.rigid_error, worst.still_error, fewest, most));
+  table.write(context.out / "runs.csv");
+  app::write_png({"Severed cube: distance from the rigid motion", "seed", "largest error / m", false, true, {rigid}},
+                 context.out / "rigid.png");
+  return {{"sever_galerkin_coupling", worst.coupling, "<=", 0},
+          {"sever_galerkin_rigid_error", worst.rigid_error, "<=", 1e-12},
+          {"sever_galerkin_still_error", worst.still_error, "<=", 0},
+          {"sever_galerkin_fewest_free_motions", static_cast<double>(fewest), ">=", 6},
+          {"sever_galerkin_most_free_motions", static_cast<double>(most), "<=", 6},
+          {"sever_galerkin_wrong_piece_counts", static_cast<double>(wrong_pieces), "<=", 0}};
+}
+
+} // namespace spherecut::experiments
