@@ -169,7 +169,7 @@ app::Figure intensities_figure(const TiltedRun& run) {
 
 std::vector<Check> run_precut_penny(const ExperimentContext& context) {
   const int seeds = context.quick ? 1 : 10;
-  const std::vector<int> sizes = context.quick ? std::vector<int>{1400} : std::vector<int>{800, 1400, 2400};
+  const std::vector<int> sizes = context.quick ? std::vector<int>{2000} : std::vector<int>{800, 1400, 2400};
   const std::vector<double> ratios = context.quick ? std::vector<double>{0.3} : std::vector<double>{0.3, 0.49};
   std::vector<Check> checks;
   app::Table table({"load", "sight", "poisson_ratio", "seed", "nodes", "spacing", "volume_error", "displacement_error",
