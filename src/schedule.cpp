@@ -105,6 +105,7 @@ double blade_travel(const BladeSettings& blade) {
 std::vector<StepSample> schedule(const Scenario& scenario, const std::vector<ToolSample>& tool, double blade_stride,
                                  double column, int most_triangles) {
   std::vector<double> times;
+  times.reserve(tool.size());
   for (const ToolSample& sample : tool)
     times.push_back(sample.time);
   if (scenario.blade) {

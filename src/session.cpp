@@ -290,7 +290,7 @@ Vector3 Session::rest_position(const Vector3& x) const {
     } catch (const NumericalError&) {
       if (tolerance == rest_tolerance)
         continue;
-      const Vector3 guess = x - displacement(x);
+      Vector3 guess = x - displacement(x);
       if (model_.incision != nullptr)
         if (const auto on = model_.incision->closest(guess, gap_reach * zone_.spacing.fine))
           return on->point;

@@ -93,6 +93,7 @@ void write_vtp(const std::filesystem::path& file, const PolyData& data) {
   xml += "<Points>\n" + array_line("Float64", "Points", 3, appended.add(flat(data.points))) + "</Points>\n";
   if (cloud) {
     std::vector<std::array<int, 1>> singles;
+    singles.reserve(data.points.size());
     for (int i = 0; i < std::ssize(data.points); ++i)
       singles.push_back({i});
     xml += cells("Verts", singles, appended);
