@@ -25,45 +25,68 @@ struct Gap {
   Vector3 normal; // outward from the tool
 };
 
-/// Steepest flank of a ball that presses, from its axis. Beyond it the surface runs on as the tangent cone. On a liver
-/// at 1.6 radii depth, 65 degrees already lost single nodes and convergence; 55 did not, in both methods at three
-/// spacings.
+/// Steepest flank of a ball that presses, from the direction into the body. Beyond it the surface runs on as the
+/// tangent cone. On a liver at 1.6 radii depth, 65 degrees already lost single nodes and convergence; 55 did not, in
+/// both methods at three spacings.
 constexpr double flank = 55 * std::numbers::pi / 180;
 
-/// Gap to the front of a ball whose lowest point is the tool's reference point, continued by its tangent cone.
-Gap ball_gap(const topology::ToolPose& pose, const Vector3& x, double radius) {
-  const Vector3 arm = x - pose.point - radius * pose.axis; // from the centre
-  const double along = arm.dot(pose.axis);
-  const Vector3 across = arm - along * pose.axis;
+/// Gap to the front of a ball about `centre`, continued by its tangent cone; `front` is the unit direction into the
+/// body.
+Gap ball_gap(const Vector3& centre, double radius, const Vector3& front, const Vector3& x) {
+  const Vector3 arm = x - centre;
+  const double along = arm.dot(front);
+  const Vector3 across = arm - along * front;
   const double distance = across.norm();
-  if (std::atan2(distance, -along) <= flank)
+  if (std::atan2(distance, along) <= flank)
     return {arm.norm() - radius, arm.normalized()};
-  const Vector3 sideways = distance > 0 ? Vector3(across / distance) : pose.axis.unitOrthogonal();
-  const Vector3 normal = std::sin(flank) * sideways - std::cos(flank) * pose.axis;
+  const Vector3 sideways = distance > 0 ? Vector3(across / distance) : front.unitOrthogonal();
+  const Vector3 normal = std::sin(flank) * sideways + std::cos(flank) * front;
   return {normal.dot(arm) - radius, normal};
 }
 
+/// A tool at a pose, and the direction in which its ball presses into the body.
+struct PressingTool {
+  const topology::ToolShape& shape;
+  topology::ToolPose pose;
+  Vector3 front;
+};
+
 /// Gap between a point and the part of the tool that can press on it. Linear elasticity cannot fold tissue over the
 /// flank of a tool: nodes driven past it would slip off one by one. So nothing is pushed sideways more than `flank`
-/// from the axis: under a flat punch the end face counts, whatever the depth, and a ball runs on as its tangent cone.
+/// from the front: under a flat punch the end face counts, whatever the depth, and a ball runs on as its tangent cone.
 /// This changes nothing for presses shallower than about half the radius. An instrument's shaft counts as it is.
-Gap contact_gap(const topology::ToolShape& tool, const topology::ToolPose& pose, const Vector3& x) {
+Gap contact_gap(const PressingTool& tool, const Vector3& x) {
+  const topology::ToolPose& pose = tool.pose;
   const double along = (x - pose.point).dot(pose.axis);
-  if (const auto* punch = std::get_if<topology::FlatPunch>(&tool)) {
+  if (const auto* punch = std::get_if<topology::FlatPunch>(&tool.shape)) {
     if ((x - pose.point - along * pose.axis).squaredNorm() < punch->radius * punch->radius &&
         along < 0.5 * punch->length)
       return {-along, -pose.axis};
-  } else if (const auto* ball = std::get_if<topology::SphereTip>(&tool)) {
-    return ball_gap(pose, x, ball->radius);
-  } else if (const auto* instrument = std::get_if<topology::Laparoscope>(&tool)) {
-    if (along < 3 * instrument->tip_radius)
-      return ball_gap(pose, x, instrument->tip_radius);
+  } else if (const auto* ball = std::get_if<topology::SphereTip>(&tool.shape)) {
+    return ball_gap(pose.point + ball->radius * pose.axis, ball->radius, tool.front, x);
   }
-  return {topology::tool_distance(tool, pose, x), topology::tool_normal(tool, pose, x)};
+  const Gap nearest{topology::tool_distance(tool.shape, pose, x), topology::tool_normal(tool.shape, pose, x)};
+  if (const auto* instrument = std::get_if<topology::Laparoscope>(&tool.shape);
+      instrument != nullptr && along < 3 * instrument->tip_radius) {
+    const Gap tip = ball_gap(pose.point + instrument->tip_radius * pose.axis, instrument->tip_radius, tool.front, x);
+    return tip.distance <= nearest.distance ? tip : nearest;
+  }
+  return nearest;
 }
 
 int size_of(const ContactPatch& patch) {
   return static_cast<int>(patch.nodes.size());
+}
+
+/// The tool with its front: against the surface about the tip, so that an oblique instrument presses as a ball does.
+PressingTool pressing(const ContactPatch& patch, const topology::ToolShape& shape, const topology::ToolPose& pose) {
+  const double reach = 2 * topology::tip_radius(shape);
+  const Vector3 centre = pose.point + topology::tip_radius(shape) * pose.axis;
+  Vector3 outward = Vector3::Zero();
+  for (int c = 0; c < size_of(patch); ++c)
+    outward += std::max(0.0, 1 - (patch.rest[c] - centre).squaredNorm() / (reach * reach)) * patch.normals[c];
+  const double length = outward.norm();
+  return {shape, pose, length > 0 ? Vector3(-outward / length) : Vector3(-pose.axis)};
 }
 
 VectorX displacement_of(const ContactPatch& patch, const std::vector<Vector3>& forces) {
@@ -128,8 +151,8 @@ void hold(const ContactPatch& patch, const std::vector<int>& held, const std::ve
   state.displacement = displacement_of(patch, state.nodal_forces);
 }
 
-void press_frictionless(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
-                        const ContactOptions& options, ContactState& state) {
+void press_frictionless(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
+                        ContactState& state) {
   const int count = size_of(patch);
   MatrixX condensed(count, count);
   VectorX gaps(count);
@@ -141,7 +164,7 @@ void press_frictionless(const ContactPatch& patch, const topology::ToolShape& to
     ++state.iterations;
     for (int c = 0; c < count; ++c) {
       const Vector3 u = state.displacement.segment<3>(3 * c);
-      const Gap gap = contact_gap(tool, pose, patch.rest[c] + u);
+      const Gap gap = contact_gap(tool, patch.rest[c] + u);
       normals[c] = gap.normal;
       gaps[c] = gap.distance + gap.normal.dot(patch.base_displacement.segment<3>(3 * c) - u);
     }
@@ -172,14 +195,14 @@ void press_frictionless(const ContactPatch& patch, const topology::ToolShape& to
   }
 }
 
-void press_bonded(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
-                  const ContactOptions& options, ContactState& state) {
+void press_bonded(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
+                  ContactState& state) {
   // A node caught by the tool keeps its place on it; a free node that the tool has overtaken is caught where it is.
   const int count = size_of(patch);
   std::vector<char> caught = state.active;
   for (int c = 0; c < count; ++c)
     if (caught[c])
-      state.bond[c] += pose.point - state.pose.point;
+      state.bond[c] += tool.pose.point - state.pose.point;
   for (int round = 0; round <= count; ++round) {
     ++state.iterations;
     std::vector<int> held;
@@ -195,7 +218,7 @@ void press_bonded(const ContactPatch& patch, const topology::ToolShape& tool, co
       if (caught[c])
         continue;
       const Vector3 u = state.displacement.segment<3>(3 * c);
-      const Gap gap = contact_gap(tool, pose, patch.rest[c] + u);
+      const Gap gap = contact_gap(tool, patch.rest[c] + u);
       if (gap.distance < -options.gap_tolerance) {
         caught[c] = 1;
         state.bond[c] = u - gap.distance * gap.normal;
@@ -272,16 +295,17 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
       at.axis = (from.axis + t * (pose.axis - from.axis)).normalized();
     }
     if (options.condition == ContactCondition::frictionless)
-      press_frictionless(patch, tool, at, options, state);
+      press_frictionless(patch, pressing(patch, tool, at), options, state);
     else
-      press_bonded(patch, tool, at, options, state);
+      press_bonded(patch, pressing(patch, tool, at), options, state);
     state.pose = at;
   }
   state.largest_penetration = 0;
+  const PressingTool pressed = pressing(patch, tool, pose);
   for (int c = 0; c < size_of(patch); ++c)
     state.largest_penetration =
         std::max(state.largest_penetration,
-                 -contact_gap(tool, pose, patch.rest[c] + state.displacement.segment<3>(3 * c)).distance);
+                 -contact_gap(pressed, patch.rest[c] + state.displacement.segment<3>(3 * c)).distance);
   summarise(patch, state);
   return state;
 }

@@ -196,6 +196,25 @@ TEST_CASE("A press as deep as the tip's radius converges") {
     }
 }
 
+TEST_CASE("A ball presses the same whichever way its shaft leans") {
+  // Deep enough that its tangent cone matters; the shaft itself stays clear of the block.
+  const Vector3 centre(0.001, 0.002, 0.0035);
+  for (Method method : both) {
+    const Block& on = block(method);
+    const auto force = [&](const ToolShape& tool, const Vector3& axis) {
+      const ContactState state = press(on.patch, tool, {centre - topology::tip_radius(tool) * axis, axis});
+      REQUIRE(state.converged);
+      return state.tool_force;
+    };
+    const Vector3 upright = force(SphereTip{0.01}, Vector3::UnitZ());
+    const Vector3 leaning = Vector3(1, 0.3, 1).normalized();
+    INFO(solvers::to_string(method) << ": " << upright.transpose() << " N upright");
+    CHECK((force(SphereTip{0.01}, leaning) - upright).norm() < 1e-6 * upright.norm());
+    const ToolShape scope = topology::Laparoscope{0.01, 0.003, 0.3, centre + 0.25 * leaning};
+    CHECK((force(scope, leaning) - upright).norm() < 1e-6 * upright.norm());
+  }
+}
+
 TEST_CASE("Prescribed displacements of the patch are met and give the condensed stiffness") {
   for (Method method : both) {
     const ContactPatch& patch = block(method).patch;
