@@ -68,7 +68,8 @@ class TriangleRows {
       share_[e] = (along / along.squaredNorm()).cast<float>();
       radius = std::max(radius, corners[e].norm());
     }
-    radius_ = static_cast<float>(radius * (1 + 1e-4));
+    rounding_ = static_cast<float>(1e-5 * (2 * leaf_side * voxel + radius));
+    radius_ = static_cast<float>(radius) + rounding_;
     steps_ = (axes_ * voxel).cast<float>();
     const Row k = Row::LinSpaced(0, leaf_side - 1);
     for (int d = 0; d < 3; ++d)
@@ -81,14 +82,16 @@ class TriangleRows {
   bool lower(int i, int j, const Row& squared_limits, Row& squared) const {
     const Eigen::Vector3f start =
         origin_ + static_cast<float>(i) * steps_.col(0) + static_cast<float>(j) * steps_.col(1);
-    const Row height = start[2] + along_z_[2], squared_height = height * height;
-    // The plane, then a disc that covers the triangle: never farther, and cheap.
-    constexpr float rounding = 1 - 1e-4F;
-    if ((squared_height * rounding - squared_limits).minCoeff() >= 0)
+    const Row height = start[2] + along_z_[2];
+    // The plane, then a disc that covers the triangle, less rounding: never farther than what is computed below, so
+    // that the order of the triangles does not matter, and cheap.
+    const Row off_plane = (height.abs() - rounding_).max(0.0F), squared_off_plane = off_plane * off_plane;
+    if ((squared_off_plane - squared_limits).minCoeff() >= 0)
       return false;
     const Row u = start[0] + along_z_[0], v = start[1] + along_z_[1];
     const Row beyond = ((u * u + v * v).sqrt() - radius_).max(0.0F);
-    if (((squared_height + beyond * beyond) * rounding - squared_limits).minCoeff() >= 0)
+    constexpr float relative = 1 - 1e-5F;
+    if (((squared_off_plane + beyond * beyond) * relative - squared_limits).minCoeff() >= 0)
       return false;
     Row to_border = Row::Constant(std::numeric_limits<float>::max());
     Row outside = -to_border; // positive beyond some edge
@@ -100,7 +103,7 @@ class TriangleRows {
       outside = outside.max(from_u * along_[e][1] - from_v * along_[e][0]);
     }
     for (int k = 0; k < leaf_side; ++k)
-      squared[k] = outside[k] > 0 ? squared_height[k] + to_border[k] : squared_height[k];
+      squared[k] = height[k] * height[k] + (outside[k] > 0 ? to_border[k] : 0.0F);
     return true;
   }
 
@@ -108,8 +111,8 @@ class TriangleRows {
   Vector3 middle_;
   Matrix3 axes_; // rows: u, v, normal
   std::array<Eigen::Vector2f, 3> corner_, along_, share_;
-  float radius_ = 0;
-  Eigen::Matrix3f steps_; // of u, v, h per voxel along x, y, z
+  float radius_ = 0, rounding_ = 0; // m
+  Eigen::Matrix3f steps_;           // of u, v, h per voxel along x, y, z
   std::array<Row, 3> along_z_;
   Eigen::Vector3f origin_ = Eigen::Vector3f::Zero();
 };

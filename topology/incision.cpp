@@ -72,9 +72,12 @@ BoundingBox box_of(const std::array<Vector3, 3>& p, double margin) {
   return {p[0].cwiseMin(p[1]).cwiseMin(p[2]).array() - margin, p[0].cwiseMax(p[1]).cwiseMax(p[2]).array() + margin};
 }
 
-/// Lexicographic order.
-bool before(const Vector3& a, const Vector3& b) {
-  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+/// An order of segments that does not depend on their numbers.
+bool before(const FrontSegment& a, const FrontSegment& b) {
+  const auto key = [](const FrontSegment& s) {
+    return std::array{s.from.x(), s.from.y(), s.from.z(), s.to.x(), s.to.y(), s.to.z()};
+  };
+  return key(a) < key(b);
 }
 
 Eigen::Vector3f single(const Vector3& x) {
@@ -280,7 +283,7 @@ std::optional<FrontFrame> Incision::front_frame(const Vector3& x, double reach) 
         const Vector3 point = from + s * (to - from);
         const double candidate = (x - point).squaredNorm();
         if (candidate > best ||
-            (candidate == best && !(frame.segment >= 0 && before(from, data.front[frame.segment].from))))
+            (candidate == best && !(frame.segment >= 0 && before(data.front[segment], data.front[frame.segment]))))
           return best;
         frame.segment = segment;
         frame.point = point;

@@ -72,7 +72,7 @@ class Incision {
   [[nodiscard]] std::optional<SheetPoint> closest(const Vector3& x, double reach) const;
 
   /// Frame of the nearest point of the front within `reach` m; nullopt when there is none. Depends on the segments
-  /// within reach alone, not on their order: of two as near, that of the lexicographically smaller `from` counts.
+  /// within reach alone, not on their order: of two as near, the one with the lexicographically smaller ends counts.
   [[nodiscard]] std::optional<FrontFrame> front_frame(const Vector3& x, double reach) const;
 
   /// Frame at the point from + share (to - from) of a segment of the front, share in [0, 1]; its distance is 0.

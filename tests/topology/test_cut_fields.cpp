@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <random>
 
 using namespace spherecut;
 using namespace spherecut::topology;
@@ -100,6 +101,34 @@ TEST_CASE("Fields updated increment by increment are those built from scratch, b
       std::vector{make_disc_sheet(Vector3(0.05, 0.05, 0.02), Vector3(1, 1, 0), 0.01, 0.002)}, block());
   fields.update(other);
   CHECK(differing(fields.voxels(), from_scratch(other, 0.001)) == 0);
+}
+
+TEST_CASE("Sheets that start, turn and cross anywhere leave the same fields however they came", "[cut_fields]") {
+  std::mt19937_64 random(5);
+  const auto uniform = [&](double from, double to) { return std::uniform_real_distribution<double>(from, to)(random); };
+  SweepOptions options;
+  options.edge = 0.005;
+  int sheets = 0;
+  for (int trial = 0; trial < 25; ++trial) {
+    BladeSweep sweep({{Vector3(0, 0, 0.02), Vector3(0, 0.004, 0), Vector3(0.01, 0, -0.02)}, 1e-4}, block(), options);
+    CutFields fields(0.002);
+    BladePose pose;
+    for (int k = 0; k < 14; ++k) {
+      pose.time = k;
+      // Every third blade moves by whole voxels along the axes, where distances and ties are exact.
+      const auto step = [&] { return trial % 3 == 0 ? 0.002 * std::round(uniform(-6, 6)) : uniform(-0.015, 0.015); };
+      pose.position =
+          k % 5 == 0 ? Vector3(0.05, 0.05, 0.024) : Vector3(pose.position + Vector3(step(), step(), step()));
+      if (trial % 3 != 0 && k % 4 == 3)
+        pose.orientation =
+            Eigen::AngleAxisd(uniform(-1, 1), Vector3(step(), step(), 0.01).normalized()) * pose.orientation;
+      if (sweep.move_to(pose).triangles > 0)
+        fields.update(sweep.incision());
+    }
+    sheets += static_cast<int>(sweep.sheets().size());
+    REQUIRE(differing(fields.voxels(), from_scratch(sweep.incision(), 0.002)) == 0);
+  }
+  CHECK(sheets > 100);
 }
 
 TEST_CASE("Cut fields refuse voxels that make no sense", "[cut_fields]") {
