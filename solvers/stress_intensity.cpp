@@ -201,7 +201,6 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
     const double t = s / half_length;
     return std::pair((1 - t * t) * (1 - t * t), -4 * t * (1 - t * t) / half_length);
   };
-  const double total = half_length * 16 / 15;
   for (const double s : {-half_length, half_length})
     for (int c = 0; c < 8; ++c)
       if (tube.at(outer * std::cos(c * pi / 4), outer * std::sin(c * pi / 4), s).leaves(*problem.domain))
@@ -214,6 +213,7 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
 
   const GaussRule gauss;
   const int cells_along = std::max(1, options.along / 2), cells_radial = std::max(1, options.radial / 2);
+  const int cells_around = std::max(1, options.around / 2);
   // r = outer t^2: the singular products of the two fields are smooth in t.
   const auto each_section = [&](const auto& visit) { // (s, weight ds, r, weight dr)
     for (int a = 0; a < cells_along; ++a)
@@ -228,14 +228,14 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
   each_section([&](double s, double ds, double r, double dr) {
     const auto [q_r, dq_r] = fade(r);
     const auto [q_s, dq_s] = bump(s);
-    for (int c = 0; c < options.around; ++c) {
-      const double theta = pi * ((2.0 * c + 1) / options.around - 1);
+    for (int c = 0; c < 2 * cells_around; ++c) {
+      const double theta = pi * ((2 * (c / 2) + 1 + gauss.place[c % 2]) / cells_around - 1);
       const double ahead = r * std::cos(theta), above = r * std::sin(theta);
       const Tube::Place place = tube.at(ahead, above, s);
       const PointState state = body.at(place.position, field);
       const Matrix3 stress = place.axes.transpose() * state.stress * place.axes;
       const Matrix3 gradient = place.axes.transpose() * state.gradient * place.axes;
-      const double weight = r * (2 * pi / options.around) * ds * dr * place.stretch;
+      const double weight = r * (pi / cells_around) * ds * dr * place.stretch;
       // Gradient of xi = q e in the axes of the place; e turns along the front.
       Matrix3 shift = Matrix3::Zero();
       shift.row(0) = Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta), q_r * dq_s / place.stretch);
@@ -275,6 +275,10 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
       }
     }
   });
+  double total = 0; // of the bump, by the same rule
+  for (int a = 0; a < cells_along; ++a)
+    for (const double ga : gauss.place)
+      total += half_length / cells_along * bump(half_length * ((2 * a + 1 + ga) / cells_along - 1)).first;
   integral /= total;
   const double plane = plane_strain_modulus(material);
   return {0.5 * plane * integral[0], 0.5 * plane * integral[1], material.shear_modulus() * integral[2]};

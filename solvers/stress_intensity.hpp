@@ -37,7 +37,7 @@ Intensities displacement_correlation(const Discretisation& body, const Field& fi
 struct InteractionOptions {
   double inner = 0.5, outer = 3; // radii between which the virtual shift fades, in units of the spacing at the front
   double half_length = 1;        // of the tube along the front, in the same units
-  int radial = 12, around = 24, along = 6; // points
+  int radial = 16, around = 24, along = 6; // points
 };
 /// Throws InputError when the tube leaves the body.
 Intensities interaction_integral(const Discretisation& body, const Field& field, const topology::FrontFrame& front,
