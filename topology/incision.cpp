@@ -113,8 +113,7 @@ struct Incision::Data {
         boxes.push_back(box_of(corners_of(s, t), abutting * size));
       }
     tree = BoxTree(boxes);
-    pieces = find_front(sheets, in_sheets, tree, *domain);
-    std::vector<std::vector<std::array<int, 3>>> neighbours;
+    std::vector<Neighbours> neighbours;
     std::vector<std::vector<bool>> at_border;
     for (const SurfaceMesh& sheet : sheets) {
       neighbours.push_back(triangle_neighbours(sheet));
@@ -124,6 +123,11 @@ struct Incision::Data {
           if (neighbours.back()[t][e] < 0)
             border[sheet.triangles[t][e]] = border[sheet.triangles[t][(e + 1) % 3]] = true;
     }
+    pieces = find_front(sheets, neighbours, in_sheets, tree, *domain);
+    triangles.reserve(in_sheets.size());
+    corners.reserve(in_sheets.size());
+    walls.reserve(in_sheets.size());
+    border_flags.reserve(in_sheets.size());
     for (const int i : tree.order()) {
       const auto [s, t] = in_sheets[i];
       triangles.push_back(in_sheets[i]);

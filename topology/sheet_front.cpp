@@ -1,6 +1,7 @@
 #include "topology/sheet_front.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/half_edges.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +11,6 @@
 namespace spherecut::topology {
 
 namespace {
-
-std::uint64_t half_edge(int from, int to) {
-  return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(from)) << 32) | static_cast<std::uint32_t>(to);
-}
 
 double body_size(const Domain& domain) {
   return domain.bounds().extent().norm();
@@ -43,51 +40,43 @@ void check_elements(const SurfaceMesh& sheet, const std::string& name) {
 
 /// Refuses edges with three triangles or two of opposite orientation, and vertices where fans only touch.
 void check_manifold(const SurfaceMesh& sheet, const std::string& name) {
-  std::unordered_map<std::uint64_t, int> owner;
-  owner.reserve(3 * sheet.triangles.size());
+  const HalfEdges edges(sheet);
   for (int t = 0; t < std::ssize(sheet.triangles); ++t)
     for (int e = 0; e < 3; ++e) {
       const int from = sheet.triangles[t][e], to = sheet.triangles[t][(e + 1) % 3];
-      const auto [other, is_new] = owner.emplace(half_edge(from, to), t);
-      if (!is_new)
+      if (const int other = edges.triangle(from, to); other != t)
         throw InputError(fmt::format("{}: triangles {} and {} both run along the edge {} to {}: the sheet is not "
                                      "manifold there, or not consistently oriented",
-                                     name, other->second, t, from, to));
+                                     name, other, t, from, to));
     }
   // Around a vertex of one fan, going from triangle to triangle passes all of them.
-  std::vector<int> around(sheet.vertices.size(), 0), first(sheet.vertices.size(), -1);
-  for (int t = 0; t < std::ssize(sheet.triangles); ++t)
-    for (const int v : sheet.triangles[t]) {
-      ++around[v];
-      first[v] = t;
-    }
   const auto next_vertex = [&](int t, int v, int step) { // corner of t `step` places after v
     const Triangle& corners = sheet.triangles[t];
     const int at = static_cast<int>(std::find(corners.begin(), corners.end(), v) - corners.begin());
     return corners[(at + step) % 3];
   };
   for (int v = 0; v < std::ssize(sheet.vertices); ++v) {
-    if (around[v] == 0)
+    const int around = edges.around(v);
+    if (around == 0)
       continue;
     int passed = 1;
+    const int first = edges.some_triangle(v);
     bool closed = false;
-    for (int t = first[v]; passed <= around[v]; ++passed) { // counter-clockwise, across the edge v -> last corner
-      const auto found = owner.find(half_edge(v, next_vertex(t, v, 2)));
-      if (found == owner.end())
+    for (int t = first; passed <= around; ++passed) { // counter-clockwise, across the edge v -> last corner
+      t = edges.triangle(v, next_vertex(t, v, 2));
+      if (t < 0)
         break;
-      t = found->second;
-      if (t == first[v]) {
+      if (t == first) {
         closed = true;
         break;
       }
     }
-    for (int t = first[v]; !closed && passed <= around[v]; ++passed) { // clockwise, across the edge first corner -> v
-      const auto found = owner.find(half_edge(next_vertex(t, v, 1), v));
-      if (found == owner.end())
+    for (int t = first; !closed && passed <= around; ++passed) { // clockwise, across the edge first corner -> v
+      t = edges.triangle(next_vertex(t, v, 1), v);
+      if (t < 0)
         break;
-      t = found->second;
     }
-    if (passed != around[v])
+    if (passed != around)
       throw InputError(fmt::format("{}: parts of the sheet only touch at vertex {} ({}, {}, {})", name, v,
                                    sheet.vertices[v].x(), sheet.vertices[v].y(), sheet.vertices[v].z()));
   }
@@ -131,8 +120,8 @@ struct BorderEdge {
 };
 
 /// Loops of the border, each starting where it enters the body if it ever leaves it.
-std::vector<std::vector<BorderEdge>> border_loops(const SurfaceMesh& sheet, const Domain& domain, double tolerance) {
-  const auto neighbours = triangle_neighbours(sheet);
+std::vector<std::vector<BorderEdge>> border_loops(const SurfaceMesh& sheet, const Neighbours& neighbours,
+                                                  const Domain& domain, double tolerance) {
   std::vector<BorderEdge> edges;
   std::unordered_map<int, int> leaving; // border edge that starts at a vertex
   for (int t = 0; t < std::ssize(sheet.triangles); ++t)
@@ -299,14 +288,15 @@ bool reaches_inside(const SurfaceMesh& sheet, const Domain& domain) {
   return area_inside(sheet, domain) > 0;
 }
 
-std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const std::vector<SheetTriangle>& triangles,
-                                   const BoxTree& tree, const Domain& domain) {
+std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const std::vector<Neighbours>& neighbours,
+                                   const std::vector<SheetTriangle>& triangles, const BoxTree& tree,
+                                   const Domain& domain) {
   const double size = body_size(domain), surface_tolerance = 1e-9 * size;
   const double cos_corner = std::cos(40 * M_PI / 180);
   std::vector<FrontPiece> front;
   for (int s = 0; s < std::ssize(sheets); ++s) {
     const SurfaceMesh& sheet = sheets[s];
-    for (const std::vector<BorderEdge>& loop : border_loops(sheet, domain, surface_tolerance)) {
+    for (const std::vector<BorderEdge>& loop : border_loops(sheet, neighbours[s], domain, surface_tolerance)) {
       const int count = static_cast<int>(loop.size());
       std::vector<FrontEnd> own(count), joint(count); // of edge i, and where edge i - 1 meets edge i
       for (int i = 0; i < count; ++i) {

@@ -33,16 +33,20 @@ struct FrontPiece {
   FrontEnd from, to;
 };
 
-/// All triangles of all sheets, in the order of the sheets.
+/// A triangle of one of several sheets.
 struct SheetTriangle {
   int sheet, triangle;
 };
 
+/// triangle_neighbours of a sheet.
+using Neighbours = std::vector<std::array<int, 3>>;
+
 /// Border of the sheets deeper inside the body than 1e-9 of its size, less what lies within 1e-7 of its size of another
-/// sheet, or of a part of the same sheet that shares no vertex with it. Chains come in order. `tree` holds the boxes of
-/// `triangles`, enlarged by that tolerance.
-std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const std::vector<SheetTriangle>& triangles,
-                                   const BoxTree& tree, const Domain& domain);
+/// sheet, or of a part of the same sheet that shares no vertex with it. Chains come in order. `triangles` lists
+/// those of all sheets, `tree` holds their boxes, enlarged by that tolerance.
+std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const std::vector<Neighbours>& neighbours,
+                                   const std::vector<SheetTriangle>& triangles, const BoxTree& tree,
+                                   const Domain& domain);
 
 /// Tolerance within which a border abuts on another sheet, in units of the body's size (diagonal of its box).
 constexpr double abutting = 1e-7;

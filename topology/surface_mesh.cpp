@@ -1,8 +1,9 @@
 #include "topology/surface_mesh.hpp"
 
+#include "topology/half_edges.hpp"
+
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <unordered_map>
 
 namespace spherecut::topology {
 
@@ -57,20 +58,11 @@ std::vector<Vector3> vertex_normals(const SurfaceMesh& mesh) {
 }
 
 std::vector<std::array<int, 3>> triangle_neighbours(const SurfaceMesh& mesh) {
-  const auto key = [](int a, int b) {
-    return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(a)) << 32) | static_cast<std::uint32_t>(b);
-  };
-  std::unordered_map<std::uint64_t, int> triangle_of_half_edge;
-  triangle_of_half_edge.reserve(3 * mesh.triangles.size());
-  for (int t = 0; t < std::ssize(mesh.triangles); ++t)
-    for (int e = 0; e < 3; ++e)
-      triangle_of_half_edge.emplace(key(mesh.triangles[t][e], mesh.triangles[t][(e + 1) % 3]), t);
+  const HalfEdges edges(mesh);
   std::vector<std::array<int, 3>> neighbours(mesh.triangles.size());
-  for (int t = 0; t < std::ssize(mesh.triangles); ++t)
-    for (int e = 0; e < 3; ++e) {
-      const auto found = triangle_of_half_edge.find(key(mesh.triangles[t][(e + 1) % 3], mesh.triangles[t][e]));
-      neighbours[t][e] = found == triangle_of_half_edge.end() ? -1 : found->second;
-    }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (int e = 0; e < 3; ++e)
+      neighbours[t][e] = edges.triangle(mesh.triangles[t][(e + 1) % 3], mesh.triangles[t][e]);
   return neighbours;
 }
 

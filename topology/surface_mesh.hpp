@@ -26,7 +26,7 @@ Vector3 triangle_normal(const SurfaceMesh& mesh, int triangle);
 /// Area-weighted unit normals of all vertices.
 std::vector<Vector3> vertex_normals(const SurfaceMesh& mesh);
 
-/// For every triangle the triangles across its edges (v0v1, v1v2, v2v0), -1 on a border.
+/// For every triangle the triangles across its edges (v0v1, v1v2, v2v0), -1 on a border. Indices must be in range.
 std::vector<std::array<int, 3>> triangle_neighbours(const SurfaceMesh& mesh);
 
 } // namespace spherecut::topology
