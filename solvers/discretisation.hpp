@@ -69,7 +69,7 @@ struct DiscretisationOptions {
   double cell_size = 0.75;                    // edge of a background cell in units of h (galerkin)
   int tip_node = -1;                          // the tool-tip node of `published`
   SightRule sight = SightRule::enriched;      // only where there is an incision
-  UnheldPieces unheld = UnheldPieces::refuse; // galerkin
+  UnheldPieces unheld = UnheldPieces::refuse; // galerkin, collocation
   bool estimate_condition = true;             // a dozen more solves; leave out where every rebuild counts
 };
 
@@ -89,7 +89,7 @@ struct AssemblyReport {
   double condition_estimate = 0;     // 1-norm estimate (Hager-Higham), 0 when not asked for
   double worst_moment_condition = 0; // largest condition number of a moment matrix
   int grown_supports = 0;            // supports whose radius had to grow
-  std::vector<Piece> pieces;         // one for a body that is not cut apart (galerkin)
+  std::vector<Piece> pieces;         // one for a body that is not cut apart
   double supports_seconds = 0, assembly_seconds = 0, factor_seconds = 0;
 };
 

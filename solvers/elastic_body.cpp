@@ -89,10 +89,10 @@ Matrix3 initial_stress(const Problem& problem) {
                               0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose()));
 }
 
-ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule)
+ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor)
     : problem_(checked(std::move(problem))),
       spheres_(problem_.nodes.positions, problem_.nodes.spacings, rho, Basis::linear, worst_moment_condition,
-               {problem_.incision, rule}) {
+               {.incision = problem_.incision, .rule = rule, .radius_factor = front_radius_factor}) {
   const Stopwatch watch;
   supports_ = nodal_supports(spheres_);
   report_.nodes = problem_.nodes.size();

@@ -48,7 +48,8 @@ class ElasticBody : public Discretisation {
                                               const std::vector<Field>& fields) const override;
 
  protected:
-  ElasticBody(Problem problem, double rho, SightRule rule);
+  /// Spheres at the front of a cut are larger by `front_radius_factor`.
+  ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor = 1);
   Problem problem_;
   AssemblyReport report_;
   Spheres spheres_;

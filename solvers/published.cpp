@@ -190,6 +190,7 @@ void Published::find_held_components() {
 void Published::evaluate_rows() {
   const NodeCloud& nodes = problem_.nodes;
   const double mu = problem_.material.shear_modulus();
+  const Matrix3 initial = initial_stress(problem_);
   blocks_.resize(supports_.nodes.size());
   load_.assign(report_.nodes, Vector3::Zero());
   measure_.resize(report_.nodes);
@@ -211,8 +212,11 @@ void Published::evaluate_rows() {
     scale_[i] = inside ? h * h / mu : h / mu;
     if (inside && problem_.loads.body_force)
       load_[i] = problem_.loads.body_force(x);
-    if (!inside && problem_.loads.traction)
-      load_[i] = problem_.loads.traction(x, normal);
+    const auto& traction = nodes.kinds[i] == NodeKind::lip ? problem_.loads.lip_traction : problem_.loads.traction;
+    if (!inside)
+      load_[i] = initial * normal;
+    if (!inside && traction)
+      load_[i] += traction(x, normal);
   }
 }
 

@@ -214,11 +214,18 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
   const auto is_absent = [&](int i) { return !absent.empty() && absent[i] != 0; };
   for (int i = 0; i < n; ++i)
     base[i] = is_absent(i) ? 0 : rho * spacings[i];
+  if (sight.incision != nullptr && sight.radius_factor != 1)
+    for (int i = 0; i < n; ++i)
+      if (sight.incision->front_frame(centres_[i], sight.reach * spacings[i]))
+        base[i] *= sight.radius_factor;
   radii_ = base;
   grid_ = SphereGrid(centres_, radii_);
   if (sight.incision != nullptr) {
     if (basis != Basis::linear)
       throw InputError("shape functions: spheres around a cut have the linear basis alone");
+    if (!(sight.radius_factor > 0) || !std::isfinite(sight.radius_factor))
+      throw InputError(fmt::format("shape functions: radii at the front times {}; the factor must be positive",
+                                   sight.radius_factor));
     cut_ = std::make_shared<CutSight>(sight, centres_, spacings, radii_);
   }
 

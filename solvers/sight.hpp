@@ -23,6 +23,8 @@ struct Sight {
   SightRule rule = SightRule::enriched;
   double reach = 4;   // enrichment ends this far from the front, in units of the node spacing there
   double blend = 0.7; // and fades from this part of the reach on, so that the shape functions stay continuous
+  /// Spheres of nodes within `reach` of the front are larger by this; an enriched basis may want it.
+  double radius_factor = 1;
 };
 
 } // namespace spherecut::solvers
