@@ -83,15 +83,13 @@ class TriangleRows {
     const Eigen::Vector3f start =
         origin_ + static_cast<float>(i) * steps_.col(0) + static_cast<float>(j) * steps_.col(1);
     const Row height = start[2] + along_z_[2];
-    // The plane, then a disc that covers the triangle, less rounding: never farther than what is computed below, so
-    // that the order of the triangles does not matter, and cheap.
-    const Row off_plane = (height.abs() - rounding_).max(0.0F), squared_off_plane = off_plane * off_plane;
-    if ((squared_off_plane - squared_limits).minCoeff() >= 0)
-      return false;
+    // A disc that covers the triangle, less rounding: never farther than what is computed below, so that the order of
+    // the triangles does not matter, and cheap.
     const Row u = start[0] + along_z_[0], v = start[1] + along_z_[1];
+    const Row off_plane = (height.abs() - rounding_).max(0.0F);
     const Row beyond = ((u * u + v * v).sqrt() - radius_).max(0.0F);
     constexpr float relative = 1 - 1e-5F;
-    if (((squared_off_plane + beyond * beyond) * relative - squared_limits).minCoeff() >= 0)
+    if (((off_plane * off_plane + beyond * beyond) * relative - squared_limits).minCoeff() >= 0)
       return false;
     Row to_border = Row::Constant(std::numeric_limits<float>::max());
     Row outside = -to_border; // positive beyond some edge
@@ -177,8 +175,9 @@ struct CutFields::Impl {
             known = Eigen::Map<const Row>(leaf->buffer().data() + offset);
           if (!rows.lower(i, j, known * known, squared))
             continue;
+          const Row values = squared.sqrt();
           for (int k = 0; k < leaf_side; ++k) {
-            const float value = std::sqrt(squared[k]);
+            const float value = values[k];
             if (value >= known[k])
               continue;
             if (!leaf) {
@@ -277,6 +276,7 @@ struct CutFields::Impl {
     sheet_area += added;
     for_new_triangles(*next, grows, [this](const std::array<Vector3, 3>& p) { add_triangle(p); });
     std::vector<FrontKey> keys;
+    keys.reserve(next->front().size());
     for (int i = 0; i < std::ssize(next->front()); ++i)
       keys.push_back(key_of(*next, i));
     std::sort(keys.begin(), keys.end());
@@ -328,7 +328,7 @@ CutFields::~CutFields() = default;
 CutFields::CutFields(CutFields&&) noexcept = default;
 CutFields& CutFields::operator=(CutFields&&) noexcept = default;
 
-void CutFields::update(std::shared_ptr<const Incision> incision) {
+void CutFields::update(const std::shared_ptr<const Incision>& incision) {
   if (!incision)
     throw InputError("cut fields: no incision is given");
   impl_->update(incision);

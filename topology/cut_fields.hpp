@@ -31,7 +31,7 @@ class CutFields {
   /// Brings the fields to `incision`. Where its sheets begin with the triangles of the last one only voxels near new
   /// triangles and near a front that went or came are visited, else all; the fields are the same bit for bit.
   /// Throws InputError when it is null or the fields would need over 2 GB; then nothing has changed.
-  void update(std::shared_ptr<const Incision> incision);
+  void update(const std::shared_ptr<const Incision>& incision);
 
   /// Trilinear values, m; band() where a voxel around x lies outside the band.
   [[nodiscard]] double distance(const Vector3& x) const;
