@@ -130,6 +130,7 @@ std::vector<Check> run_closed_cut_compression(const ExperimentContext& context) 
         continue;
       const double bound = condition == LipCondition::sticking ? 0.02 : 0.04;
       std::vector<double> errors;
+      errors.reserve(values.size());
       for (double value : values)
         errors.push_back(std::abs(value - 1));
       const std::string name =
