@@ -26,52 +26,57 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
   const double modulus = material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
   const double wanted = 8 * force * std::pow(depth + 0.64 * arm, 3) / (thickness * modulus * std::pow(arm, 3));
   std::vector<Check> checks;
-  app::Table table({"nodes", "seed", "spacing", "opening", "beam"});
-  app::Series points{"galerkin, enriched", {}, {}, app::SeriesStyle::points};
-  for (int size : sizes) {
-    ErrorSeries errors;
-    for (int seed = 1; seed <= seeds; ++seed) {
-      CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0, 0.4)}, 1.5, 0.35,
-                      size,         static_cast<std::uint64_t>(seed)};
-      CutBody body = cut_body(cut);
-      body.problem.material = material;
-      hold_sides(body.problem, strip);
-      body.problem.loads.traction = [frame](const Vector3& x, const Vector3& n) -> Vector3 {
-        if (n.dot(frame.ahead) > -0.9)
-          return Vector3::Zero();
-        return (frame.local(x)[1] > 0 ? 1 : -1) * force / (thickness * arm) * frame.normal;
-      };
-      const auto discretisation = solvers::discretise(body.problem, {});
-      const solvers::Field field = discretisation->solve();
-      // Mean over the ends of the arms.
-      constexpr int rows = 8, columns = 4;
-      double opening = 0;
-      for (int a = 0; a < rows; ++a)
-        for (int b = 0; b < columns; ++b)
-          for (const double side : {1.0, -1.0}) {
-            const Vector3 at(-0.5 * length + 1e-6, side * arm * (a + 0.5) / rows,
-                             thickness * ((b + 0.5) / columns - 0.5));
-            const Vector3 x = frame.origin + frame.global(at);
-            opening += side * discretisation->at(x, field).displacement.dot(frame.normal) / (rows * columns);
-          }
-      errors.add("compliance", std::abs(opening / wanted - 1));
-      table.add(
-          {static_cast<double>(body.problem.nodes.size()), static_cast<double>(seed), body.fine, opening, wanted});
-      points.x.push_back(body.problem.nodes.size());
-      points.y.push_back(opening / wanted);
+  app::Table table({"method", "sight", "nodes", "seed", "spacing", "opening", "beam"});
+  app::Figure figure{
+      "Double cantilever: opening over that of root-corrected beams", "nodes", "opening / beam", false, false, {}};
+  for (const PrecutMethod& method : precut_methods(context.quick)) {
+    app::Series points{method.name(), {}, {}, app::SeriesStyle::points};
+    for (int size : sizes) {
+      ErrorSeries errors;
+      for (int seed = 1; seed <= (method.judged ? seeds : std::min(seeds, 3)); ++seed) {
+        CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0, 0.4)}, 1.5, 0.35,
+                        size,         static_cast<std::uint64_t>(seed)};
+        CutBody body = cut_body(cut);
+        body.problem.material = material;
+        hold_sides(body.problem, strip);
+        body.problem.loads.traction = [frame](const Vector3& x, const Vector3& n) -> Vector3 {
+          if (n.dot(frame.ahead) > -0.9)
+            return Vector3::Zero();
+          return (frame.local(x)[1] > 0 ? 1 : -1) * force / (thickness * arm) * frame.normal;
+        };
+        const auto discretisation = solvers::discretise(body.problem, method.options());
+        const solvers::Field field = discretisation->solve();
+        // Mean over the ends of the arms.
+        constexpr int rows = 8, columns = 4;
+        double opening = 0;
+        for (int a = 0; a < rows; ++a)
+          for (int b = 0; b < columns; ++b)
+            for (const double side : {1.0, -1.0}) {
+              const Vector3 at(-0.5 * length + 1e-6, side * arm * (a + 0.5) / rows,
+                               thickness * ((b + 0.5) / columns - 0.5));
+              const Vector3 x = frame.origin + frame.global(at);
+              opening += side * discretisation->at(x, field).displacement.dot(frame.normal) / (rows * columns);
+            }
+        errors.add("compliance", std::abs(opening / wanted - 1));
+        table.add({std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
+                   fmt::format("{}", body.problem.nodes.size()), fmt::format("{}", seed),
+                   fmt::format("{:.4f}", body.fine), fmt::format("{:.5g}", opening), fmt::format("{:.5g}", wanted)});
+        points.x.push_back(body.problem.nodes.size());
+        points.y.push_back(opening / wanted);
+      }
+      context.say(fmt::format("{}, {} nodes, median (worst): {}", method.name(), size, errors.text()));
+      if (size != sizes.back())
+        continue;
+      const std::string name = "precut_beam_" + method.name();
+      if (method.judged)
+        errors.check(name, "compliance", method.bound(0.05, 0.08), checks);
+      else
+        checks.push_back({name + "_compliance_reported", median(errors["compliance"]), ">=", 0});
     }
-    context.say(fmt::format("galerkin, enriched, {} nodes, median (worst): {}", size, errors.text()));
-    if (size == sizes.back())
-      errors.check("precut_beam_galerkin", "compliance", 0.05, checks);
+    figure.series.push_back(points);
   }
   table.write(context.out / "runs.csv");
-  app::write_png({"Double cantilever: opening over that of root-corrected beams",
-                  "nodes",
-                  "opening / beam",
-                  false,
-                  false,
-                  {points}},
-                 context.out / "compliance.png");
+  app::write_png(figure, context.out / "compliance.png");
   return checks;
 }
 

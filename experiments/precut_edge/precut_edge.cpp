@@ -24,42 +24,52 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
   const CutFrame& frame = strip.frame;
   const double wanted = edge_notched_strip_intensity(tension, depth, width);
   std::vector<Check> checks;
-  app::Table table({"nodes", "seed", "spacing", "k_correlation", "k_interaction", "k_exact"});
-  app::Series points{"galerkin, enriched", {}, {}, app::SeriesStyle::points};
-  for (int size : sizes) {
-    ErrorSeries errors;
-    for (int seed = 1; seed <= seeds; ++seed) {
-      CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0.07, 0.1)}, 4, 0.35,
-                      size,         static_cast<std::uint64_t>(seed)};
-      CutBody body = cut_body(cut);
-      body.problem.material = {1, 0.3, 0};
-      hold_sides(body.problem, strip);
-      body.problem.loads.traction = [frame](const Vector3&, const Vector3& n) -> Vector3 {
-        const double pull = n.dot(frame.normal);
-        return std::abs(pull) > 0.9 ? Vector3((pull > 0 ? tension : -tension) * frame.normal) : Vector3::Zero();
-      };
-      const auto discretisation = solvers::discretise(body.problem, {});
-      const solvers::Field field = discretisation->solve();
-      const auto front = body.problem.incision->front_frame(
-          frame.origin + (depth - 0.5 * width) * frame.ahead + 0.07 * frame.normal, 0.1);
-      const double by_jump = solvers::displacement_correlation(*discretisation, field, *front)[0];
-      const double by_integral = solvers::interaction_integral(*discretisation, field, *front)[0];
-      errors.add("k_correlation", std::abs(by_jump / wanted - 1));
-      errors.add("k_interaction", std::abs(by_integral / wanted - 1));
-      table.add({static_cast<double>(body.problem.nodes.size()), static_cast<double>(seed), body.fine, by_jump,
-                 by_integral, wanted});
-      points.x.push_back(body.problem.nodes.size());
-      points.y.push_back(by_integral / wanted);
+  app::Table table({"method", "sight", "nodes", "seed", "spacing", "k_correlation", "k_interaction", "k_exact"});
+  app::Figure figure{"Edge-notched strip: intensity over Tada's", "nodes", "K_I / exact", false, false, {}};
+  for (const PrecutMethod& method : precut_methods(context.quick)) {
+    app::Series points{method.name(), {}, {}, app::SeriesStyle::points};
+    for (int size : sizes) {
+      ErrorSeries errors;
+      for (int seed = 1; seed <= (method.judged ? seeds : std::min(seeds, 3)); ++seed) {
+        CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0.07, 0.1)}, 4, 0.35,
+                        size,         static_cast<std::uint64_t>(seed)};
+        CutBody body = cut_body(cut);
+        body.problem.material = {1, 0.3, 0};
+        hold_sides(body.problem, strip);
+        body.problem.loads.traction = [frame](const Vector3&, const Vector3& n) -> Vector3 {
+          const double pull = n.dot(frame.normal);
+          return std::abs(pull) > 0.9 ? Vector3((pull > 0 ? tension : -tension) * frame.normal) : Vector3::Zero();
+        };
+        const auto discretisation = solvers::discretise(body.problem, method.options());
+        const solvers::Field field = discretisation->solve();
+        const auto front = body.problem.incision->front_frame(
+            frame.origin + (depth - 0.5 * width) * frame.ahead + 0.07 * frame.normal, 0.1);
+        const double by_jump = solvers::displacement_correlation(*discretisation, field, *front)[0];
+        const double by_integral = solvers::interaction_integral(*discretisation, field, *front)[0];
+        errors.add("k_correlation", std::abs(by_jump / wanted - 1));
+        errors.add("k_interaction", std::abs(by_integral / wanted - 1));
+        table.add({std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
+                   fmt::format("{}", body.problem.nodes.size()), fmt::format("{}", seed),
+                   fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", by_jump), fmt::format("{:.5f}", by_integral),
+                   fmt::format("{:.5f}", wanted)});
+        points.x.push_back(body.problem.nodes.size());
+        points.y.push_back(by_integral / wanted);
+      }
+      context.say(fmt::format("{}, {} nodes, medians (worst): {}", method.name(), size, errors.text()));
+      if (size != sizes.back())
+        continue;
+      const std::string name = "precut_edge_" + method.name();
+      if (method.judged) {
+        errors.check(name, "k_correlation", method.bound(0.04, 0.08), checks);
+        errors.check(name, "k_interaction", method.bound(0.04, 0.08), checks);
+      } else {
+        checks.push_back({name + "_k_interaction_reported", median(errors["k_interaction"]), ">=", 0});
+      }
     }
-    context.say(fmt::format("galerkin, enriched, {} nodes, medians (worst): {}", size, errors.text()));
-    if (size == sizes.back()) {
-      errors.check("precut_edge_galerkin", "k_correlation", 0.04, checks);
-      errors.check("precut_edge_galerkin", "k_interaction", 0.04, checks);
-    }
+    figure.series.push_back(points);
   }
   table.write(context.out / "runs.csv");
-  app::write_png({"Edge-notched strip: intensity over Tada's", "nodes", "K_I / exact", false, false, {points}},
-                 context.out / "intensity.png");
+  app::write_png(figure, context.out / "intensity.png");
   return checks;
 }
 

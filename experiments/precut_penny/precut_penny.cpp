@@ -24,8 +24,6 @@ namespace spherecut::experiments {
 
 namespace {
 
-using solvers::SightRule;
-
 constexpr double pi = std::numbers::pi, radius = 1, tilt = 35 * pi / 180;
 const Vector3 half_size(2, 2, 2); // m
 const CutFrame crack = tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
@@ -172,40 +170,36 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
   const std::vector<int> sizes = context.quick ? std::vector<int>{2000} : std::vector<int>{800, 1400, 2400};
   const std::vector<double> ratios = context.quick ? std::vector<double>{0.3} : std::vector<double>{0.3, 0.49};
   std::vector<Check> checks;
-  app::Table table({"load", "sight", "poisson_ratio", "seed", "nodes", "spacing", "volume_error", "displacement_error",
-                    "k_correlation_error", "k_interaction_error"});
+  app::Table table({"load", "method", "sight", "poisson_ratio", "seed", "nodes", "spacing", "volume_error",
+                    "displacement_error", "k_correlation_error", "k_interaction_error"});
   app::Figure figure{"Pressurised penny: displacement error against spacing, median of seeds",
                      "spacing at the front / m",
                      "relative L2 error",
                      true,
                      true,
                      {}};
-  const auto record = [&](const char* load, SightRule rule, double nu, int seed, const CutBody& body,
+  const auto record = [&](const char* load, const PrecutMethod& method, double nu, int seed, const CutBody& body,
                           const PennyErrors& e) {
-    table.add({load, std::string(solvers::to_string(rule)), fmt::format("{}", nu), fmt::format("{}", seed),
-               fmt::format("{}", body.problem.nodes.size()), fmt::format("{:.4f}", body.fine),
-               fmt::format("{:.5f}", e.volume), fmt::format("{:.5f}", e.displacement),
+    table.add({load, std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
+               fmt::format("{}", nu), fmt::format("{}", seed), fmt::format("{}", body.problem.nodes.size()),
+               fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", e.volume), fmt::format("{:.5f}", e.displacement),
                fmt::format("{:.5f}", e.k_correlation), fmt::format("{:.5f}", e.k_interaction)});
   };
-  const std::vector<SightRule> rules =
-      context.quick ? std::vector<SightRule>{SightRule::enriched}
-                    : std::vector<SightRule>{SightRule::enriched, SightRule::diffraction, SightRule::visibility};
-  for (const SightRule rule : rules) {
-    solvers::DiscretisationOptions options;
-    options.sight = rule;
-    for (double nu : rule == SightRule::enriched ? ratios : std::vector<double>{0.3}) {
-      app::Series series{fmt::format("{}, nu = {}", solvers::to_string(rule), nu), {}, {}};
+  const std::vector<PrecutMethod> methods = precut_methods(context.quick);
+  for (const PrecutMethod& method : methods) {
+    for (double nu : method.judged ? ratios : std::vector<double>{0.3}) {
+      app::Series series{fmt::format("{}, nu = {}", method.name(), nu), {}, {}};
       ErrorSeries errors;
       for (int size : sizes) {
         errors = {};
         double spacing = 0;
-        for (int seed = 1; seed <= (rule != SightRule::enriched ? std::min(seeds, 3)
-                                    : size == sizes.back()      ? seeds
-                                                                : std::min(seeds, 5));
+        for (int seed = 1; seed <= (!method.judged         ? std::min(seeds, 3)
+                                    : size == sizes.back() ? seeds
+                                                           : std::min(seeds, 5));
              ++seed) {
           const CutBody body = penny_body(size, static_cast<std::uint64_t>(seed), nu);
-          const PennyErrors e = under_pressure(body, options);
-          record("pressure", rule, nu, seed, body, e);
+          const PennyErrors e = under_pressure(body, method.options());
+          record("pressure", method, nu, seed, body, e);
           spacing = body.fine;
           errors.add("volume", e.volume);
           errors.add("displacement", e.displacement);
@@ -214,36 +208,43 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
         }
         series.x.push_back(spacing);
         series.y.push_back(median(errors["displacement"]));
-        context.say(fmt::format("pressure, galerkin, {}, nu = {}, {} nodes, medians (worst): {}",
-                                solvers::to_string(rule), nu, size, errors.text()));
+        context.say(fmt::format("pressure, {}, nu = {}, {} nodes, medians (worst): {}", method.name(), nu, size,
+                                errors.text()));
       }
       figure.series.push_back(series);
-      const std::string name = fmt::format("precut_penny_galerkin_{}_nu{:02.0f}", solvers::to_string(rule), 100 * nu);
-      if (rule != SightRule::enriched) {
+      const std::string name = fmt::format("precut_penny_{}_nu{:02.0f}", method.name(), 100 * nu);
+      if (!method.judged) {
         checks.push_back({name + "_volume_reported", median(errors["volume"]), ">=", 0});
         continue;
       }
-      errors.check(name, "volume", 0.03, checks);
-      errors.check(name, "displacement", 0.045, checks);
-      errors.check(name, "k_correlation", 0.06, checks);
-      errors.check(name, "k_interaction", 0.06, checks);
+      // Near nu = 1/2 collocation has the pressure as an unknown.
+      errors.check(name, "volume", method.bound(0.03, nu > 0.4 ? 0.10 : 0.07), checks);
+      errors.check(name, "displacement", method.bound(0.045, 0.08), checks);
+      errors.check(name, "k_correlation", method.bound(0.06, 0.10), checks);
+      errors.check(name, "k_interaction", method.bound(0.06, 0.10), checks);
       if (sizes.size() > 1)
         checks.push_back({name + "_slope", log_log_slope(series.x, series.y), ">=", 0.8});
     }
   }
-  ErrorSeries tilted;
-  for (int seed = 1; seed <= seeds; ++seed) {
-    const CutBody body = penny_body(sizes.back(), static_cast<std::uint64_t>(seed), 0.3);
-    const TiltedRun run = under_tilted_tension(body, {});
-    record("tilted tension", SightRule::enriched, 0.3, seed, body, run.errors);
-    tilted.add("k_correlation", run.errors.k_correlation);
-    tilted.add("k_interaction", run.errors.k_interaction);
-    if (seed == 1)
-      app::write_png(intensities_figure(run), context.out / "intensities.png");
+  for (const PrecutMethod& method : methods) {
+    if (!method.judged)
+      continue;
+    ErrorSeries tilted;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      const CutBody body = penny_body(sizes.back(), static_cast<std::uint64_t>(seed), 0.3);
+      const TiltedRun run = under_tilted_tension(body, method.options());
+      record("tilted tension", method, 0.3, seed, body, run.errors);
+      tilted.add("k_correlation", run.errors.k_correlation);
+      tilted.add("k_interaction", run.errors.k_interaction);
+      if (seed == 1)
+        app::write_png(intensities_figure(run),
+                       context.out / fmt::format("intensities_{}.png", solvers::to_string(method.method)));
+    }
+    context.say(fmt::format("tilted tension, {}, medians (worst): {}", method.name(), tilted.text()));
+    const std::string name = fmt::format("precut_penny_{}_tilted", method.name());
+    tilted.check(name, "k_correlation", method.bound(0.06, 0.10), checks);
+    tilted.check(name, "k_interaction", method.bound(0.06, 0.10), checks);
   }
-  context.say(fmt::format("tilted tension, galerkin, enriched, medians (worst): {}", tilted.text()));
-  tilted.check("precut_penny_galerkin_tilted", "k_correlation", 0.06, checks);
-  tilted.check("precut_penny_galerkin_tilted", "k_interaction", 0.06, checks);
   table.write(context.out / "runs.csv");
   app::write_png(figure, context.out / "displacement.png");
   return checks;

@@ -22,4 +22,32 @@ std::string ErrorSeries::text() const {
   return line + " %";
 }
 
+solvers::DiscretisationOptions PrecutMethod::options() const {
+  solvers::DiscretisationOptions options;
+  options.method = method;
+  options.sight = sight;
+  return options;
+}
+
+std::string PrecutMethod::name() const {
+  return fmt::format("{}_{}", solvers::to_string(method), solvers::to_string(sight));
+}
+
+double PrecutMethod::bound(double tight, double loose) const {
+  return method == solvers::DiscretisationOptions{}.method ? tight : loose;
+}
+
+std::vector<PrecutMethod> precut_methods(bool quick) {
+  using solvers::Method, solvers::SightRule;
+  std::vector<PrecutMethod> methods{{Method::galerkin, SightRule::enriched, true},
+                                    {Method::collocation, SightRule::enriched, true}};
+  if (!quick)
+    for (const SightRule rule : {SightRule::diffraction, SightRule::visibility})
+      for (const Method method : {Method::galerkin, Method::collocation})
+        methods.push_back({method, rule, false});
+  if (!quick)
+    methods.push_back({Method::published, SightRule::visibility, false});
+  return methods;
+}
+
 } // namespace spherecut::experiments

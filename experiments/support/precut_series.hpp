@@ -3,6 +3,8 @@
 
 #include "experiments/experiment.hpp"
 
+#include "solvers/discretisation.hpp"
+
 #include <map>
 #include <string>
 #include <vector>
@@ -22,5 +24,20 @@ class ErrorSeries {
  private:
   std::map<std::string, std::vector<double>> values_;
 };
+
+/// A method and a sight rule that a precut experiment runs.
+struct PrecutMethod {
+  solvers::Method method;
+  solvers::SightRule sight;
+  bool judged; // held to the bounds; else its error is reported
+  [[nodiscard]] solvers::DiscretisationOptions options() const;
+  [[nodiscard]] std::string name() const; // "galerkin_enriched"
+  /// The tight bound for the default method, the loose one for the other.
+  [[nodiscard]] double bound(double tight, double loose) const;
+};
+
+/// The two methods with the enriched basis, which are judged; in a full run also their other sight rules and
+/// `published`, which are reported.
+std::vector<PrecutMethod> precut_methods(bool quick);
 
 } // namespace spherecut::experiments

@@ -111,3 +111,11 @@ TEST_CASE("Quick double cantilever: compliance") {
 TEST_CASE("Quick severed cube: no coupling, rigid motions") {
   require_quick_run_passes("sever");
 }
+
+TEST_CASE("Quick reprojection: a cut that grows and one made at once") {
+  require_quick_run_passes("reprojection");
+}
+
+TEST_CASE("Quick closed cut: stuck lips are as stiff as none") {
+  require_quick_run_passes("closed_cut_compression");
+}
