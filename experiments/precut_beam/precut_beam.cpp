@@ -30,6 +30,9 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
   app::Figure figure{
       "Double cantilever: opening over that of root-corrected beams", "nodes", "opening / beam", false, false, {}};
   for (const PrecutMethod& method : precut_methods(context.quick)) {
+    // The strip is a surface mesh that stands askew: rounding leaves a node of some sets outside it, without a cell.
+    if (method.method == solvers::Method::collocation)
+      continue;
     app::Series points{method.name(), {}, {}, app::SeriesStyle::points};
     for (int size : sizes) {
       ErrorSeries errors;
