@@ -65,10 +65,10 @@ Gap contact_gap(const PressingTool& tool, const Vector3& x) {
   } else if (const auto* ball = std::get_if<topology::SphereTip>(&tool.shape)) {
     return ball_gap(pose.point + ball->radius * pose.axis, ball->radius, tool.front, x);
   }
-  const Gap nearest{topology::tool_distance(tool.shape, pose, x), topology::tool_normal(tool.shape, pose, x)};
+  Gap nearest{topology::tool_distance(tool.shape, pose, x), topology::tool_normal(tool.shape, pose, x)};
   if (const auto* instrument = std::get_if<topology::Laparoscope>(&tool.shape);
       instrument != nullptr && along < 3 * instrument->tip_radius) {
-    const Gap tip = ball_gap(pose.point + instrument->tip_radius * pose.axis, instrument->tip_radius, tool.front, x);
+    Gap tip = ball_gap(pose.point + instrument->tip_radius * pose.axis, instrument->tip_radius, tool.front, x);
     return tip.distance <= nearest.distance ? tip : nearest;
   }
   return nearest;

@@ -607,7 +607,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, std::shared_ptr<const to
     return anew(outside, std::move(next), std::move(removed));
 
   // Exchange.
-  const auto grown = static_cast<Eigen::Index>(3 * next.nodes.size());
+  const Eigen::Index grown = 3 * static_cast<Eigen::Index>(next.nodes.size());
   s.cell_loads.conservativeResizeLike(VectorX::Zero(grown));
   for (int k = 0; k < change.added.size(); ++k) {
     const int block = s.next_room + k;
@@ -730,7 +730,7 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
   const State& s = *state_;
   const Problem& problem = s.problem;
   const std::unique_ptr<Spheres> spheres = s.make_spheres();
-  const auto size = static_cast<Eigen::Index>(3 * problem.nodes.size());
+  const Eigen::Index size = 3 * static_cast<Eigen::Index>(problem.nodes.size());
   MatrixX k = MatrixX::Zero(size, size);
   const double mu = problem.material.shear_modulus(), lambda = problem.material.lame_lambda();
   CellEvaluator evaluator(*spheres);
