@@ -121,12 +121,14 @@ class Nearness {
 /// What each prescribed entry holds, as the ordinary discretisation takes it.
 std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& spheres) {
   std::vector<int> nodes;
+  nodes.reserve(problem.prescribed.size());
   for (const Prescribed& entry : problem.prescribed)
     nodes.push_back(entry.node);
   if (problem.prescribed_region)
     return SurfacePatches(*problem.domain, problem.nodes, problem.incision)
         .means(nodes, spheres, problem.prescribed_region);
   std::vector<DisplacementMean> means;
+  means.reserve(nodes.size());
   for (int node : nodes)
     means.push_back(value_at(spheres, problem.nodes.positions[node]));
   return means;
@@ -475,7 +477,7 @@ GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
   return report;
 }
 
-GrowthReport GrowingCut::grow(const NodeChange& change, std::shared_ptr<const topology::Incision> incision) {
+GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision) {
   const Stopwatch total;
   GrowthReport report;
   State& s = *state_;
@@ -619,7 +621,9 @@ GrowthReport GrowingCut::grow(const NodeChange& change, std::shared_ptr<const to
   s.slot = std::move(new_slot);
   CellEvaluator numbering(*fresh_spheres);
   CellShapes by_slot;
-  for (auto& [b, box] : exchanged) {
+  for (auto& exchange : exchanged) {
+    const int b = exchange.first;
+    State::Box& box = exchange.second;
     s.add_cell_loads(s.boxes[b], -1, *s.spheres, s.cell_loads);
     // A cell that came out as it was cancels itself.
     const std::vector<CellShapes>& old_cells = s.boxes[b].cells;

@@ -49,7 +49,7 @@ class GrowingCut {
   /// The cut becomes `incision`, whose sheets continue those before it triangle by triangle (as topology::BladeSweep
   /// appends them), and the nodes change with it. Whatever the window does not cover is condensed anew and said. Throws
   /// as the constructor when the new body cannot be solved; the state is then the one before.
-  GrowthReport grow(const NodeChange& change, std::shared_ptr<const topology::Incision> incision);
+  GrowthReport grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision);
 
   /// Condenses anew about another predicted way (in the background of a real-time loop, from a copy of problem()).
   GrowthReport condense_anew(topology::SurfaceMesh way);
