@@ -229,7 +229,8 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
     const auto [q_r, dq_r] = fade(r);
     const auto [q_s, dq_s] = bump(s);
     for (int c = 0; c < 2 * cells_around; ++c) {
-      const double theta = pi * ((2 * (c / 2) + 1 + gauss.place[c % 2]) / cells_around - 1);
+      const int cell = c / 2;
+      const double theta = pi * ((2 * cell + 1 + gauss.place[c % 2]) / cells_around - 1);
       const double ahead = r * std::cos(theta), above = r * std::sin(theta);
       const Tube::Place place = tube.at(ahead, above, s);
       const PointState state = body.at(place.position, field);
