@@ -8,85 +8,20 @@
 
 #include "solvers/half_space.hpp"
 #include "solvers/linear_complementarity.hpp"
+#include "solvers/tool_gap.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <numbers>
 
 namespace spherecut::solvers {
 
 namespace {
 
-struct Gap {
-  double distance;
-  Vector3 normal; // outward from the tool
-};
-
-/// Steepest flank of a ball that presses, from the direction into the body. Beyond it the surface runs on as the
-/// tangent cone. On a liver at 1.6 radii depth, 65 degrees already lost single nodes and convergence; 55 did not, in
-/// both methods at three spacings.
-constexpr double flank = 55 * std::numbers::pi / 180;
-
-/// Gap to the front of a ball about `centre`, continued by its tangent cone; `front` is the unit direction into the
-/// body.
-Gap ball_gap(const Vector3& centre, double radius, const Vector3& front, const Vector3& x) {
-  const Vector3 arm = x - centre;
-  const double along = arm.dot(front);
-  const Vector3 across = arm - along * front;
-  const double distance = across.norm();
-  if (std::atan2(distance, along) <= flank)
-    return {arm.norm() - radius, arm.normalized()};
-  const Vector3 sideways = distance > 0 ? Vector3(across / distance) : front.unitOrthogonal();
-  const Vector3 normal = std::sin(flank) * sideways + std::cos(flank) * front;
-  return {normal.dot(arm) - radius, normal};
-}
-
-/// A tool at a pose, and the direction in which its ball presses into the body.
-struct PressingTool {
-  const topology::ToolShape& shape;
-  topology::ToolPose pose;
-  Vector3 front;
-};
-
-/// Gap between a point and the part of the tool that can press on it. Linear elasticity cannot fold tissue over the
-/// flank of a tool: nodes driven past it would slip off one by one. So nothing is pushed sideways more than `flank`
-/// from the front: under a flat punch the end face counts, whatever the depth, and a ball runs on as its tangent cone.
-/// This changes nothing for presses shallower than about half the radius. An instrument's shaft counts as it is.
-Gap contact_gap(const PressingTool& tool, const Vector3& x) {
-  const topology::ToolPose& pose = tool.pose;
-  const double along = (x - pose.point).dot(pose.axis);
-  if (const auto* punch = std::get_if<topology::FlatPunch>(&tool.shape)) {
-    if ((x - pose.point - along * pose.axis).squaredNorm() < punch->radius * punch->radius &&
-        along < 0.5 * punch->length)
-      return {-along, -pose.axis};
-  } else if (const auto* ball = std::get_if<topology::SphereTip>(&tool.shape)) {
-    return ball_gap(pose.point + ball->radius * pose.axis, ball->radius, tool.front, x);
-  }
-  Gap nearest{topology::tool_distance(tool.shape, pose, x), topology::tool_normal(tool.shape, pose, x)};
-  if (const auto* instrument = std::get_if<topology::Laparoscope>(&tool.shape);
-      instrument != nullptr && along < 3 * instrument->tip_radius) {
-    Gap tip = ball_gap(pose.point + instrument->tip_radius * pose.axis, instrument->tip_radius, tool.front, x);
-    return tip.distance <= nearest.distance ? tip : nearest;
-  }
-  return nearest;
-}
-
 int size_of(const ContactPatch& patch) {
   return static_cast<int>(patch.nodes.size());
-}
-
-/// The tool with its front: against the surface about the tip, so that an oblique instrument presses as a ball does.
-PressingTool pressing(const ContactPatch& patch, const topology::ToolShape& shape, const topology::ToolPose& pose) {
-  const double reach = 2 * topology::tip_radius(shape);
-  const Vector3 centre = pose.point + topology::tip_radius(shape) * pose.axis;
-  Vector3 outward = Vector3::Zero();
-  for (int c = 0; c < size_of(patch); ++c)
-    outward += std::max(0.0, 1 - (patch.rest[c] - centre).squaredNorm() / (reach * reach)) * patch.normals[c];
-  const double length = outward.norm();
-  return {shape, pose, length > 0 ? Vector3(-outward / length) : Vector3(-pose.axis)};
 }
 
 VectorX displacement_of(const ContactPatch& patch, const std::vector<Vector3>& forces) {
@@ -295,13 +230,13 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
       at.axis = (from.axis + t * (pose.axis - from.axis)).normalized();
     }
     if (options.condition == ContactCondition::frictionless)
-      press_frictionless(patch, pressing(patch, tool, at), options, state);
+      press_frictionless(patch, pressing(tool, at, patch.rest, patch.normals), options, state);
     else
-      press_bonded(patch, pressing(patch, tool, at), options, state);
+      press_bonded(patch, pressing(tool, at, patch.rest, patch.normals), options, state);
     state.pose = at;
   }
   state.largest_penetration = 0;
-  const PressingTool pressed = pressing(patch, tool, pose);
+  const PressingTool pressed = pressing(tool, pose, patch.rest, patch.normals);
   for (int c = 0; c < size_of(patch); ++c)
     state.largest_penetration =
         std::max(state.largest_penetration,

@@ -133,25 +133,6 @@ class SetSearch {
   int patience_ = 8;
 };
 
-/// The tool's patch on the body whose closed pairs are held together.
-ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const std::vector<char>& closed) {
-  ContactPatch held;
-  held.nodes = patch.nodes;
-  held.rest = patch.rest;
-  held.spacings = patch.spacings;
-  held.normals = patch.normals;
-  held.compliance = patch.compliance;
-  held.base_displacement = patch.base_displacement;
-  const std::vector<int> a = closed_entries(closed, lips.modes);
-  if (a.empty())
-    return held;
-  const Eigen::PartialPivLU<MatrixX> lu(gathered(lips.compliance, a, a));
-  const MatrixX reach = gathered(lips.tool_of_lips, all_of_size(lips.tool_of_lips.rows()), a);
-  held.compliance -= reach * lu.solve(gathered(lips.lips_of_tool, a, all_of_size(lips.lips_of_tool.cols())));
-  held.base_displacement -= reach * lu.solve(gathered(lips.base_opening, a));
-  return held;
-}
-
 VectorX stacked(const std::vector<Vector3>& forces) {
   VectorX result(3 * std::ssize(forces));
   for (Eigen::Index c = 0; c < std::ssize(forces); ++c)
@@ -183,6 +164,24 @@ CutContactState settle(const ContactPatch& patch, const LipPatch& lips, double t
 }
 
 } // namespace
+
+ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const std::vector<char>& closed) {
+  ContactPatch held;
+  held.nodes = patch.nodes;
+  held.rest = patch.rest;
+  held.spacings = patch.spacings;
+  held.normals = patch.normals;
+  held.compliance = patch.compliance;
+  held.base_displacement = patch.base_displacement;
+  const std::vector<int> a = closed_entries(closed, lips.modes);
+  if (a.empty())
+    return held;
+  const Eigen::PartialPivLU<MatrixX> lu(gathered(lips.compliance, a, a));
+  const MatrixX reach = gathered(lips.tool_of_lips, all_of_size(lips.tool_of_lips.rows()), a);
+  held.compliance -= reach * lu.solve(gathered(lips.lips_of_tool, a, all_of_size(lips.lips_of_tool.cols())));
+  held.base_displacement -= reach * lu.solve(gathered(lips.base_opening, a));
+  return held;
+}
 
 std::string_view to_string(LipCondition condition) {
   switch (condition) {

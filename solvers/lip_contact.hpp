@@ -71,6 +71,10 @@ CutContactState press(const ContactPatch& patch, const LipPatch& lips, const top
                       const topology::ToolPose& pose, const ContactOptions& options = {},
                       const CutContactState* previous = nullptr);
 
+/// The tool's patch on the body whose closed pairs are held together, without its fields: what the tool feels while no
+/// lip opens or closes.
+ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const std::vector<char>& closed);
+
 /// Prescribed displacements of the tool's candidates with the lips in contact.
 CutContactState prescribe(const ContactPatch& patch, const LipPatch& lips, const std::vector<Vector3>& displacements,
                           double tolerance = 1e-9);

@@ -144,6 +144,16 @@ StepResult Session::step(const StepSample& sample) {
   return result;
 }
 
+void Session::prepare(const StepSample& sample) {
+  if ((!touch_ && !cuts()) || model_.body != nullptr)
+    return;
+  if (sample.tool)
+    last_contact_ = find_contact(*sample.tool);
+  build(model_);
+  if (touch_ && model_.patch.nodes.empty())
+    condense(candidates(model_), model_);
+}
+
 // A bonded contact stays with its nodes, so its zone stays too.
 bool Session::must_follow(const topology::SurfaceContact& contact) const {
   if (scenario_.contact.condition == solvers::ContactCondition::bonded || contact.depth <= 0)

@@ -53,6 +53,10 @@ class Session {
   /// everything as it was, and says why in the result and once in warnings(). Throws NumericalError.
   StepResult step(const StepSample& sample);
 
+  /// Builds the body and condenses it onto the tool's candidates before the first touch, so that the first step in
+  /// contact need not. `sample`: where the tool is. Does nothing when nothing ever touches or cuts.
+  void prepare(const StepSample& sample);
+
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const Organ& organ() const { return organ_; }
   [[nodiscard]] const solvers::Sprinkling& sprinkling() const { return model_.sprinkling; }
@@ -61,6 +65,8 @@ class Session {
   [[nodiscard]] const solvers::Discretisation* body() const { return model_.body.get(); }
   /// Solution of the last step.
   [[nodiscard]] const solvers::Field& field() const { return model_.field; }
+  /// Body, condensed patch and contact of the last step, for the haptic loop.
+  [[nodiscard]] const BodyModel& model() const { return model_; }
   /// The cut so far; null: none.
   [[nodiscard]] const topology::Incision* incision() const { return model_.incision.get(); }
   /// The surface with the cut so far; in a scenario without cuts it is not made.

@@ -1,0 +1,58 @@
+// What the simulation thread hands to the haptic thread after a solve: the contact condensed onto the candidate nodes
+// under the tool, from which the force at another pose of the tool follows without the body.
+#pragma once
+
+#include "solvers/contact_solver.hpp"
+#include "topology/contact.hpp"
+
+#include <cstdint>
+
+namespace spherecut::app {
+
+/// Candidates of a snapshot. Of a larger patch those nearest to the contact are handed over.
+inline constexpr int most_candidates = 128;
+
+/// u = base + compliance * f over the candidates, and the state of the solve. Closed lips are held: their compliance is
+/// already taken out. Every array is allocated once, for most_candidates; only the first `count` entries count. With
+/// the method `collocation` the compliance is not symmetric; what is handed over is its symmetric part (see
+/// `asymmetry`), because a symmetric compliance derives from a potential, so that no closed loop of the tool at
+/// constant contact can give energy to the hand.
+struct ContactSnapshot {
+  ContactSnapshot();
+
+  std::uint64_t sequence = 0;       // 1, 2, ...: number of the solve; 0: none yet
+  std::uint64_t pose_tick = 0;      // tick of the device pose that was solved
+  double time = 0;                  // s, of that tick
+  topology::ToolPose pose;          // of the tool in the solve
+  Vector3 force = Vector3::Zero();  // N, of the body on the tool, of the solve as it is
+  topology::SurfaceContact contact; // deepest point on the surface at rest
+  solvers::ContactCondition condition = solvers::ContactCondition::frictionless;
+
+  int count = 0;                     // candidates; 0: the tool is far
+  std::vector<Vector3> rest;         // m
+  std::vector<Vector3> normals;      // outward, of the surface at rest
+  std::vector<Vector3> base;         // m, displacement without tool
+  std::vector<Vector3> displacement; // m, in the solve
+  std::vector<Vector3> forces;       // N on the body, in the solve
+  std::vector<Vector3> bond;         // m, bonded: displacement of an active node that moves with the tool
+  std::vector<char> active;          // in contact
+  std::vector<double> compliance;    // m/N, column-major 3 count x 3 count
+  double asymmetry = 0;              // |C - C^T| / |C + C^T| of the compliance before it was made symmetric
+  double reach = 0;                  // m, of the candidates about the contact's point
+
+  bool resprinkled = false; // the nodes have followed the tool since the last snapshot
+  int cut_triangles = 0;    // added to the cut since the last snapshot
+  int degradation = 0;      // level of coarsening (see simulation.hpp)
+  int nodes = 0;            // of the body
+  double solve_seconds = 0; // wall clock, from pose to snapshot
+};
+
+/// Copies the state of a patch; `candidates` beyond most_candidates are left out, those farthest from the contact
+/// first. Allocates for its own work, but never inside the snapshot.
+void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state,
+          const topology::SurfaceContact& contact, solvers::ContactCondition condition, ContactSnapshot& snapshot);
+
+/// No candidates: the tool is far.
+void clear(ContactSnapshot& snapshot);
+
+} // namespace spherecut::app

@@ -1,0 +1,99 @@
+// What the hand holds: pose in, force out, once a tick of the haptic loop. The loop knows devices by this interface
+// alone: a scripted path, a simulated hand, a recording, a bridge to hardware.
+//
+// Chosen here: a device gives the pose of the tool's reference point (or of the blade's frame) already in the
+// scenario's frame and in metres; forces alone go back, no torques, as on the usual three-motor devices; and a device
+// has no clock, it is asked once a tick and answers with the newest it has.
+#pragma once
+
+#include "src/schedule.hpp"
+
+#include <Eigen/Geometry>
+#include <cstdint>
+
+namespace spherecut::app {
+
+/// Where a device is at a tick of the haptic loop.
+struct DeviceState {
+  std::uint64_t tick = 0;             // of the loop
+  double time = 0;                    // s, tick / rate of the loop
+  Vector3 position = Vector3::Zero(); // m, reference point of the tool, origin of the blade's frame
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity(); // turns +z into the tool's axis; the blade's frame
+  bool connected = true; // false: nobody answers; the loop brings the force to zero
+};
+
+class Device {
+ public:
+  virtual ~Device() = default;
+  /// The pose at this tick. Called once a tick, ticks rising by one, from the haptic thread alone: neither allocates,
+  /// locks nor waits.
+  virtual DeviceState read(std::uint64_t tick) noexcept = 0;
+  /// Force on the hand, N, until the next call. Called once a tick after read(), under the same conditions.
+  virtual void apply(const Vector3& force) noexcept = 0;
+};
+
+/// A pose at a time of a path.
+struct PathPose {
+  double time = 0; // s
+  Vector3 position = Vector3::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+};
+
+/// Pose on a path at a time: straight and evenly turned between poses, at rest before the first and after the last.
+/// Allocates nothing.
+PathPose path_pose(const std::vector<PathPose>& path, double time) noexcept;
+
+/// The way of the tool through the moments of a run, or of the blade when there is no tool. Throws InputError when
+/// there is neither.
+std::vector<PathPose> driven_path(const std::vector<StepSample>& steps);
+
+/// Follows a path whatever the force: an open loop.
+class ScriptedPath : public Device {
+ public:
+  /// `rate` in ticks per second. Throws InputError unless there is a pose, times rise and the rate is positive.
+  ScriptedPath(std::vector<PathPose> path, double rate);
+  DeviceState read(std::uint64_t tick) noexcept override;
+  void apply(const Vector3& /*force*/) noexcept override {}
+
+ private:
+  std::vector<PathPose> path_;
+  double rate_;
+};
+
+/// A hand that holds the device by spring and damper, and moves their other end along a path.
+struct HandSettings {
+  double mass = 0.1;      // kg, of device and hand
+  double stiffness = 300; // N/m, towards the path
+  double damping = 5;     // N s/m, against the path's velocity
+  double resolution = 0;  // m, of the position sensor; 0: exact
+  int delay = 0;          // ticks by which a force acts late
+  bool rides_path = true; // false: stays put until pushed (the path's first pose is its target)
+};
+
+/// Mass on spring and damper: m x'' = k (path - x) + b (path' - x') + force, integrated with ten semi-implicit Euler
+/// steps a tick. The force closes the loop. Orientation follows the path.
+class SimulatedHand : public Device {
+ public:
+  /// Throws InputError when mass or rate is not positive, another setting is negative or the delay exceeds 15 ticks.
+  SimulatedHand(std::vector<PathPose> path, const HandSettings& settings, double rate);
+  DeviceState read(std::uint64_t tick) noexcept override;
+  void apply(const Vector3& force) noexcept override;
+
+  /// Where the hand is now, unquantised, m; and its velocity, m/s.
+  [[nodiscard]] const Vector3& position() const { return position_; }
+  [[nodiscard]] const Vector3& velocity() const { return velocity_; }
+  /// Work done on the loop so far, J: minus that of the acting force over the true motion.
+  [[nodiscard]] double work() const { return work_; }
+
+ private:
+  static constexpr int longest_delay = 15;
+  std::vector<PathPose> path_;
+  HandSettings settings_;
+  double rate_;
+  Vector3 position_ = Vector3::Zero(), velocity_ = Vector3::Zero();
+  std::array<Vector3, longest_delay + 1> forces_{}; // newest first
+  double work_ = 0;
+  bool started_ = false;
+};
+
+} // namespace spherecut::app
