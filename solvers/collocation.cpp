@@ -96,6 +96,7 @@ class Collocation final : public ElasticBody {
   [[nodiscard]] CellBalance cell_balance() const;
   Field solve() const override { return solve_for(loads_, 1, prescribed_values(problem_)); }
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
+  std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;
   Field prescribed_response(const std::vector<Vector3>& values) const override {
     return solve_for({}, 0, prescribed_values(problem_, values));
   }
@@ -112,6 +113,7 @@ class Collocation final : public ElasticBody {
     std::vector<double> damping;   // gamma, per face
   };
   [[nodiscard]] FaceOperators face_operators() const;
+  [[nodiscard]] std::vector<Field> responses_to(const MatrixX& right) const;
   void assemble_balance();
   /// Finds the pieces; springs hold those that nothing holds, or their unknowns are dropped.
   void treat_pieces(UnheldPieces unheld);
@@ -420,19 +422,35 @@ SparseMatrix Collocation::constrained_system() const {
   return SparseMatrix(rows);
 }
 
-std::vector<Field> Collocation::force_responses(const std::vector<int>& candidates) const {
+std::vector<Field> Collocation::responses_to(const MatrixX& right) const {
   const VectorX no_displacement = VectorX::Zero(3 * std::ssize(problem_.prescribed));
+  const MatrixX solution = factorisation_->solve(right);
+  std::vector<Field> responses;
+  responses.reserve(static_cast<std::size_t>(solution.cols()));
+  for (Eigen::Index k = 0; k < solution.cols(); ++k)
+    responses.push_back(field_of(solution.col(k), 0, no_displacement));
+  return responses;
+}
+
+std::vector<Field> Collocation::force_responses(const std::vector<int>& candidates) const {
   MatrixX right = MatrixX::Zero(report_.unknowns, 3 * std::ssize(candidates));
   for (Eigen::Index c = 0; c < std::ssize(candidates); ++c)
     for (int axis = 0; axis < 3; ++axis)
       if (!constrained_[candidates[c]][axis])
         right(stride_ * candidates[c] + axis, 3 * c + axis) = 1;
-  const MatrixX solution = factorisation_->solve(right);
-  std::vector<Field> responses;
-  responses.reserve(3 * candidates.size());
-  for (Eigen::Index k = 0; k < solution.cols(); ++k)
-    responses.push_back(field_of(solution.col(k), 0, no_displacement));
-  return responses;
+  return responses_to(right);
+}
+
+// A force at a point goes to the cells around it in the shares of the shape functions there, which keep its sum and,
+// since they reproduce linear fields, its moment.
+std::vector<Field> Collocation::pattern_responses(const std::vector<ForcePattern>& patterns) const {
+  const MatrixX loads = pattern_loads(patterns);
+  MatrixX right = MatrixX::Zero(report_.unknowns, loads.cols());
+  for (int i = 0; i < problem_.nodes.size(); ++i)
+    for (int c = 0; c < 3; ++c)
+      if (!constrained_[i][c])
+        right.row(stride_ * i + c) = loads.row(3 * i + c);
+  return responses_to(right);
 }
 
 std::vector<Vector3> Collocation::constraint_forces(const Field& field) const {

@@ -54,6 +54,14 @@ void Field::add(double factor, const Field& other) {
   prescribed += factor * other.prescribed;
 }
 
+std::vector<Field> Discretisation::pattern_responses(const std::vector<ForcePattern>&) const {
+  throw InputError(fmt::format("method {} has no forces in newtons to spread over points", to_string(method())));
+}
+
+MatrixX Discretisation::pattern_displacements(const std::vector<ForcePattern>&, const std::vector<Field>&) const {
+  throw InputError(fmt::format("method {} has no forces in newtons to spread over points", to_string(method())));
+}
+
 std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options) {
   switch (options.method) {
   case Method::collocation:

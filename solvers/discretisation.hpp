@@ -114,6 +114,13 @@ struct PointState {
   Matrix3 stress = Matrix3::Zero(); // Pa
 };
 
+/// A force that is spread over points inside the body: at amplitude 1 `forces` (N) act on `points` (m). Conjugate to
+/// the amplitude is the displacement sum of forces . u(points), N m.
+struct ForcePattern {
+  std::vector<Vector3> points;
+  std::vector<Vector3> forces;
+};
+
 class Discretisation {
  public:
   virtual ~Discretisation() = default;
@@ -127,6 +134,13 @@ class Discretisation {
   /// Response to unit forces (N) on nodes: field k = 3 c + a is the solution under a unit force along axis a on node
   /// candidates[c], with homogeneous loads and prescribed displacements.
   [[nodiscard]] virtual std::vector<Field> force_responses(const std::vector<int>& candidates) const = 0;
+
+  /// Response to every pattern at amplitude 1, with homogeneous loads and prescribed displacements. Throws InputError
+  /// where the method has no forces in newtons (`published`) and NumericalError at a point without a sound support.
+  [[nodiscard]] virtual std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const;
+  /// Displacement conjugate to every pattern, rows, under every field, columns, N m. Throws as pattern_responses.
+  [[nodiscard]] virtual MatrixX pattern_displacements(const std::vector<ForcePattern>& patterns,
+                                                      const std::vector<Field>& fields) const;
 
   /// Response to prescribed displacements `values` (one per entry of problem().prescribed), with zero loads.
   [[nodiscard]] virtual Field prescribed_response(const std::vector<Vector3>& values) const = 0;

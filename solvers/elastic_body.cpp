@@ -127,6 +127,31 @@ MatrixX ElasticBody::contact_displacements(const std::vector<int>& nodes, const 
   return displacements;
 }
 
+MatrixX ElasticBody::pattern_loads(const std::vector<ForcePattern>& patterns) const {
+  MatrixX loads = MatrixX::Zero(3 * static_cast<Eigen::Index>(problem_.nodes.size()), std::ssize(patterns));
+  ShapeFunctions shape;
+  for (std::size_t p = 0; p < patterns.size(); ++p)
+    for (std::size_t q = 0; q < patterns[p].points.size(); ++q) {
+      const Vector3& x = patterns[p].points[q];
+      if (!evaluate(spheres_, x, shape))
+        throw NumericalError(
+            fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+      for (int k = 0; k < shape.size(); ++k)
+        loads.col(static_cast<Eigen::Index>(p)).segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) +=
+            shape.value[k] * patterns[p].forces[q];
+    }
+  return loads;
+}
+
+MatrixX ElasticBody::pattern_displacements(const std::vector<ForcePattern>& patterns,
+                                           const std::vector<Field>& fields) const {
+  const MatrixX loads = pattern_loads(patterns);
+  MatrixX displacements(std::ssize(patterns), std::ssize(fields));
+  for (std::size_t f = 0; f < fields.size(); ++f)
+    displacements.col(static_cast<Eigen::Index>(f)) = loads.transpose() * fields[f].coefficients;
+  return displacements;
+}
+
 PointState ElasticBody::at(const Vector3& x, const Field& field) const {
   thread_local ShapeFunctions shape;
   if (!evaluate(spheres_, x, shape))

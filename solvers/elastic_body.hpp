@@ -46,10 +46,14 @@ class ElasticBody : public Discretisation {
   [[nodiscard]] Vector3 contact_point(int node) const override { return problem_.nodes.positions[node]; }
   [[nodiscard]] MatrixX contact_displacements(const std::vector<int>& nodes,
                                               const std::vector<Field>& fields) const override;
+  [[nodiscard]] MatrixX pattern_displacements(const std::vector<ForcePattern>& patterns,
+                                              const std::vector<Field>& fields) const override;
 
  protected:
   /// Spheres at the front of a cut are larger by `front_radius_factor`.
   ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor = 1);
+  /// Force of each pattern on each node's coefficients, sum of h_j(x) f over its points: 3N rows, a column a pattern.
+  [[nodiscard]] MatrixX pattern_loads(const std::vector<ForcePattern>& patterns) const;
   Problem problem_;
   AssemblyReport report_;
   Spheres spheres_;

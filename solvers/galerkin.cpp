@@ -70,13 +70,11 @@ class Galerkin final : public ElasticBody {
     for (std::size_t c = 0; c < candidates.size(); ++c)
       for (int axis = 0; axis < 3; ++axis)
         add_force(contact_mean(candidates[c]), Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
-    const MatrixX solution = solve_ordered(right);
-    const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
-    std::vector<Field> responses;
-    responses.reserve(static_cast<std::size_t>(solution.cols()));
-    for (Eigen::Index k = 0; k < solution.cols(); ++k)
-      responses.push_back(field_of(solution.col(k), 0, no_displacement));
-    return responses;
+    return fields_of(solve_ordered(right));
+  }
+
+  std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override {
+    return fields_of(solve_ordered(pattern_loads(patterns)));
   }
 
   Field prescribed_response(const std::vector<Vector3>& values) const override {
@@ -183,6 +181,16 @@ class Galerkin final : public ElasticBody {
     Field field{coefficients, {}, load_factor, prescribed};
     require_finite(field, report_);
     return field;
+  }
+
+  /// Columns as responses without loads and prescribed displacements.
+  [[nodiscard]] std::vector<Field> fields_of(const MatrixX& solution) const {
+    const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
+    std::vector<Field> responses;
+    responses.reserve(static_cast<std::size_t>(solution.cols()));
+    for (Eigen::Index k = 0; k < solution.cols(); ++k)
+      responses.push_back(field_of(solution.col(k), 0, no_displacement));
+    return responses;
   }
 
   BackgroundCells cells_;
