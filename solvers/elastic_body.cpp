@@ -89,10 +89,17 @@ Matrix3 initial_stress(const Problem& problem) {
                               0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose()));
 }
 
+Sight sight_about_cut(const Problem& problem, SightRule rule, double front_radius_factor) {
+  Sight sight{.incision = problem.incision, .rule = rule, .radius_factor = front_radius_factor};
+  if (problem.material.poisson_ratio >= 0.45)
+    sight.reach = 2.5;
+  return sight;
+}
+
 ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor)
     : problem_(checked(std::move(problem))),
       spheres_(problem_.nodes.positions, problem_.nodes.spacings, rho, Basis::linear, worst_moment_condition,
-               {.incision = problem_.incision, .rule = rule, .radius_factor = front_radius_factor}) {
+               sight_about_cut(problem_, rule, front_radius_factor)) {
   const Stopwatch watch;
   supports_ = nodal_supports(spheres_);
   report_.nodes = problem_.nodes.size();

@@ -35,6 +35,12 @@ Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient);
 /// sigma = C strain - initial_stress, Pa.
 Matrix3 initial_stress(const Problem& problem);
 
+/// How the spheres of both discretisations reach around the cut of a problem. Near incompressibility the enrichment
+/// reaches farther, as the supports of the weak form do: at nu = 0.49 a reach of 1.75 spacings leaves 3.0 % of a
+/// penny's volume and 7.6 % of its K wrong, one of 2.5 leaves 1.0 and 2.3 %; at nu = 0.3 the shorter one is as right (K
+/// of a straight crack in mode II 0.3 against 1.6 %) and an increment of a cut changes less than half as much.
+Sight sight_about_cut(const Problem& problem, SightRule rule, double front_radius_factor = 1);
+
 /// Shared part of the two finite-sphere discretisations.
 class ElasticBody : public Discretisation {
  public:

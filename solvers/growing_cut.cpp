@@ -181,10 +181,11 @@ struct GrowingCut::State {
   [[nodiscard]] BackgroundOptions background() const { return {options.method.cell_size, options.method.quadrature}; }
   [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
     return std::make_unique<Spheres>(problem.nodes.positions, problem.nodes.spacings, rho, Basis::linear,
-                                     worst_moment_condition, Sight{problem.incision, options.method.sight}, removed);
+                                     worst_moment_condition, sight_about_cut(problem, options.method.sight), removed);
   }
   [[nodiscard]] double enrichment_reach() const {
-    return options.method.sight == SightRule::enriched ? Sight{}.reach / rho : 0; // in sphere radii
+    return options.method.sight == SightRule::enriched ? sight_about_cut(problem, options.method.sight).reach / rho
+                                                       : 0; // in sphere radii
   }
   /// Largest sphere about a point, m.
   [[nodiscard]] double radius_at(const Vector3& x) const {
@@ -526,7 +527,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   const std::vector<double> old_radii = s.spheres->radii();
   const auto fresh_spheres =
       std::make_unique<Spheres>(next.nodes.positions, next.nodes.spacings, s.rho, Basis::linear, worst_moment_condition,
-                                Sight{incision, s.options.method.sight}, removed);
+                                sight_about_cut(next, s.options.method.sight), removed);
   std::vector<int> changed_nodes = change.removed;
   for (int i = 0; i < next.nodes.size(); ++i)
     if (i >= std::ssize(old_radii) || (removed[i] == 0 && old_radii[i] != fresh_spheres->radii()[i]))

@@ -76,10 +76,10 @@ TEST_CASE("Near the front the enriched basis reproduces the crack field", "[cut_
   ShapeFunctions shape;
   int tried = 0;
   double worst = 0, worst_gradient = 0;
-  for (int trial = 0; trial < 4000; ++trial) {
+  for (int trial = 0; trial < 12000; ++trial) {
     const Vector3 x = random_point(random, 0.45);
     const double r = front_distance(frame, x);
-    if (r > 0.65 * 4 / 8.0 || r < 1e-3)
+    if (r > 0.95 * Sight{}.blend * Sight{}.reach / 8.0 || r < 1e-3)
       continue;
     ++tried;
     REQUIRE(evaluate(spheres, x, shape));
