@@ -38,6 +38,8 @@ const std::vector<Experiment>& all_experiments() {
       {"precut_edge", "stress intensity of an edge-notched strip", run_precut_edge},
       {"precut_beam", "compliance of a double cantilever", run_precut_beam},
       {"sever", "a body cut in two: no coupling, rigid motions", run_sever},
+      {"extrapolation", "the force between solves: held, extrapolated in time, and by the condensed contact",
+       run_extrapolation},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
   };
   return experiments;

@@ -154,6 +154,14 @@ void Session::prepare(const StepSample& sample) {
     condense(candidates(model_), model_);
 }
 
+void Session::coarsen(double factor) {
+  if (!(factor > 0) || !std::isfinite(factor))
+    throw InputError(fmt::format("spacings {:g} times those of the scenario; allowed: above 0", factor));
+  zone_.spacing.fine *= factor / coarseness_;
+  zone_.spacing.coarse *= factor / coarseness_;
+  coarseness_ = factor;
+}
+
 // A bonded contact stays with its nodes, so its zone stays too.
 bool Session::must_follow(const topology::SurfaceContact& contact) const {
   if (scenario_.contact.condition == solvers::ContactCondition::bonded || contact.depth <= 0)
@@ -224,8 +232,8 @@ bool Session::tool_in_reach() const {
   if (!touch_ || !last_contact_)
     return false;
   double moved = 0;
-  for (const solvers::PointState& state : node_states_)
-    moved = std::max(moved, state.displacement.norm());
+  for (Eigen::Index i = 0; i + 2 < node_displacements_.size(); i += 3)
+    moved = std::max(moved, node_displacements_.segment<3>(i).norm());
   return last_contact_->depth > -(2 * moved + zone_.spacing.radius + topology::tip_radius(scenario_.tool->shape));
 }
 
@@ -277,9 +285,15 @@ std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pos
     known[node] = 1;
   for (const solvers::Prescribed& entry : model.body->problem().prescribed)
     known[entry.node] = 1;
+  // A share of the surface moves about as its node does: the mean over it is looked at near the tool alone.
+  const VectorX displacements = model.body->nodal_displacements(model.field);
+  const auto near = [&](int i) {
+    return topology::tool_distance(scenario_.tool->shape, pose, nodes.positions[i] + displacements.segment<3>(3 * i)) <
+           zone_.spacing.fine;
+  };
   std::vector<int> missed;
   for (int i = 0; i < nodes.size(); ++i)
-    if (on_surface(nodes.kinds[i]) && known[i] == 0 &&
+    if (on_surface(nodes.kinds[i]) && known[i] == 0 && near(i) &&
         topology::tool_distance(scenario_.tool->shape, pose,
                                 model.body->contact_point(i) + model.body->contact_displacement(i, model.field)) <
             -patch_gap * zone_.spacing.fine)
@@ -430,12 +444,24 @@ void Session::evaluate(StepResult& result) {
   result.iterations = tool.iterations;
   result.converged = tool.converged;
   result.largest_penetration = tool.largest_penetration;
-  result.residual = residual(model_);
+  node_displacements_ = model_.body->nodal_displacements(model_.field);
+  if (!force_only_)
+    result.residual = residual(model_);
   if (!result.force.allFinite())
     throw NumericalError(fmt::format("the tool force at t = {:g} s is not finite; residual {:.1e}, condition estimate "
                                      "{:.1e}",
                                      result.time, result.residual, model_.body->report().condition_estimate));
   node_states_.clear();
+  if (!force_only_)
+    evaluate_nodes(result);
+  if (!result.converged)
+    warn("contact", fmt::format("the contact did not converge at t = {:g} s: {:.2g} m of penetration left", result.time,
+                                result.largest_penetration));
+  if (!model_.state->lips.converged)
+    warn("lips", fmt::format("the contact of the lips did not converge at t = {:g} s", result.time));
+}
+
+void Session::evaluate_nodes(StepResult& result) {
   for (const Vector3& x : model_.sprinkling.nodes.positions) {
     node_states_.push_back(model_.body->at(x, model_.field));
     const Matrix3& gradient = node_states_.back().gradient;
@@ -448,11 +474,6 @@ void Session::evaluate(StepResult& result) {
          fmt::format("tissue rotates by {:.0f} degrees at t = {:g} s (over {:g}): linear elasticity is being "
                      "stretched",
                      result.rotation_degrees, result.time, stretched_rotation));
-  if (!result.converged)
-    warn("contact", fmt::format("the contact did not converge at t = {:g} s: {:.2g} m of penetration left", result.time,
-                                result.largest_penetration));
-  if (!model_.state->lips.converged)
-    warn("lips", fmt::format("the contact of the lips did not converge at t = {:g} s", result.time));
 }
 
 void Session::warn(const std::string& key, const std::string& text) {

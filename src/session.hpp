@@ -65,6 +65,13 @@ class Session {
   [[nodiscard]] const solvers::Discretisation* body() const { return model_.body.get(); }
   /// Solution of the last step.
   [[nodiscard]] const solvers::Field& field() const { return model_.field; }
+  /// On: steps find contact and force alone and leave out what only output needs, node_states() and the residual; the
+  /// rotation of the tissue is then not watched.
+  void set_force_only(bool on) { force_only_ = on; }
+
+  /// Spacings `factor` times the scenario's from the next sprinkling on. Throws InputError unless it is positive.
+  void coarsen(double factor);
+
   /// Body, condensed patch and contact of the last step, for the haptic loop.
   [[nodiscard]] const BodyModel& model() const { return model_; }
   /// The cut so far; null: none.
@@ -100,6 +107,7 @@ class Session {
   void check_pieces(double time);
   void report_cut(CutReport& report) const;
   void evaluate(StepResult& result);
+  void evaluate_nodes(StepResult& result);
   void warn(const std::string& key, const std::string& text);
 
   Scenario scenario_;
@@ -109,12 +117,15 @@ class Session {
   topology::ContactQuery query_;
   std::optional<FirstTouch> touch_;
   FineZone zone_;
+  double coarseness_ = 1; // of the spacings in zone_
   std::vector<StepSample> steps_;
   std::optional<topology::SurfaceContact> zone_contact_; // centre of the fine zone; empty: no tool touches
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
   BodyModel model_;
   std::optional<topology::SurfaceContact> last_contact_;
   std::vector<solvers::PointState> node_states_;
+  VectorX node_displacements_; // m, 3 a node, in the last step
+  bool force_only_ = false;
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;
 };

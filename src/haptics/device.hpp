@@ -6,6 +6,7 @@
 // has no clock, it is asked once a tick and answers with the newest it has.
 #pragma once
 
+#include "src/haptics/haptic_settings.hpp"
 #include "src/schedule.hpp"
 
 #include <Eigen/Geometry>
@@ -58,16 +59,6 @@ class ScriptedPath : public Device {
  private:
   std::vector<PathPose> path_;
   double rate_;
-};
-
-/// A hand that holds the device by spring and damper, and moves their other end along a path.
-struct HandSettings {
-  double mass = 0.1;      // kg, of device and hand
-  double stiffness = 300; // N/m, towards the path
-  double damping = 5;     // N s/m, against the path's velocity
-  double resolution = 0;  // m, of the position sensor; 0: exact
-  int delay = 0;          // ticks by which a force acts late
-  bool rides_path = true; // false: stays put until pushed (the path's first pose is its target)
 };
 
 /// Mass on spring and damper: m x'' = k (path - x) + b (path' - x') + force, integrated with ten semi-implicit Euler

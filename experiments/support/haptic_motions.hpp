@@ -1,0 +1,34 @@
+// Motions of a ball on a block, and the errors of the force models on them: ground of the haptic experiments.
+#pragma once
+
+#include "src/haptics/virtual_loop.hpp"
+
+#include <string>
+#include <vector>
+
+namespace spherecut::experiments {
+
+/// A motion of the tool, with or without a blade that cuts beside it.
+struct HapticMotion {
+  std::string name;
+  double duration = 1;             // s
+  std::vector<app::PathPose> path; // of the ball's lowest point
+  bool cut = false;
+};
+
+/// press: 4 mm deep in 0.4 s and out. tap: three times in and out of contact at 0.1 m/s. slide: 3 mm deep, 16 mm along
+/// the surface at up to 50 mm/s. sine: 1 to 5 Hz about 3 mm of depth, up to 0.1 m/s. cut: 2 Hz about 2.5 mm of depth
+/// while a blade cuts past the ball at 10 mm/s.
+std::vector<HapticMotion> haptic_motions();
+
+/// A ball of 10 mm radius on a block of 60 x 60 x 30 mm with E = 10 kPa on its base, about 300 nodes; nu = 0.3.
+app::Scenario haptic_block(const HapticMotion& motion, solvers::Method method);
+
+/// Error of the recorded tissue force against the solved one over the ticks in contact, N.
+struct ForceError {
+  double rms = 0, largest = 0; // N
+  double peak = 0;             // N, of the solved force
+};
+ForceError force_error(const std::vector<app::TickRecord>& ticks, const std::vector<app::SolvedForce>& solved);
+
+} // namespace spherecut::experiments

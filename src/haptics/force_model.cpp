@@ -1,0 +1,82 @@
+#include "src/haptics/force_model.hpp"
+
+#include "src/haptics/tangent_model.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+class HoldModel : public ForceModel {
+ public:
+  void solved(const ContactSnapshot& snapshot) noexcept override { force_ = snapshot.force; }
+  ModelForce at(const topology::ToolPose& /*pose*/, double /*time*/) noexcept override {
+    ModelForce result;
+    result.force = force_;
+    return result;
+  }
+
+ private:
+  Vector3 force_ = Vector3::Zero();
+};
+
+/// Goes on along the line for three intervals between solves at most, so that a solve that does not come does not drive
+/// the force away.
+class LinearInTimeModel : public ForceModel {
+ public:
+  void solved(const ContactSnapshot& snapshot) noexcept override {
+    const double interval = snapshot.time - time_;
+    slope_ = solves_ > 0 && interval > 0 ? Vector3((snapshot.force - force_) / interval) : Vector3(Vector3::Zero());
+    longest_ = 3 * interval;
+    force_ = snapshot.force;
+    time_ = snapshot.time;
+    ++solves_;
+  }
+  ModelForce at(const topology::ToolPose& /*pose*/, double time) noexcept override {
+    ModelForce result;
+    result.force = force_ + std::clamp(time - time_, 0.0, longest_) * slope_;
+    return result;
+  }
+
+ private:
+  Vector3 force_ = Vector3::Zero(), slope_ = Vector3::Zero();
+  double time_ = 0, longest_ = 0;
+  long solves_ = 0;
+};
+
+} // namespace
+
+std::string_view to_string(ForceModelKind kind) {
+  switch (kind) {
+  case ForceModelKind::hold:
+    return "hold";
+  case ForceModelKind::linear_in_time:
+    return "linear_in_time";
+  case ForceModelKind::tangent:
+    return "tangent";
+  }
+  return "unknown";
+}
+
+ForceModelKind force_model_from_string(std::string_view name) {
+  for (const ForceModelKind kind : {ForceModelKind::hold, ForceModelKind::linear_in_time, ForceModelKind::tangent})
+    if (name == to_string(kind))
+      return kind;
+  throw InputError(fmt::format("force model '{}' does not exist; there are: hold, linear_in_time, tangent", name));
+}
+
+std::unique_ptr<ForceModel> make_force_model(ForceModelKind kind, const topology::ToolShape& tool) {
+  switch (kind) {
+  case ForceModelKind::hold:
+    return std::make_unique<HoldModel>();
+  case ForceModelKind::linear_in_time:
+    return std::make_unique<LinearInTimeModel>();
+  case ForceModelKind::tangent:
+    break;
+  }
+  return std::make_unique<TangentModel>(tool);
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,34 @@
+// The force between two solves. A model is told of every solve and asked for the force at the tool's pose once a tick,
+// by the haptic thread alone: nothing here allocates, locks, waits or throws after construction.
+#pragma once
+
+#include "src/haptics/contact_snapshot.hpp"
+#include "src/haptics/haptic_settings.hpp"
+
+#include <memory>
+#include <optional>
+
+namespace spherecut::app {
+
+struct ModelForce {
+  Vector3 force = Vector3::Zero(); // N, of the body on the tool
+  std::optional<double> stored{};  // J, elastic energy behind the force; empty: the model knows of none
+  int active = 0;                  // nodes in contact
+  int rounds = 0;                  // linearisations of the tool's surface
+  bool converged = true;
+  double sinking = 0; // m, deepest candidate inside the tool
+};
+
+class ForceModel {
+ public:
+  virtual ~ForceModel() = default;
+  /// A new solve; the snapshot stays what it is until the next call.
+  virtual void solved(const ContactSnapshot& snapshot) noexcept = 0;
+  /// Force with the tool at `pose` at `time` (s); zero before the first solve.
+  virtual ModelForce at(const topology::ToolPose& pose, double time) noexcept = 0;
+};
+
+/// A model for the tool of a scenario. The shape must outlive it.
+std::unique_ptr<ForceModel> make_force_model(ForceModelKind kind, const topology::ToolShape& tool);
+
+} // namespace spherecut::app

@@ -1,0 +1,67 @@
+// One tick of the haptic loop as a function of what has been, without a clock: pose in, force out. The threads' shell
+// (realtime_loop.hpp) and the loop in virtual time (virtual_loop.hpp) both run it, so a recorded session replays bit by
+// bit.
+#pragma once
+
+#include "src/haptics/device.hpp"
+#include "src/haptics/force_model.hpp"
+#include "src/haptics/passivity.hpp"
+
+namespace spherecut::app {
+
+/// Pose of a tool that a device holds; an instrument's axis points to its port.
+topology::ToolPose tool_pose(const topology::ToolShape& tool, const DeviceState& device) noexcept;
+
+/// What a tick gives.
+struct TickResult {
+  Vector3 force = Vector3::Zero();  // N, on the hand
+  ModelForce model;                 // before hand-over, gain and limits
+  Vector3 tissue = Vector3::Zero(); // N, model and hand-over: what the tissue is said to do to the tool
+  topology::SurfaceContact contact; // deepest point on the surface at rest
+  std::uint64_t sequence = 0;       // of the snapshot in use
+  double energy = 0;                // J, put in by the hand so far
+  bool limited = false;             // by saturation or slew
+  bool outside = false;             // the contact has left the candidates of the snapshot
+};
+
+/// Neither allocates, locks, waits nor throws after construction. A tick with a new snapshot is
+///   leave(state); (take the snapshot over, the old one may go) arrive(snapshot); tick(state);
+/// any other is tick(state).
+///
+/// At a new snapshot the force goes on from where the old one had it: the difference of the two at the tool's pose is
+/// added and fades linearly within HapticSettings::hand_over. When the contact leaves the candidates, the patch is
+/// taken along with the tool: the model is asked as if the tool were still at their rim. A device that does not answer
+/// brings the force to zero at the slew limit.
+class HapticTick {
+ public:
+  /// `organ` follows the contact on the surface at rest; null: not followed. Tool and organ must outlive this.
+  HapticTick(const HapticSettings& settings, const topology::ToolShape& tool, const topology::ContactQuery* organ);
+
+  /// Where the walk over the surface starts; before the first tick.
+  void start(const DeviceState& device);
+  void leave(const DeviceState& device) noexcept;
+  void arrive(const ContactSnapshot& snapshot) noexcept;
+  TickResult tick(const DeviceState& device) noexcept;
+
+  [[nodiscard]] const PassivityControl& passivity() const { return passivity_; }
+
+ private:
+  [[nodiscard]] ModelForce ask(const DeviceState& device, bool& outside) noexcept;
+  void locate(const DeviceState& device) noexcept;
+
+  HapticSettings settings_;
+  const topology::ToolShape& tool_;
+  const topology::ContactQuery* organ_;
+  std::unique_ptr<ForceModel> model_;
+  PassivityControl passivity_;
+  const ContactSnapshot* snapshot_ = nullptr;
+  topology::SurfaceContact contact_;
+  std::uint64_t located_ = 0;            // tick after which contact_ was found, plus one; 0: never
+  bool arrived_ = false;                 // a snapshot has come since the last tick
+  Vector3 before_ = Vector3::Zero();     // N, by the model that was left
+  Vector3 difference_ = Vector3::Zero(); // N, still to fade
+  Vector3 fading_ = Vector3::Zero();     // N, per tick
+  Vector3 sent_ = Vector3::Zero();
+};
+
+} // namespace spherecut::app

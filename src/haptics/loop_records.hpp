@@ -1,0 +1,54 @@
+// What a haptic session leaves behind: every tick and every solve, enough to replay it.
+#pragma once
+
+#include "src/haptics/haptic_tick.hpp"
+
+namespace spherecut::app {
+
+/// One tick.
+struct TickRecord {
+  DeviceState device;
+  Vector3 force = Vector3::Zero();  // N, on the hand
+  Vector3 tissue = Vector3::Zero(); // N, of the tissue on the tool, with hand-over, before gain, control and limits
+  Vector3 model = Vector3::Zero();  // N, of the model alone
+  double energy = 0;                // J, put in by the hand so far
+  double depth = 0;                 // m, of the contact on the surface at rest
+  double sinking = 0;               // m, of the deepest candidate inside the tool
+  std::uint64_t sequence = 0;       // of the snapshot in use
+  bool arrived = false;             // it came at this tick
+  bool limited = false, outside = false, converged = true;
+  int active = 0, rounds = 0;
+  double latency = 0; // s, from when the tick was due to when it began; 0 in virtual time
+  double compute = 0; // s of the thread's processor time; 0 in virtual time
+};
+
+/// A scheduling event: a solve that began at the pose of one tick and was taken over at another.
+struct SolveEvent {
+  static constexpr std::uint64_t never = ~std::uint64_t{0};
+  std::uint64_t sequence = 0;
+  std::uint64_t pose_tick = 0;
+  std::uint64_t arrival_tick = never; // tick that first used it; never: overtaken by a newer one, failed, or too late
+  int degradation = 0;
+};
+
+/// One solve, and what it did.
+struct SolveRecord {
+  SolveEvent event;
+  bool failed = false;
+  std::string reason; // of the failure
+  bool resprinkled = false;
+  int cut_triangles = 0, nodes = 0, candidates = 0, active = 0;
+  double asymmetry = 0;            // of the compliance
+  Vector3 force = Vector3::Zero(); // N, of the solve
+  double seconds = 0;              // wall clock
+};
+
+struct LoopRecords {
+  std::vector<TickRecord> ticks;
+  std::vector<SolveRecord> solves;
+};
+
+TickRecord record_of(const DeviceState& device, const TickResult& result, bool arrived) noexcept;
+SolveRecord record_of(const SolveEvent& event, const ContactSnapshot& snapshot);
+
+} // namespace spherecut::app

@@ -1,0 +1,62 @@
+#include "src/haptics/passivity.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double reserve = 2e-5; // J, surplus that is kept
+
+} // namespace
+
+PassivityControl::PassivityControl(const DeviceLimits& limits, double rate, bool active)
+    : limits_(limits), rate_(rate), active_(active) {
+  positions_.fill(Vector3::Zero());
+  sent_.fill(Vector3::Zero());
+  damping_forces_.fill(Vector3::Zero());
+  if (limits.delay < 0 || limits.delay > static_cast<int>(longest_delay))
+    throw InputError(fmt::format("a device that is {} ticks late; allowed: 0 to {}", limits.delay, longest_delay));
+}
+
+void PassivityControl::sent(const Vector3& force) noexcept {
+  std::copy_backward(sent_.begin(), sent_.end() - 1, sent_.end());
+  sent_[0] = force;
+}
+
+double PassivityControl::sampling_allowance() const {
+  return std::sqrt(3.0) * limits_.force * limits_.resolution;
+}
+
+Vector3 PassivityControl::control(const Vector3& position, const Vector3& wanted,
+                                  std::optional<double> stored) noexcept {
+  const double now = stored.value_or(0);
+  if (ticks_ == 0) {
+    positions_.fill(position);
+    stored_ = now;
+  }
+  const Vector3 step = position - positions_[(ticks_ + window - 1) % window];
+  const Vector3 velocity = (position - positions_[ticks_ % window]) * (rate_ / static_cast<double>(window));
+  positions_[ticks_ % window] = position;
+  ++ticks_;
+  const auto late = static_cast<std::size_t>(limits_.delay);
+  const double gained = -sent_[late].dot(step);
+  energy_ += gained;
+  lowest_ = std::min(lowest_, energy_);
+  damped_ -= damping_forces_[late].dot(step);
+  std::copy_backward(damping_forces_.begin(), damping_forces_.end() - 1, damping_forces_.end());
+  surplus_ = std::min(surplus_ + gained - (now - stored_), reserve);
+  stored_ = now;
+  damping_forces_[0].setZero();
+  if (!active_ || surplus_ >= 0)
+    return wanted;
+  const double power = velocity.squaredNorm() / rate_; // J per N s/m in a tick
+  const double damping = power > 0 ? std::min(-surplus_ / power, limits_.damping) : 0;
+  damping_forces_[0] = -damping * velocity;
+  return wanted + damping_forces_[0];
+}
+
+} // namespace spherecut::app

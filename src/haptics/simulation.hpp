@@ -1,0 +1,56 @@
+// The simulation side of the haptic loop: a session, solved where the device is.
+#pragma once
+
+#include "src/haptics/contact_snapshot.hpp"
+#include "src/haptics/device.hpp"
+#include "src/session.hpp"
+
+namespace spherecut::app {
+
+/// Coarsening rule of a loop that must not fall behind: a rebuild (nodes that follow the tool, a cut) that took longer
+/// than its budget raises the level by one, up to most_degradation; eight rebuilds in a row within a third of the
+/// budget lower it by one. At level n the next rebuild makes its nodes with spacings coarse_per_level^n times the
+/// scenario's. A solve without a rebuild changes nothing. The haptic rate is never touched.
+inline constexpr int most_degradation = 4;
+inline constexpr double coarse_per_level = 1.19; // 2^(1/4): half the time of a dense solve in about one level
+
+class DegradationRule {
+ public:
+  explicit DegradationRule(double budget) : budget_(budget) {}
+  [[nodiscard]] int level() const { return level_; }
+  void rebuilt(double seconds);
+
+ private:
+  double budget_;
+  int level_ = 0, quick_ = 0;
+};
+
+/// The device holds the tool; in a scenario without a tool, the blade. A blade beside a tool follows its own path.
+class HapticSimulation {
+ public:
+  /// As Session. Throws InputError when there is neither tool nor blade to hold.
+  explicit HapticSimulation(
+      Scenario scenario, std::function<void(const std::string&)> say = [](const std::string&) {});
+
+  /// Builds and condenses the body at the device's first pose.
+  void prepare(const DeviceState& device);
+
+  /// Solves at the pose and time of `device` and fills the snapshot; its sequence is the caller's. Throws
+  /// NumericalError or InputError as Session::step; the snapshot is then as before.
+  void solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot);
+
+  /// Result of the last solve.
+  [[nodiscard]] const StepResult& result() const { return result_; }
+  [[nodiscard]] const Session& session() const { return session_; }
+  [[nodiscard]] const topology::ToolShape& tool() const;
+  [[nodiscard]] std::vector<PathPose> path() const { return driven_path(session_.steps()); }
+
+ private:
+  [[nodiscard]] StepSample sample(const DeviceState& device) const;
+
+  Session session_;
+  StepResult result_;
+  int degradation_ = 0;
+};
+
+} // namespace spherecut::app

@@ -1,0 +1,52 @@
+// The force model `tangent`: the contact problem of the last solve, on its condensed compliance, solved again at every
+// tick with the tool where it is now.
+#pragma once
+
+#include "src/haptics/force_model.hpp"
+
+#include <array>
+#include <span>
+
+namespace spherecut::app {
+
+/// While the body behind the snapshot stands, this is the solve itself in fewer rounds, warm from the last tick: onset,
+/// spreading, sliding and loss of contact are followed; a bonded contact goes with the tool and catches what the tool
+/// overtakes. Rounds and pivots have a fixed budget; what is left over continues in the next tick.
+class TangentModel : public ForceModel {
+ public:
+  explicit TangentModel(const topology::ToolShape& tool);
+  void solved(const ContactSnapshot& snapshot) noexcept override;
+  ModelForce at(const topology::ToolPose& pose, double time) noexcept override;
+
+ private:
+  template <typename T>
+  using PerCandidate = std::array<T, most_candidates>;
+
+  ModelForce press(const topology::ToolPose& pose) noexcept;
+  ModelForce follow(const topology::ToolPose& pose) noexcept;
+  [[nodiscard]] bool solve_active() noexcept;
+  void displace() noexcept;
+  [[nodiscard]] bool catch_node(int candidate) noexcept;
+  [[nodiscard]] std::span<const Vector3> rest() const;
+  [[nodiscard]] std::span<const Vector3> normals() const;
+
+  const topology::ToolShape& tool_;
+  const ContactSnapshot* snapshot_ = nullptr;
+  topology::ToolPose pose_;            // of the last tick
+  PerCandidate<Vector3> displacement_; // m, of the candidates
+  PerCandidate<Vector3> moved_;        // m, the same for the forces of this round
+  PerCandidate<Vector3> normal_;       // of the tool
+  PerCandidate<double> gap_;           // m, linearised, at the displacement without tool
+  PerCandidate<double> pressure_;      // N along the normal
+  PerCandidate<char> active_;
+  PerCandidate<char> wrong_;         // candidates that change sides in a pivot
+  PerCandidate<Vector3> step_;       // m, of the last round
+  PerCandidate<Vector3> bond_;       // m, bonded: displacement when the tool was at pose_
+  PerCandidate<Vector3> bond_force_; // N
+  PerCandidate<int> chosen_;         // active candidates, in the order of the factor's rows
+  int chosen_count_ = 0;
+  std::vector<double> factor_; // Cholesky factor of the active block, row-major
+  std::vector<double> right_;  // right-hand sides of it
+};
+
+} // namespace spherecut::app

@@ -1,0 +1,29 @@
+// The haptic loop in virtual time: one thread, no clock, the same bits every time. For experiments, tests and replay.
+#pragma once
+
+#include "src/haptics/loop_records.hpp"
+#include "src/haptics/simulation.hpp"
+
+namespace spherecut::app {
+
+/// Solves that begin every `period` ticks, at the pose of that tick, and are taken over `latency` ticks later.
+std::vector<SolveEvent> regular_solves(std::uint64_t ticks, std::uint64_t period, std::uint64_t latency);
+
+/// Runs `ticks` ticks: reads the device, solves where an event begins, takes over what arrives, computes the force and
+/// applies it. Events must be in the order of their sequence, pose and arrival ticks rising. `device` is read from tick
+/// 0 on; `simulation` is prepared there. Throws InputError when the events are out of order.
+LoopRecords run_virtual(const HapticSettings& settings, HapticSimulation& simulation, Device& device,
+                        const std::vector<SolveEvent>& events, std::uint64_t ticks);
+
+/// Force on the tool solved at every `stride`-th recorded pose in order, by a simulation that has not moved yet: what
+/// the force models are judged by.
+struct SolvedForce {
+  std::uint64_t tick = 0;
+  Vector3 force = Vector3::Zero(); // N
+  bool resprinkled = false;
+  int cut_triangles = 0, active = 0;
+};
+std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std::vector<TickRecord>& ticks,
+                                        std::uint64_t stride);
+
+} // namespace spherecut::app

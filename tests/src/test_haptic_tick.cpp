@@ -1,0 +1,355 @@
+// A tick of the haptic loop: force models against the solve, hand-over, limits, allocation, energy of closed loops.
+#include "src/haptics/haptic_tick.hpp"
+#include "src/haptics/virtual_loop.hpp"
+
+#include "tests/src/scenario_text.hpp"
+#include "tests/support/allocation_counter.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "topology/errors.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using spherecut::tests::replaced;
+using spherecut::tests::small_scenario;
+using spherecut::tests::TemporaryFolder;
+
+namespace {
+
+Scenario scenario_of(const std::string& text) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "s.toml") << text;
+  return read_scenario(folder.path() / "s.toml");
+}
+
+Scenario small(const std::string& method, const std::string& condition = "frictionless") {
+  return scenario_of(small_scenario + "[method]\nname = \"" + method + "\"\n[contact]\ncondition = \"" + condition +
+                     "\"\n");
+}
+
+DeviceState device_at(std::uint64_t tick, const Vector3& position) {
+  return {tick, 1e-3 * static_cast<double>(tick), position, Eigen::Quaterniond::Identity(), true};
+}
+
+/// Down to 2 mm, 4 mm sideways, and up again, all within contact from tick 60 on: a closed loop of 400 ticks.
+Vector3 around(std::uint64_t tick) {
+  const double angle = 2 * std::numbers::pi * static_cast<double>(tick) / 400;
+  return {0.002 * std::sin(angle), 0.001 * std::sin(2 * angle), 0.0292 - 0.001 * std::cos(angle)};
+}
+
+/// A snapshot of one ball on one candidate whose compliance is a plain spring of `stiffness` N/m.
+void spring(double stiffness, const Vector3& at, ContactSnapshot& snapshot) {
+  clear(snapshot);
+  snapshot.count = 1;
+  snapshot.rest[0] = at;
+  snapshot.normals[0] = Vector3::UnitZ();
+  snapshot.base[0] = snapshot.displacement[0] = snapshot.forces[0] = snapshot.bond[0] = Vector3::Zero();
+  snapshot.active[0] = 0;
+  snapshot.pose.point = at;
+  snapshot.reach = 1;
+  snapshot.condition = solvers::ContactCondition::frictionless;
+  for (std::size_t i = 0; i < 9; ++i)
+    snapshot.compliance[i] = i % 4 == 0 ? 1 / stiffness : 0;
+}
+
+const topology::ToolShape punch = topology::FlatPunch{0.005, 0.05};
+
+} // namespace
+
+TEST_CASE("Between solves the tangent model gives the force that a solve would give") {
+  const auto [method, bound] =
+      GENERATE(std::pair<std::string, double>{"galerkin", 2e-4}, std::pair<std::string, double>{"collocation", 0.02});
+  HapticSimulation simulation(small(method));
+  simulation.prepare(device_at(0, around(0)));
+  ContactSnapshot first;
+  simulation.solve(device_at(0, around(0)), 0, first);
+  const auto model = make_force_model(ForceModelKind::tangent, simulation.tool());
+  model->solved(first);
+  ContactSnapshot now;
+  double peak = 0;
+  double worst = 0;
+  for (std::uint64_t tick = 1; tick <= 400; ++tick) {
+    const DeviceState device = device_at(tick, around(tick));
+    const ModelForce force = model->at(tool_pose(simulation.tool(), device), device.time);
+    if (tick % 20 != 0)
+      continue;
+    simulation.solve(device, 0, now);
+    REQUIRE_FALSE(now.resprinkled);
+    peak = std::max(peak, now.force.norm());
+    worst = std::max(worst, (now.force - force.force).norm());
+    CHECK(force.sinking < 1e-6);
+  }
+  CHECK(peak > 0.05);
+  CHECK(worst < bound * peak);
+}
+
+TEST_CASE("The tangent model follows onset and loss of contact") {
+  HapticSimulation simulation(small("galerkin"));
+  const auto height = [](double depth) { return Vector3(0, 0, 0.03 - depth); };
+  ContactSnapshot clear_of_it;
+  simulation.prepare(device_at(0, height(-5e-4)));
+  simulation.solve(device_at(0, height(-5e-4)), 0, clear_of_it);
+  REQUIRE(clear_of_it.count > 0);
+  const auto model = make_force_model(ForceModelKind::tangent, simulation.tool());
+  model->solved(clear_of_it);
+  const auto force = [&](double depth) { return model->at({height(depth), Vector3::UnitZ()}, 0).force; };
+  CHECK(force(-1e-4).norm() == 0);
+  ContactSnapshot deep;
+  simulation.solve(device_at(1, height(1e-3)), 0, deep);
+  for (int i = 0; i < 10; ++i)
+    static_cast<void>(force(1e-4 * i));
+  CHECK((force(1e-3) - deep.force).norm() < 1e-3 * deep.force.norm());
+  for (int i = 10; i >= 0; --i)
+    static_cast<void>(force(1e-4 * i));
+  CHECK(force(-1e-5).norm() == 0);
+}
+
+TEST_CASE("A bonded contact goes with the tool and catches what it overtakes") {
+  const auto method = GENERATE(as<std::string>(), "galerkin", "collocation");
+  HapticSimulation simulation(small(method, "bonded"));
+  const Vector3 start(0, 0, 0.0297);
+  simulation.prepare(device_at(0, start));
+  ContactSnapshot first;
+  simulation.solve(device_at(0, start), 0, first);
+  const auto model = make_force_model(ForceModelKind::tangent, simulation.tool());
+  model->solved(first);
+  ModelForce force;
+  for (int i = 1; i <= 30; ++i)
+    force = model->at({start + Vector3(4e-5 * i, 0, -4e-5 * i), Vector3::UnitZ()}, 0);
+  ContactSnapshot last;
+  for (std::uint64_t i = 1; i <= 30; ++i)
+    simulation.solve(device_at(i, start + Vector3(4e-5, 0, -4e-5) * static_cast<double>(i)), 0, last);
+  CHECK(last.force.x() < -0.01); // dragged along
+  CHECK((force.force - last.force).norm() < 0.02 * last.force.norm());
+  CHECK(force.active > 1);
+}
+
+TEST_CASE("Around a closed loop at constant contact the tangent model gives no energy, symmetric or not") {
+  const auto method = GENERATE(as<std::string>(), "galerkin", "collocation");
+  HapticSimulation simulation(small(method));
+  simulation.prepare(device_at(0, around(0)));
+  ContactSnapshot snapshot;
+  simulation.solve(device_at(0, around(0)), 0, snapshot);
+  if (method == "collocation")
+    CHECK(snapshot.asymmetry > 1e-4);
+  const auto model = make_force_model(ForceModelKind::tangent, simulation.tool());
+  model->solved(snapshot);
+  double work = 0;
+  double exchanged = 0;
+  Vector3 before = Vector3::Zero();
+  for (int i = 0; i <= 800; ++i) { // twice around; the first round settles the active set
+    const ModelForce force = model->at({around(static_cast<std::uint64_t>(i)), Vector3::UnitZ()}, 0);
+    if (i > 400) {
+      const double part =
+          -0.5 *
+          (before + force.force).dot(around(static_cast<std::uint64_t>(i)) - around(static_cast<std::uint64_t>(i - 1)));
+      work += part;
+      exchanged += std::abs(part);
+    }
+    before = force.force;
+  }
+  CHECK(exchanged > 1e-5);
+  CHECK(std::abs(work) < 2e-3 * exchanged);
+}
+
+TEST_CASE("The linear model goes on along the line through the last two solves, the hold model stays") {
+  ContactSnapshot first;
+  ContactSnapshot second;
+  first.time = 0.01;
+  first.force = {0, 0, 1};
+  second.time = 0.02;
+  second.force = {0, 0, 1.5};
+  const auto linear = make_force_model(ForceModelKind::linear_in_time, punch);
+  const auto hold = make_force_model(ForceModelKind::hold, punch);
+  CHECK(linear->at({}, 0).force.norm() == 0);
+  linear->solved(first);
+  CHECK(linear->at({}, 0.018).force.z() == Approx(1));
+  linear->solved(second);
+  CHECK(linear->at({}, 0.026).force.z() == Approx(1.8));
+  CHECK(linear->at({}, 10).force.z() == Approx(1.5 + 3 * 0.5)); // three intervals at most
+  hold->solved(second);
+  CHECK(hold->at({}, 10).force.z() == Approx(1.5));
+  CHECK_THROWS_AS(force_model_from_string("cubic"), InputError);
+}
+
+TEST_CASE("A tick allocates nothing, with or without a new solve, in every model") {
+  const auto kind = GENERATE(ForceModelKind::hold, ForceModelKind::linear_in_time, ForceModelKind::tangent);
+  const auto condition = GENERATE(as<std::string>(), "frictionless", "bonded");
+  HapticSimulation simulation(small("galerkin", condition));
+  simulation.prepare(device_at(0, around(0)));
+  std::array<ContactSnapshot, 2> snapshots;
+  simulation.solve(device_at(0, around(0)), 0, snapshots[0]);
+  simulation.solve(device_at(30, around(30)), 0, snapshots[1]);
+  HapticSettings settings;
+  settings.model = kind;
+  const topology::ContactQuery organ(simulation.session().organ().domain->surface());
+  HapticTick core(settings, simulation.tool(), &organ);
+  core.start(device_at(0, around(0)));
+  const std::size_t before = tests::allocations();
+  for (std::uint64_t tick = 0; tick < 100; ++tick) {
+    const DeviceState device = device_at(tick, around(tick));
+    if (tick % 10 == 0) {
+      core.leave(device);
+      core.arrive(snapshots[tick / 10 % 2]);
+    }
+    static_cast<void>(core.tick(device));
+  }
+  CHECK(tests::allocations() == before);
+}
+
+TEST_CASE("At a new solve the force goes on from where it was and fades over in the given time") {
+  HapticSettings settings;
+  settings.hand_over = 0.01;
+  settings.passivity = false;
+  const topology::ToolShape shape = punch;
+  HapticTick core(settings, shape, nullptr);
+  ContactSnapshot soft;
+  ContactSnapshot stiff;
+  spring(400, Vector3::Zero(), soft);
+  spring(500, Vector3::Zero(), stiff);
+  const Vector3 deep(0, 0, -2e-3);
+  core.leave(device_at(0, deep));
+  core.arrive(soft);
+  for (std::uint64_t tick = 0; tick < 20; ++tick)
+    static_cast<void>(core.tick(device_at(tick, deep)));
+  const Vector3 before = core.tick(device_at(20, deep)).force;
+  CHECK(before.z() == Approx(0.8));
+  core.leave(device_at(21, deep));
+  core.arrive(stiff);
+  double last = before.z();
+  for (std::uint64_t tick = 21; tick < 31; ++tick) {
+    const double force = core.tick(device_at(tick, deep)).force.z();
+    CHECK(force - last == Approx(tick == 21 ? 0 : 0.02).margin(1e-9));
+    last = force;
+  }
+  CHECK(core.tick(device_at(31, deep)).force.z() == Approx(1.0));
+}
+
+TEST_CASE("Gain, saturation and slew hold for the force that is sent, and a device that is gone is let go") {
+  HapticSettings settings;
+  settings.passivity = false;
+  settings.limits.gain = 2;
+  settings.limits.force = 1.5;
+  settings.limits.slew = 100;
+  const topology::ToolShape shape = punch;
+  HapticTick core(settings, shape, nullptr);
+  ContactSnapshot contact;
+  spring(500, Vector3::Zero(), contact);
+  core.leave(device_at(0, {0, 0, -2e-3}));
+  core.arrive(contact);
+  double last = 0;
+  for (std::uint64_t tick = 0; tick < 100; ++tick) {
+    const TickResult result = core.tick(device_at(tick, {0, 0, -2e-3}));
+    CHECK(result.force.norm() <= 1.5 + 1e-12);
+    CHECK(std::abs(result.force.z() - last) <= 0.1 + 1e-12);
+    last = result.force.z();
+  }
+  CHECK(last == Approx(1.5)); // 2 * 500 N/m * 2 mm = 2 N, cut off
+  DeviceState gone = device_at(100, {0, 0, -2e-3});
+  gone.connected = false;
+  for (std::uint64_t tick = 100; tick < 116; ++tick) {
+    gone.tick = tick;
+    last = core.tick(gone).force.z();
+  }
+  CHECK(last == 0);
+}
+
+TEST_CASE("The observer counts the work of a force that is constant between ticks") {
+  PassivityControl control({}, 1000, false);
+  Vector3 position(0, 0, 0);
+  double work = 0;
+  Vector3 sent = Vector3::Zero();
+  for (int i = 0; i < 50; ++i) {
+    const Vector3 next(1e-4 * i, 2e-5 * i * i, 0);
+    if (i > 0)
+      work -= sent.dot(next - position);
+    position = next;
+    const Vector3 force(std::sin(0.1 * i), -0.3, 0.01 * i);
+    CHECK(control.control(position, force, std::nullopt) == force);
+    control.sent(force);
+    sent = force;
+  }
+  CHECK(control.energy() == Approx(work).epsilon(1e-12));
+}
+
+TEST_CASE("A light hand on a stiff spring swings up without the controller and comes to rest with it") {
+  const auto run = [](bool passivity) {
+    HapticSettings settings;
+    settings.passivity = passivity;
+    settings.limits.force = 20;
+    settings.limits.slew = 1e5;
+    settings.limits.delay = 1;
+    const topology::ToolShape shape = punch;
+    HapticTick core(settings, shape, nullptr);
+    ContactSnapshot wall;
+    spring(1500, Vector3::Zero(), wall);
+    HandSettings light;
+    light.mass = 0.08;
+    light.stiffness = 60;
+    light.damping = 0.2;
+    light.delay = 1;
+    std::vector<PathPose> path{{0, {0, 0, 1e-3}, Eigen::Quaterniond::Identity()},
+                               {0.1, {0, 0, -0.02}, Eigen::Quaterniond::Identity()}};
+    SimulatedHand hand(path, light, 1000);
+    core.leave(device_at(0, {0, 0, 1e-3}));
+    core.arrive(wall);
+    double late = 0; // m/s, fastest in the last half second
+    for (std::uint64_t tick = 0; tick < 3000; ++tick) {
+      hand.apply(core.tick(hand.read(tick)).force);
+      if (tick >= 2500)
+        late = std::max(late, hand.velocity().norm());
+    }
+    return std::pair{late, core.passivity().lowest_energy()};
+  };
+  const auto [loose, loose_energy] = run(false);
+  const auto [kept, kept_energy] = run(true);
+  CHECK(loose > 0.2);
+  CHECK(loose_energy < -1e-3);
+  CHECK(kept < 0.01);
+  CHECK(kept_energy > -1e-4);
+}
+
+TEST_CASE("The loop in virtual time gives the same bits twice") {
+  const auto run = [] {
+    HapticSimulation simulation(small("galerkin"));
+    SimulatedHand hand(simulation.path(), {}, 1000);
+    return run_virtual({}, simulation, hand, regular_solves(600, 10, 7), 600);
+  };
+  const LoopRecords a = run();
+  const LoopRecords b = run();
+  REQUIRE(a.ticks.size() == 600);
+  REQUIRE(a.solves.size() == 60);
+  double peak = 0;
+  for (std::size_t i = 0; i < a.ticks.size(); ++i) {
+    CHECK(a.ticks[i].force == b.ticks[i].force);
+    CHECK(a.ticks[i].device.position == b.ticks[i].device.position);
+    CHECK(a.ticks[i].arrived == (i >= 7 && (i - 7) % 10 == 0));
+    peak = std::max(peak, a.ticks[i].force.norm());
+  }
+  CHECK(peak > 0.01);
+  HapticSimulation simulation(small("galerkin"));
+  ScriptedPath device(simulation.path(), 1000);
+  CHECK_THROWS_AS(run_virtual({}, simulation, device, {{1, 5, 4, 0}}, 10), InputError);
+  CHECK_THROWS_AS(run_virtual({}, simulation, device, {{1, 5, 6, 0}, {2, 5, 7, 0}}, 10), InputError);
+}
+
+TEST_CASE("Rebuilds that miss their budget coarsen the next ones, quick ones refine them again") {
+  DegradationRule rule(0.01);
+  rule.rebuilt(0.009);
+  CHECK(rule.level() == 0);
+  rule.rebuilt(0.011);
+  rule.rebuilt(0.02);
+  CHECK(rule.level() == 2);
+  for (int i = 0; i < 7; ++i)
+    rule.rebuilt(0.001);
+  CHECK(rule.level() == 2);
+  rule.rebuilt(0.001);
+  CHECK(rule.level() == 1);
+  for (int i = 0; i < 20; ++i)
+    rule.rebuilt(1);
+  CHECK(rule.level() == most_degradation);
+}
