@@ -40,6 +40,8 @@ const std::vector<Experiment>& all_experiments() {
       {"sever", "a body cut in two: no coupling, rigid motions", run_sever},
       {"extrapolation", "the force between solves: held, extrapolated in time, and by the condensed contact",
        run_extrapolation},
+      {"force_continuity", "the largest step of the force from tick to tick, against the solved force's own",
+       run_force_continuity},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
   };
   return experiments;

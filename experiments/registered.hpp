@@ -21,5 +21,6 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context);
 std::vector<Check> run_precut_beam(const ExperimentContext& context);
 std::vector<Check> run_sever(const ExperimentContext& context);
 std::vector<Check> run_extrapolation(const ExperimentContext& context);
+std::vector<Check> run_force_continuity(const ExperimentContext& context);
 
 } // namespace spherecut::experiments

@@ -22,48 +22,47 @@ using solvers::Method;
 constexpr std::array<ForceModelKind, 3> models{ForceModelKind::hold, ForceModelKind::linear_in_time,
                                                ForceModelKind::tangent};
 
-struct Case {
-  Method method;
-  HapticMotion motion;
-  std::vector<app::SolvedForce> solved;
-  double peak = 0; // N
-};
-
 /// Errors over the peak by model, in the order of `models`.
 struct Outcome {
   std::array<double, 3> rms{}, largest{};
+  std::array<std::vector<app::TickRecord>, 3> ticks;
 };
 
-Outcome run_case(const Case& one, int solve_rate, std::vector<std::vector<app::TickRecord>>& ticks) {
+Outcome run_models(const SolvedMotion& one, int solve_rate) {
   Outcome outcome;
-  const auto count = static_cast<std::uint64_t>(one.solved.size());
-  const auto period = static_cast<std::uint64_t>(std::lround(1000.0 / solve_rate));
   for (std::size_t m = 0; m < models.size(); ++m) {
-    app::HapticSettings settings;
-    settings.model = models[m];
-    settings.passivity = false;
-    app::HapticSimulation simulation(haptic_block(one.motion, one.method));
-    app::ScriptedPath device(one.motion.path, settings.rate);
-    ticks.push_back(
-        app::run_virtual(settings, simulation, device, app::regular_solves(count, period, period), count).ticks);
-    const ForceError error = force_error(ticks.back(), one.solved);
+    outcome.ticks[m] = run_motion(one, models[m], solve_rate).ticks;
+    const ForceError error = force_error(outcome.ticks[m], one.solved);
     outcome.rms[m] = error.rms / one.peak;
     outcome.largest[m] = error.largest / one.peak;
   }
   return outcome;
 }
 
-Case solve_case(Method method, const HapticMotion& motion) {
-  Case one{method, motion, {}, 0};
-  app::ScriptedPath device(motion.path, 1000);
-  std::vector<app::TickRecord> ticks;
-  for (std::uint64_t tick = 0; tick < static_cast<std::uint64_t>(std::lround(1000 * motion.duration)); ++tick)
-    ticks.emplace_back().device = device.read(tick);
-  app::HapticSimulation simulation(haptic_block(motion, method));
-  one.solved = app::solve_recorded(simulation, ticks, 1);
-  for (const app::SolvedForce& force : one.solved)
-    one.peak = std::max(one.peak, force.force.norm());
-  return one;
+void draw(const SolvedMotion& one, const Outcome& outcome, const std::filesystem::path& file) {
+  app::Figure figure;
+  figure.title = "Force while " + one.motion.name + "ping, 100 solves a second";
+  figure.x_label = "time [s]";
+  figure.y_label = "force on the tool [N]";
+  app::Series solved{"solved at every tick", {}, {}, app::SeriesStyle::points};
+  std::array<app::Series, 3> felt;
+  for (std::size_t m = 0; m < models.size(); ++m)
+    felt[m] = {std::string(app::to_string(models[m])), {}, {}, app::SeriesStyle::lines};
+  for (const app::SolvedForce& force : one.solved) {
+    const double time = 1e-3 * static_cast<double>(force.tick);
+    if (time > 0.5) // two taps
+      break;
+    if (force.tick % 5 == 0) {
+      solved.x.push_back(time);
+      solved.y.push_back(force.force.norm());
+    }
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      felt[m].x.push_back(time);
+      felt[m].y.push_back(outcome.ticks[m][force.tick].tissue.norm());
+    }
+  }
+  figure.series = {felt[0], felt[1], felt[2], solved};
+  app::write_png(figure, file);
 }
 
 } // namespace
@@ -75,15 +74,16 @@ std::vector<Check> run_extrapolation(const ExperimentContext& context) {
   const std::vector<Method> methods{Method::galerkin, Method::collocation};
   for (const Method method : methods)
     for (const HapticMotion& motion : haptic_motions()) {
-      if (context.quick && (motion.cut || (motion.name == "sine" && method == Method::collocation)))
+      if (context.quick && motion.name != "tap" && (motion.name != "slide" || method == Method::collocation))
         continue;
-      const Case one = solve_case(method, motion);
+      const SolvedMotion one = solve_motion(method, motion);
       const std::string name = fmt::format("{}_{}", solvers::to_string(method), motion.name);
       for (const int rate : {30, 100, 300}) {
         if (context.quick && rate != 100)
           continue;
-        std::vector<std::vector<app::TickRecord>> ticks;
-        const Outcome outcome = run_case(one, rate, ticks);
+        const Outcome outcome = run_models(one, rate);
+        if (motion.name == "tap" && rate == 100 && method == Method::galerkin)
+          draw(one, outcome, context.out / "tap.png");
         const auto& rms = outcome.rms;
         context.say(fmt::format("{} at {} Hz, peak {:.3g} N: hold {:.2f} %, linear {:.2f} %, tangent {:.3f} %; largest "
                                 "{:.1f} / {:.1f} / {:.2f} %",

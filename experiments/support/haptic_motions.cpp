@@ -9,6 +9,7 @@ namespace {
 
 constexpr double top = 0.030;    // m, of the block
 constexpr double sample = 0.001; // s, of a path
+constexpr double tick_rate = 1000;
 constexpr double pi = std::numbers::pi;
 
 /// Smooth step from 0 to 1 over 0 <= t <= 1.
@@ -81,6 +82,31 @@ app::Scenario haptic_block(const HapticMotion& motion, solvers::Method method) {
     scenario.cut.front_spacing = 0.0032;
   }
   return scenario;
+}
+
+SolvedMotion solve_motion(solvers::Method method, const HapticMotion& motion) {
+  SolvedMotion result{method, motion, {}, 0};
+  app::ScriptedPath device(motion.path, tick_rate);
+  std::vector<app::TickRecord> ticks;
+  for (std::uint64_t tick = 0; tick < static_cast<std::uint64_t>(std::lround(tick_rate * motion.duration)); ++tick)
+    ticks.emplace_back().device = device.read(tick);
+  app::HapticSimulation simulation(haptic_block(motion, method));
+  result.solved = app::solve_recorded(simulation, ticks, 1);
+  for (const app::SolvedForce& force : result.solved)
+    result.peak = std::max(result.peak, force.force.norm());
+  return result;
+}
+
+app::LoopRecords run_motion(const SolvedMotion& motion, app::ForceModelKind model, int solve_rate) {
+  const auto count = static_cast<std::uint64_t>(motion.solved.size());
+  const auto period = static_cast<std::uint64_t>(std::lround(tick_rate / solve_rate));
+  app::HapticSettings settings;
+  settings.model = model;
+  settings.passivity = false;
+  settings.limits.force = settings.limits.slew = 1e6;
+  app::HapticSimulation simulation(haptic_block(motion.motion, motion.method));
+  app::ScriptedPath device(motion.motion.path, tick_rate);
+  return app::run_virtual(settings, simulation, device, app::regular_solves(count, period, period), count);
 }
 
 ForceError force_error(const std::vector<app::TickRecord>& ticks, const std::vector<app::SolvedForce>& solved) {

@@ -24,6 +24,19 @@ std::vector<HapticMotion> haptic_motions();
 /// A ball of 10 mm radius on a block of 60 x 60 x 30 mm with E = 10 kPa on its base, about 300 nodes; nu = 0.3.
 app::Scenario haptic_block(const HapticMotion& motion, solvers::Method method);
 
+/// A motion and the force solved at every tick of it.
+struct SolvedMotion {
+  solvers::Method method;
+  HapticMotion motion;
+  std::vector<app::SolvedForce> solved; // one a tick
+  double peak = 0;                      // N
+};
+SolvedMotion solve_motion(solvers::Method method, const HapticMotion& motion);
+
+/// The loop in virtual time on the motion, without device limits or controller: `solve_rate` solves a second, each of
+/// which takes the whole time until the next.
+app::LoopRecords run_motion(const SolvedMotion& motion, app::ForceModelKind model, int solve_rate);
+
 /// Error of the recorded tissue force against the solved one over the ticks in contact, N.
 struct ForceError {
   double rms = 0, largest = 0; // N

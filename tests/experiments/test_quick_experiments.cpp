@@ -119,3 +119,11 @@ TEST_CASE("Quick reprojection: a cut that grows and one made at once") {
 TEST_CASE("Quick closed cut: stuck lips are as stiff as none") {
   require_quick_run_passes("closed_cut_compression");
 }
+
+TEST_CASE("Quick extrapolation: the force between solves against solving at every tick") {
+  require_quick_run_passes("extrapolation");
+}
+
+TEST_CASE("Quick force continuity: no step beyond that of the solved force") {
+  require_quick_run_passes("force_continuity");
+}
