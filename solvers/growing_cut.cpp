@@ -431,29 +431,14 @@ VectorX GrowingCut::State::window_right(const VectorX& right) const {
 
 void GrowingCut::State::condense_contact() {
   const auto count = static_cast<Eigen::Index>(contact.size());
-  const int begin = window->contact_begin();
-  const bool inside = std::all_of(contact.begin(), contact.end(), [&](const DisplacementMean& mean) {
-    return std::all_of(mean.nodes.begin(), mean.nodes.end(), [&](int node) { return 3 * slot[node] >= begin; });
-  });
-  const int first = inside ? begin : 0;
-  MatrixX right = MatrixX::Zero(window->slots() - first, 3 * count);
+  MatrixX functionals = MatrixX::Zero(window->slots(), 3 * count);
   for (Eigen::Index c = 0; c < count; ++c)
     for (std::size_t k = 0; k < contact[c].nodes.size(); ++k)
       for (int a = 0; a < 3; ++a)
-        right(3 * slot[contact[c].nodes[k]] + a - first, 3 * c + a) += contact[c].weights[k];
-  const MatrixX solution = inside ? window->solve_contact(right) : window->solve(right);
-  const VectorX resting = window->solve(window_right(loads)).col(0);
-  compliance.resize(3 * count, 3 * count);
-  base.resize(3 * count);
-  for (Eigen::Index c = 0; c < count; ++c) {
-    compliance.middleRows<3>(3 * c).setZero();
-    base.segment<3>(3 * c).setZero();
-    for (std::size_t k = 0; k < contact[c].nodes.size(); ++k) {
-      const int s = 3 * slot[contact[c].nodes[k]];
-      compliance.middleRows<3>(3 * c) += contact[c].weights[k] * solution.middleRows<3>(s - first);
-      base.segment<3>(3 * c) += contact[c].weights[k] * resting.segment<3>(s);
-    }
-  }
+        functionals(3 * slot[contact[c].nodes[k]] + a, 3 * c + a) += contact[c].weights[k];
+  SchurWindow::Condensed condensed = window->condense(functionals, window_right(loads));
+  compliance = std::move(condensed.compliance);
+  base = std::move(condensed.response);
 }
 
 GrowingCut::GrowingCut(Problem problem, GrowthOptions options)

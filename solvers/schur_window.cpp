@@ -9,6 +9,8 @@ extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
 void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
             const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a,
+            const int* lda, const double* beta, double* c, const int* ldc);
 void dtrmm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
             const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 }
@@ -24,6 +26,18 @@ void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& ri
     return;
   const double one = 1;
   dtrsm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower, &lda, right.data(), &rows);
+}
+
+/// Dense Cholesky factor in place.
+void cholesky(const std::vector<int>& slots, std::vector<double>& square) {
+  const int n = static_cast<int>(slots.size());
+  int info = 0;
+  if (n > 0)
+    dpotrf_("L", &n, square.data(), &n, &info);
+  if (info != 0)
+    throw NumericalError(fmt::format("the window of {} unknowns is not positive definite (slot {}): a piece that "
+                                     "nothing holds, or an unsound support",
+                                     n, info > 0 ? slots[info - 1] : info));
 }
 
 /// B = L B or L^T B.
@@ -51,6 +65,7 @@ SchurWindow::SchurWindow(const SparseMatrix& lower, int changing, int room, int 
   const int slots = window + room;
   schur_ = MatrixX::Zero(slots, slots);
   active_.assign(slots, 0);
+  changed_.assign(slots, 0);
   for (int j = 0; j < window; ++j) {
     const int slot = slot_of(far_ + j);
     active_[slot] = 1;
@@ -66,37 +81,85 @@ void SchurWindow::activate(int slot) {
 
 void SchurWindow::deactivate(int slot) {
   active_[slot] = 0;
+  changed_[slot] = 1;
   schur_.col(slot).setZero();
   schur_.row(slot).setZero();
 }
 
-void SchurWindow::factor() {
-  order_.clear();
-  for (int slot = 0; slot < slots(); ++slot)
-    if (active_[slot] != 0)
-      order_.push_back(slot);
-  contact_size_ = static_cast<int>(order_.end() - std::lower_bound(order_.begin(), order_.end(), contact_begin()));
-  const int n = static_cast<int>(order_.size());
-  factor_.resize(static_cast<std::size_t>(n) * n);
-  // Runs of consecutive active slots are copied as they are.
-  for (int j = 0; j < n; ++j) {
-    const double* from = column(order_[j]);
-    double* to = factor_.data() + static_cast<std::ptrdiff_t>(j) * n;
-    for (int i = j; i < n;) {
-      int end = i + 1;
-      while (end < n && order_[end] == order_[end - 1] + 1)
+/// The lower triangle of S of some slots (ascending), column-major.
+void SchurWindow::gather(const std::vector<int>& slots, std::vector<double>& square) const {
+  const auto n = std::ssize(slots);
+  square.resize(static_cast<std::size_t>(n * n));
+  for (std::ptrdiff_t j = 0; j < n; ++j) {
+    const double* from = schur_.data() + static_cast<std::ptrdiff_t>(slots[j]) * schur_.rows();
+    double* to = square.data() + j * n;
+    // Runs of consecutive slots are copied as they are.
+    for (std::ptrdiff_t i = j; i < n;) {
+      std::ptrdiff_t end = i + 1;
+      while (end < n && slots[end] == slots[end - 1] + 1)
         ++end;
-      std::copy(from + order_[i], from + order_[end - 1] + 1, to + i);
+      std::copy(from + slots[i], from + slots[end - 1] + 1, to + i);
       i = end;
     }
   }
-  int info = 0;
-  if (n > 0)
-    dpotrf_("L", &n, factor_.data(), &n, &info);
-  if (info != 0)
-    throw NumericalError(fmt::format("the window of {} unknowns is not positive definite (slot {}): a piece that "
-                                     "nothing holds, or an unsound support",
-                                     n, info > 0 ? order_[info - 1] : info));
+}
+
+void SchurWindow::prepare(const std::vector<char>& kept) {
+  ahead_.clear();
+  kept_.clear();
+  kept_place_.assign(slots(), -1);
+  for (int slot = 0; slot < slots(); ++slot) {
+    const bool free_room = active_[slot] == 0 && slot >= changing_;
+    if (kept[slot] != 0 || slot >= contact_begin() || free_room) {
+      kept_place_[slot] = static_cast<int>(kept_.size());
+      kept_.push_back(slot);
+    } else if (active_[slot] != 0) {
+      ahead_.push_back(slot);
+    }
+  }
+  std::fill(changed_.begin(), changed_.end(), 0);
+  gather(ahead_, ahead_factor_);
+  try {
+    cholesky(ahead_, ahead_factor_);
+  } catch (...) {
+    ahead_.clear();
+    throw;
+  }
+  coupling_.resize(std::ssize(kept_), std::ssize(ahead_));
+  for (Eigen::Index j = 0; j < coupling_.cols(); ++j)
+    for (Eigen::Index i = 0; i < coupling_.rows(); ++i)
+      coupling_(i, j) = kept_[i] > ahead_[j] ? schur_(kept_[i], ahead_[j]) : schur_(ahead_[j], kept_[i]);
+  const int rows = static_cast<int>(kept_.size()), columns = static_cast<int>(ahead_.size());
+  eliminated_ = MatrixX::Zero(rows, rows);
+  if (rows > 0 && columns > 0) {
+    const double one = 1, none = 0;
+    dtrsm_("R", "L", "T", "N", &rows, &columns, &one, ahead_factor_.data(), &columns, coupling_.data(), &rows);
+    dsyrk_("L", "N", &rows, &columns, &one, coupling_.data(), &rows, &none, eliminated_.data(), &rows);
+  }
+  factor();
+}
+
+bool SchurWindow::factor() {
+  const bool held = std::all_of(ahead_.begin(), ahead_.end(), [&](int slot) { return changed_[slot] == 0; });
+  if (!held)
+    ahead_.clear();
+  const bool usable = held && !ahead_.empty();
+  order_.clear();
+  for (int slot = 0; slot < slots(); ++slot)
+    if (active_[slot] != 0 && (!usable || kept_place_[slot] >= 0))
+      order_.push_back(slot);
+  gather(order_, factor_);
+  if (usable) {
+    const auto n = std::ssize(order_);
+    for (std::ptrdiff_t j = 0; j < n; ++j) {
+      const double* less = eliminated_.data() + kept_place_[order_[j]] * eliminated_.rows();
+      double* to = factor_.data() + j * n;
+      for (std::ptrdiff_t i = j; i < n; ++i)
+        to[i] -= less[kept_place_[order_[i]]];
+    }
+  }
+  cholesky(order_, factor_);
+  return usable;
 }
 
 MatrixX SchurWindow::reduce(const MatrixX& right) const {
@@ -108,31 +171,65 @@ MatrixX SchurWindow::reduce(const MatrixX& right) const {
   return by_slot;
 }
 
+void SchurWindow::forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) const {
+  ahead.resize(std::ssize(ahead_), right.cols());
+  rest.resize(std::ssize(order_), right.cols());
+  for (Eigen::Index i = 0; i < ahead.rows(); ++i)
+    ahead.row(i) = right.row(ahead_[i]);
+  for (Eigen::Index i = 0; i < rest.rows(); ++i)
+    rest.row(i) = right.row(order_[i]);
+  if (!ahead_.empty()) {
+    triangular_solve(false, ahead_factor_.data(), static_cast<int>(ahead_.size()), ahead);
+    const MatrixX taken = coupling_ * ahead;
+    for (Eigen::Index i = 0; i < rest.rows(); ++i)
+      rest.row(i) -= taken.row(kept_place_[order_[i]]);
+  }
+  triangular_solve(false, factor_.data(), static_cast<int>(order_.size()), rest);
+}
+
 MatrixX SchurWindow::solve(const MatrixX& right) const {
-  const int n = static_cast<int>(order_.size());
-  MatrixX packed(n, right.cols());
-  for (int i = 0; i < n; ++i)
-    packed.row(i) = right.row(order_[i]);
-  triangular_solve(false, factor_.data(), n, packed);
-  triangular_solve(true, factor_.data(), n, packed);
+  MatrixX ahead, rest;
+  forward(right, ahead, rest);
+  triangular_solve(true, factor_.data(), static_cast<int>(order_.size()), rest);
   MatrixX by_slot = MatrixX::Zero(slots(), right.cols());
-  for (int i = 0; i < n; ++i)
-    by_slot.row(order_[i]) = packed.row(i);
+  for (Eigen::Index i = 0; i < rest.rows(); ++i)
+    by_slot.row(order_[i]) = rest.row(i);
+  if (ahead_.empty())
+    return by_slot;
+  MatrixX below = MatrixX::Zero(std::ssize(kept_), right.cols());
+  for (Eigen::Index i = 0; i < rest.rows(); ++i)
+    below.row(kept_place_[order_[i]]) = rest.row(i);
+  ahead.noalias() -= coupling_.transpose() * below;
+  triangular_solve(true, ahead_factor_.data(), static_cast<int>(ahead_.size()), ahead);
+  for (Eigen::Index i = 0; i < ahead.rows(); ++i)
+    by_slot.row(ahead_[i]) = ahead.row(i);
   return by_slot;
 }
 
-MatrixX SchurWindow::solve_contact(const MatrixX& right) const {
-  const int n = static_cast<int>(order_.size()), first = n - contact_size_;
-  MatrixX packed(contact_size_, right.cols());
-  for (int i = 0; i < contact_size_; ++i)
-    packed.row(i) = right.row(order_[first + i] - contact_begin());
-  const double* corner = factor_.data() + static_cast<std::ptrdiff_t>(first) * n + first;
-  triangular_solve(false, corner, n, packed);
-  triangular_solve(true, corner, n, packed);
-  MatrixX by_slot = MatrixX::Zero(contact_, right.cols());
-  for (int i = 0; i < contact_size_; ++i)
-    by_slot.row(order_[first + i] - contact_begin()) = packed.row(i);
-  return by_slot;
+SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const VectorX& right) const {
+  // With Y = L^-1 F: F^T S^-1 F = Y^T Y and F^T S^-1 b = Y^T (L^-1 b). Above its first entry F leaves Y zero.
+  const auto is_zero = [&](int slot) { return functionals.row(slot).isZero(0); };
+  MatrixX load_ahead, load;
+  forward(right, load_ahead, load);
+  Condensed condensed;
+  if (!std::all_of(ahead_.begin(), ahead_.end(), is_zero)) {
+    MatrixX ahead, rest;
+    forward(functionals, ahead, rest);
+    condensed.compliance = ahead.transpose() * ahead + rest.transpose() * rest;
+    condensed.response = ahead.transpose() * load_ahead + rest.transpose() * load;
+    return condensed;
+  }
+  const int n = static_cast<int>(order_.size());
+  const int first = static_cast<int>(std::find_if_not(order_.begin(), order_.end(), is_zero) - order_.begin()),
+            rows = n - first;
+  MatrixX rest(rows, functionals.cols());
+  for (int i = 0; i < rows; ++i)
+    rest.row(i) = functionals.row(order_[first + i]);
+  if (rows > 0)
+    triangular_solve(false, factor_.data() + static_cast<std::ptrdiff_t>(first) * n + first, n, rest);
+  condensed.compliance = rest.transpose() * rest;
+  condensed.response = rest.transpose() * load.bottomRows(rows);
+  return condensed;
 }
 
 MatrixX SchurWindow::recover(const MatrixX& window, const MatrixX& right) const {

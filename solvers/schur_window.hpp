@@ -7,7 +7,9 @@
 //
 // L_WW being the trailing block of the sparse Cholesky factor. Entries of K between window unknowns change S by as
 // much. Slots of the window: the unknowns that a cut may change, then room for unknowns to come, then those of the
-// contact, whose condensed stiffness is then the trailing block of the dense factor.
+// contact, whose condensed stiffness is then the trailing block of the dense factor. Between two increments the part of
+// the window that the next one will not touch can be eliminated ahead, so that an increment itself factors no more than
+// what it changes.
 #pragma once
 
 #include "solvers/factorisation.hpp"
@@ -29,35 +31,65 @@ class SchurWindow {
     return unknown < far_ ? -1 : unknown - far_ + (unknown - far_ >= changing_ ? room_ : 0);
   }
 
-  /// Column of S as it stands; entries from the diagonal down are meant to be changed, those above are not read.
-  [[nodiscard]] double* column(int slot) { return schur_.data() + static_cast<std::ptrdiff_t>(slot) * schur_.rows(); }
+  /// Column of S as it stands; entries from the diagonal down are meant to be changed, those above are not read. Counts
+  /// as a change of the slot: whoever changes an entry asks for the columns of both its unknowns, as it must for their
+  /// diagonals.
+  [[nodiscard]] double* column(int slot) {
+    changed_[slot] = 1;
+    return schur_.data() + static_cast<std::ptrdiff_t>(slot) * schur_.rows();
+  }
   [[nodiscard]] bool active(int slot) const { return active_[slot] != 0; }
   /// A new unknown: its row and column start at zero.
   void activate(int slot);
   /// Takes an unknown out of the system; its row and column are forgotten.
   void deactivate(int slot);
 
-  /// Factors the active part of S. Throws NumericalError naming the slot where it is not positive definite.
-  void factor();
+  /// Work done ahead of a change: eliminates what is active and not marked in `kept` (by slot), so that the next
+  /// factor() has only the marked unknowns left to do, as long as nothing else has changed by then. Contact slots and
+  /// free room are kept whatever the marks say. Factors the rest as well. Throws as factor().
+  void prepare(const std::vector<char>& kept);
+
+  /// Factors the active part of S. Whether what was prepared could be used. Throws NumericalError naming the slot where
+  /// S is not positive definite.
+  bool factor();
+  /// Unknowns that the last factor() had to do, and those done ahead.
+  [[nodiscard]] int factored() const { return static_cast<int>(order_.size()); }
+  [[nodiscard]] int done_ahead() const { return static_cast<int>(ahead_.size()); }
 
   /// Right-hand sides by slots that the window sees when `right` acts on K (elimination order); new slots get zero.
   [[nodiscard]] MatrixX reduce(const MatrixX& right) const;
   /// S^-1 right, by slots; inactive slots are zero. Needs factor().
   [[nodiscard]] MatrixX solve(const MatrixX& right) const;
-  /// Contact part of S^-1 right for right-hand sides that act on the contact slots alone (rows: those slots).
-  [[nodiscard]] MatrixX solve_contact(const MatrixX& right) const;
+
+  /// F^T S^-1 F and F^T S^-1 right for functionals F (slots x count): what they see of unit loads on themselves and of
+  /// a load. Cheap when F reaches late slots alone, such as those of the contact.
+  struct Condensed {
+    MatrixX compliance; // count x count, symmetric
+    VectorX response;   // count
+  };
+  [[nodiscard]] Condensed condense(const MatrixX& functionals, const VectorX& right) const;
+
   /// Solution in elimination order of K from that of the window (slots) and the right-hand sides given to reduce().
   [[nodiscard]] MatrixX recover(const MatrixX& window, const MatrixX& right) const;
 
  private:
+  void gather(const std::vector<int>& slots, std::vector<double>& square) const;
+  /// L^-1 right, the part done ahead and the rest.
+  void forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) const;
+
   int far_, changing_, room_, contact_;
   std::unique_ptr<OrderedCholesky> cholesky_;
-  MatrixX trailing_;           // L_WW at construction
-  MatrixX schur_;              // lower triangle, by slots
-  std::vector<char> active_;   // by slot
-  std::vector<int> order_;     // active slots at the last factor()
+  MatrixX trailing_;          // L_WW at construction
+  MatrixX schur_;             // lower triangle, by slots
+  std::vector<char> active_;  // by slot
+  std::vector<char> changed_; // by slot, since prepare()
+  // Done ahead: S of the slots `ahead_` is ahead_factor_ squared; coupling_ (kept x ahead) are the rows of the kept
+  // slots below it, and their own part of S is to be less by coupling_ coupling_^T, `eliminated_`.
+  std::vector<int> ahead_, kept_, kept_place_; // slots; place of a slot in kept_, -1 outside
+  std::vector<double> ahead_factor_;           // column-major, ahead squared
+  MatrixX coupling_, eliminated_;
+  std::vector<int> order_;     // slots at the last factor(), but those done ahead
   std::vector<double> factor_; // their dense Cholesky factor, column-major, order_.size() squared
-  int contact_size_ = 0;       // active contact slots, at the end of order_
 };
 
 } // namespace spherecut::solvers

@@ -57,6 +57,15 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   const int n = 90, changing = 20, room = 5, contact = 12, far = n - changing - contact;
   const MatrixX k = spring_matrix(n, 3);
   SchurWindow window(lower_of(k), changing, room, contact);
+  // What will not change is eliminated ahead; or too much is, and the window has to start over.
+  const int ahead = GENERATE(0, 1, 2);
+  std::vector<char> kept(window.slots(), 0);
+  for (int unknown : {1, 3, 4, 8, 9, 10, 11, 12, 17})
+    kept[window.slot_of(far + unknown)] = 1;
+  if (ahead == 2)
+    kept[window.slot_of(far + 9)] = 0;
+  if (ahead > 0)
+    window.prepare(kept);
   // From scratch: unknown `gone` leaves with its springs, two new ones come, coupled to each other and the window.
   MatrixX larger = MatrixX::Zero(n + 2, n + 2);
   larger.topLeftCorner(n, n) = k;
@@ -84,7 +93,9 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   larger.row(gone).setZero();
   larger.col(gone).setZero();
   larger(gone, gone) = 1;
-  window.factor();
+  CHECK(window.factor() == (ahead == 1));
+  CHECK((window.done_ahead() > 0) == (ahead == 1));
+  CHECK(window.factored() + window.done_ahead() == changing - 1 + 2 + contact);
 
   VectorX right = random_vector(n + 2, 4);
   right[gone] = 0;
@@ -99,10 +110,25 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   CHECK(by_slot(changing, 0) == Approx(exact[n]));
   CHECK(by_slot(changing + 1, 0) == Approx(exact[n + 1]));
 
-  const MatrixX unit = MatrixX::Identity(contact, contact);
-  const MatrixX compliance = window.solve_contact(unit);
   const MatrixX inverse = larger.inverse();
-  CHECK((compliance - inverse.block(n - contact, n - contact, contact, contact)).norm() < 1e-11 * compliance.norm());
+  for (const int from : {window.contact_begin(), changing + 1, 0}) { // where the functionals begin
+    MatrixX functionals = MatrixX::Zero(window.slots(), 3);
+    std::vector<int> unknown_of(window.slots(), -1);
+    for (int i = far; i < n; ++i)
+      if (i != gone)
+        unknown_of[window.slot_of(i)] = i;
+    unknown_of[changing] = n;
+    unknown_of[changing + 1] = n + 1;
+    MatrixX by_unknown = MatrixX::Zero(n + 2, 3);
+    for (int slot = from; slot < window.slots(); ++slot)
+      if (unknown_of[slot] >= 0)
+        for (int c = 0; c < 3; ++c)
+          functionals(slot, c) = by_unknown(unknown_of[slot], c) = std::sin(1.0 + slot * (c + 1));
+    const SchurWindow::Condensed condensed = window.condense(functionals, seen.col(0));
+    const MatrixX compliance = by_unknown.transpose() * inverse * by_unknown;
+    CHECK((condensed.compliance - compliance).norm() < 1e-11 * compliance.norm());
+    CHECK((condensed.response - by_unknown.transpose() * exact).norm() < 1e-11 * (by_unknown.norm() * exact.norm()));
+  }
 }
 
 TEST_CASE("A window without hold is said, not solved", "[schur_window]") {
