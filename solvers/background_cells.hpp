@@ -55,18 +55,20 @@ inline constexpr int most_cell_points = 27;
 /// Points of a quadrature rule over the surface, `weight` is an area, m2. Triangles of the tessellation are divided to
 /// edges of at most `edge` local spacings; each carries three points, exact for quadratic functions, or its centroid
 /// alone where it is less than `centroid_below` spacings long. Triangles that a sheet of the incision (null: uncut)
-/// meets are divided by it.
+/// meets are divided by it. With `region` only triangles whose bounding boxes meet it count, the same points as
+/// without.
 struct SurfacePoint {
   Vector3 position;
   Vector3 normal;
   double weight;
 };
 std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes, double edge = 0.5,
-                                             double centroid_below = 0, const topology::Incision* incision = nullptr);
+                                             double centroid_below = 0, const topology::Incision* incision = nullptr,
+                                             const BoundingBox* region = nullptr);
 
 /// The same over both faces of an incision, as far as they lie inside the body: positions lip_offset spacings off the
 /// sheet, normals out of the material.
 std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge = 0.5,
-                                         double centroid_below = 0);
+                                         double centroid_below = 0, const BoundingBox* region = nullptr);
 
 } // namespace spherecut::solvers

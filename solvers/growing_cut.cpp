@@ -23,6 +23,11 @@ namespace {
 /// the sphere radius. What their spheres covered or will cover changes too.
 constexpr double node_margin = 0.35;
 
+/// Shares of the surface about some nodes are found from the surface this far around them, in spacings.
+constexpr double shares_reach = 4;
+/// A share itself changes when faces or surface nodes come this near to it, in spacings.
+constexpr double share_size = 2;
+
 /// Points of a sheet no farther than `spacing` apart, m: corners and midpoints of its triangles, divided as needed.
 std::vector<Vector3> sample_points(const topology::SurfaceMesh& sheet, std::size_t first_triangle, double spacing) {
   std::vector<Vector3> points;
@@ -159,7 +164,6 @@ struct GrowingCut::State {
   VectorX first_loads;   // 3N at condensation, all loads
   VectorX loads;         // 3N as they stand
   MatrixX reduced_first; // by slots
-  std::unique_ptr<SurfacePatches> patches;
   std::vector<DisplacementMean> contact;
   MatrixX compliance;
   VectorX base;
@@ -302,10 +306,27 @@ struct GrowingCut::State {
   }
 
   void find_contact() {
-    patches = std::make_unique<SurfacePatches>(*problem.domain, problem.nodes, problem.incision);
     contact.clear();
+    if (options.contact.empty())
+      return;
+    BoundingBox region{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
+    for (int node : options.contact) {
+      const double room = shares_reach * problem.nodes.spacings[node];
+      region.lower = region.lower.cwiseMin((problem.nodes.positions[node].array() - room).matrix());
+      region.upper = region.upper.cwiseMax((problem.nodes.positions[node].array() + room).matrix());
+    }
+    const SurfacePatches patches(*problem.domain, problem.nodes, problem.incision, region);
     for (int node : options.contact)
-      contact.push_back(patches->mean(node, *spheres, problem.prescribed_region));
+      contact.push_back(patches.mean(node, *spheres, problem.prescribed_region));
+  }
+
+  /// Whether an increment along `way` may change what lies within `half` of x, m.
+  [[nodiscard]] auto reach_of(const topology::SurfaceMesh& way) const {
+    const double finest = *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
+    return [this, finest, to_way = std::make_shared<Nearness>(sample_points(way, 0, 0.5 * finest))](const Vector3& x,
+                                                                                                    double half) {
+      return (*to_way)(x)-half - 0.5 * finest < radius_at(x) * std::max(1 + node_margin, enrichment_reach());
+    };
   }
 
   void condense_all();
@@ -342,14 +363,11 @@ void GrowingCut::State::condense_all() {
   const topology::Domain& domain = *problem.domain;
   BackgroundCells filled;
   std::vector<char> in_window(problem.nodes.size(), 0);
-  const double finest = *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
-  const Nearness way(sample_points(options.way, 0, 0.5 * finest));
+  const auto in_reach = reach_of(options.way);
   cell_loads = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
   for (const BackgroundBox& leaf : stiffness.cells.boxes) {
     Box box{leaf, {}, {}};
-    const double radius = radius_at(leaf.centre);
-    const bool reached =
-        way(leaf.centre) - leaf.half.norm() - 0.5 * finest < radius * std::max(1 + node_margin, enrichment_reach());
+    const bool reached = in_reach(leaf.centre, leaf.half.norm());
     if (reached || has_cell_loads()) {
       refill_box(domain, leaf, background(), problem.incision.get(), filled);
       evaluate(box, filled, evaluator);
@@ -510,7 +528,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   // New spheres; the state changes only when all touched cells are known to lie in the window.
   const Stopwatch sphere_watch;
   const std::vector<double> old_radii = s.spheres->radii();
-  const auto fresh_spheres =
+  auto fresh_spheres =
       std::make_unique<Spheres>(next.nodes.positions, next.nodes.spacings, s.rho, Basis::linear, worst_moment_condition,
                                 sight_about_cut(next, s.options.method.sight), removed);
   std::vector<int> changed_nodes = change.removed;
@@ -573,7 +591,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
             outside = "the cut left the predicted way";
     exchanged.emplace_back(b, std::move(box));
   }
-  // The same for means of the held surface whose points see the change.
+  // The same for means over the surface: those whose points see the change have new weights, and where the faces or
+  // surface nodes come near the shares themselves are new.
   const auto is_near = [&](const DisplacementMean& mean) {
     const double radius = s.radius_at(mean.centroid), share = 0.5 * radius;
     return to_faces(mean.centroid) < radius + share ||
@@ -581,16 +600,36 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
            std::any_of(balls.begin(), balls.end(),
                        [&](const auto& ball) { return (ball.first - mean.centroid).norm() < ball.second + share; });
   };
+  std::vector<Vector3> surface_changes = changes.faces;
+  for (int node : change.removed)
+    if (s.problem.nodes.kinds[node] != NodeKind::interior)
+      surface_changes.push_back(s.problem.nodes.positions[node]);
+  for (int k = 0; k < change.added.size(); ++k)
+    if (change.added.kinds[k] != NodeKind::interior)
+      surface_changes.push_back(change.added.positions[k]);
+  const Nearness to_surface_changes(surface_changes);
+  const auto is_reshaped = [&](const DisplacementMean& mean, int node) {
+    return to_surface_changes(mean.centroid) < share_size * s.problem.nodes.spacings[node];
+  };
   std::vector<DisplacementMean> held = s.held;
-  if (std::any_of(held.begin(), held.end(), is_near)) {
+  bool reshaped = false;
+  for (std::size_t k = 0; k < held.size(); ++k)
+    reshaped = reshaped || is_reshaped(held[k], next.prescribed[k].node);
+  if (reshaped)
     held = held_means(next, *fresh_spheres);
-    for (std::size_t k = 0; k < held.size(); ++k)
-      if (held[k].nodes != s.held[k].nodes || held[k].weights != s.held[k].weights)
-        for (const DisplacementMean* one : {&held[k], &s.held[k]})
-          for (int node : one->nodes)
-            if (new_slot[node] < 0)
-              outside = "the cut came to the held region";
-  }
+  else
+    for (DisplacementMean& mean : held)
+      if (is_near(mean))
+        mean = reweighed(mean, *fresh_spheres);
+  const auto differs = [&](std::size_t k) {
+    return held[k].nodes != s.held[k].nodes || held[k].weights != s.held[k].weights;
+  };
+  for (std::size_t k = 0; k < held.size(); ++k)
+    if (differs(k))
+      for (const DisplacementMean* one : {&held[k], &s.held[k]})
+        for (int node : one->nodes)
+          if (new_slot[node] < 0)
+            outside = "the cut came to the held region";
   if (outside != nullptr)
     return anew(outside, std::move(next), std::move(removed));
 
@@ -627,7 +666,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     s.add_cell_loads(s.boxes[b], 1, *fresh_spheres, s.cell_loads);
   }
   for (std::size_t k = 0; k < held.size(); ++k)
-    if (held[k].nodes != s.held[k].nodes || held[k].weights != s.held[k].weights) {
+    if (differs(k)) {
       s.scatter(s.held[k], next.prescribed[k], -1);
       s.scatter(held[k], next.prescribed[k], 1);
     }
@@ -642,18 +681,26 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   std::vector<char> previously_removed = std::move(s.removed);
   s.problem = std::move(next);
   s.removed = std::move(removed);
-  *s.spheres = *fresh_spheres;
+  s.spheres = std::move(fresh_spheres);
   s.loads = s.cell_loads + s.surface_loads();
   report.boxes = static_cast<int>(exchanged.size());
   report.cells_seconds = cell_watch.seconds();
 
   try {
     const Stopwatch factor_watch;
-    s.window->factor();
+    report.prepared = s.window->factor();
+    report.factored = s.window->factored();
     report.factor_seconds = factor_watch.seconds();
     const Stopwatch condense_watch;
-    if (std::any_of(s.contact.begin(), s.contact.end(), is_near))
+    bool contact_reshaped = false;
+    for (std::size_t c = 0; c < s.contact.size(); ++c)
+      contact_reshaped = contact_reshaped || is_reshaped(s.contact[c], s.options.contact[c]);
+    if (contact_reshaped)
       s.find_contact();
+    else
+      for (DisplacementMean& mean : s.contact)
+        if (is_near(mean))
+          mean = reweighed(mean, *s.spheres);
     s.condense_contact();
     report.condense_seconds = condense_watch.seconds();
   } catch (const NumericalError&) {
@@ -675,6 +722,31 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
       static_cast<int>(std::count_if(s.window_node.begin(), s.window_node.end(), [](int node) { return node >= 0; }));
   report.total_seconds = total.seconds();
   return report;
+}
+
+double GrowingCut::prepare(const topology::SurfaceMesh& next) {
+  const Stopwatch watch;
+  State& s = *state_;
+  std::vector<char> kept(s.window->slots(), 0);
+  const auto keep = [&](int node) {
+    if (const int block = s.slot[node]; block >= 0)
+      std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
+  };
+  const auto in_reach = s.reach_of(next);
+  for (const State::Box& box : s.boxes)
+    if (!box.cells.empty() && in_reach(box.box.centre, box.box.half.norm()))
+      for (const CellShapes& cell : box.cells)
+        for (int node : cell.nodes)
+          keep(node);
+  for (const DisplacementMean& mean : s.held)
+    if (in_reach(mean.centroid, 0.5 * s.radius_at(mean.centroid)))
+      for (int node : mean.nodes)
+        keep(node);
+  for (const DisplacementMean& mean : s.contact)
+    for (int node : mean.nodes)
+      keep(node);
+  s.window->prepare(kept);
+  return watch.seconds();
 }
 
 const Problem& GrowingCut::problem() const {

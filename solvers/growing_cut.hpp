@@ -34,6 +34,8 @@ struct GrowthReport {
   const char* reason = ""; // why it had to be
   int boxes = 0;           // background boxes exchanged
   int window_nodes = 0;    // nodes in the dense system
+  bool prepared = false;   // what prepare() had eliminated ahead could stay
+  int factored = 0;        // unknowns of the dense system factored in the increment itself
   double spheres_seconds = 0, cells_seconds = 0, factor_seconds = 0, condense_seconds = 0, total_seconds = 0;
 };
 
@@ -50,6 +52,11 @@ class GrowingCut {
   /// appends them), and the nodes change with it. Whatever the window does not cover is condensed anew and said. Throws
   /// as the constructor when the new body cannot be solved; the state is then the one before.
   GrowthReport grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision);
+
+  /// Work ahead of the next increment, whose new faces are expected along `next`: eliminates the part of the window
+  /// that it will not touch. Returns the seconds it took (those of the background, not of the increment). A wrong guess
+  /// costs the increment the whole window, no more.
+  double prepare(const topology::SurfaceMesh& next);
 
   /// Condenses anew about another predicted way (in the background of a real-time loop, from a copy of problem()).
   GrowthReport condense_anew(topology::SurfaceMesh way);

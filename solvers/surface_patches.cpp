@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -94,6 +95,18 @@ Vector3 DisplacementMean::of(const std::function<Vector3(const Vector3& x)>& fie
   return value;
 }
 
+DisplacementMean reweighed(const DisplacementMean& mean, const Spheres& spheres) {
+  if (mean.area == 0)
+    return value_at(spheres, mean.centroid);
+  std::vector<SurfacePoint> points;
+  std::vector<int> all(mean.share.size());
+  std::iota(all.begin(), all.end(), 0);
+  points.reserve(all.size());
+  for (const QuadraturePoint& point : mean.share)
+    points.push_back({point.position, Vector3::Zero(), mean.area * point.weight});
+  return mean_over(points, all, spheres);
+}
+
 DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
   ShapeFunctions shape;
   if (!evaluate(spheres, x, shape))
@@ -103,20 +116,24 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
 }
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
-                               std::shared_ptr<const topology::Incision> incision)
+                               std::shared_ptr<const topology::Incision> incision,
+                               const std::optional<BoundingBox>& region)
     : nodes_(nodes), incision_(std::move(incision)),
-      points_(surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision_.get())),
+      points_(surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision_.get(),
+                                 region ? &*region : nullptr)),
       points_of_node_(nodes.size()) {
   faces_begin_ = static_cast<int>(points_.size());
   if (incision_ != nullptr) {
-    const std::vector<SurfacePoint> faces = lip_quadrature(*incision_, nodes, share_edge, share_centroid_below);
+    const std::vector<SurfacePoint> faces =
+        lip_quadrature(*incision_, nodes, share_edge, share_centroid_below, region ? &*region : nullptr);
     points_.insert(points_.end(), faces.begin(), faces.end());
   }
   for (const bool lips : {false, true}) {
     std::vector<Vector3> positions;
     std::vector<int> ids;
     for (int i = 0; i < nodes.size(); ++i)
-      if (nodes.kinds[i] != NodeKind::interior && (nodes.kinds[i] == NodeKind::lip) == lips) {
+      if (nodes.kinds[i] != NodeKind::interior && (nodes.kinds[i] == NodeKind::lip) == lips &&
+          (!region || region->contains(nodes.positions[i]))) {
         positions.push_back(nodes.positions[i]);
         ids.push_back(i);
       }

@@ -5,6 +5,8 @@
 #include "solvers/discretisation.hpp"
 #include "solvers/shape_functions.hpp"
 
+#include <optional>
+
 namespace spherecut::solvers {
 
 /// A linear functional of the displacement with unit total weight: sum_k weight[k] alpha_{node[k]}.
@@ -19,6 +21,9 @@ struct DisplacementMean {
   [[nodiscard]] Vector3 of(const std::function<Vector3(const Vector3& x)>& field) const;
 };
 
+/// The mean over the same share with the shape functions of `spheres`. Throws NumericalError.
+DisplacementMean reweighed(const DisplacementMean& mean, const Spheres& spheres);
+
 /// Value at one point. Throws NumericalError when no sound support covers it.
 DisplacementMean value_at(const Spheres& spheres, const Vector3& x);
 
@@ -26,8 +31,10 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x);
 /// surface node or, on a face, lip node that it sees.
 class SurfacePatches {
  public:
+  /// With `region` only the shares of nodes deep enough inside it (two spacings) are meant to be asked for.
   SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
-                 std::shared_ptr<const topology::Incision> incision = nullptr);
+                 std::shared_ptr<const topology::Incision> incision = nullptr,
+                 const std::optional<BoundingBox>& region = std::nullopt);
 
   /// Mean over the share of `node` of the surface outside `held` (null: all of it) or, for a lip node, of its face; the
   /// node itself when it has no share.

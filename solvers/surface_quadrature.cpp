@@ -11,6 +11,11 @@ namespace {
 
 using Corners = std::array<Vector3, 3>;
 
+bool is_outside(const Corners& t, const BoundingBox* region) {
+  return region != nullptr && ((t[0].cwiseMax(t[1]).cwiseMax(t[2]).array() < region->lower.array()).any() ||
+                               (t[0].cwiseMin(t[1]).cwiseMin(t[2]).array() > region->upper.array()).any());
+}
+
 double longest_edge(const Corners& t) {
   return std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
 }
@@ -75,7 +80,8 @@ std::array<double, 3> distances(const Corners& t, const topology::Domain& domain
 } // namespace
 
 std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, const NodeCloud& nodes, double edge,
-                                             double centroid_below, const topology::Incision* incision) {
+                                             double centroid_below, const topology::Incision* incision,
+                                             const BoundingBox* region) {
   const topology::PointTree tree(nodes.positions);
   const topology::SurfaceMesh& surface = domain.surface();
   std::vector<SurfacePoint> points;
@@ -85,6 +91,8 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
     while (!pending.empty()) {
       const Corners t = pending.back();
       pending.pop_back();
+      if (is_outside(t, region))
+        continue;
       const double spacing = nodes.spacings[tree.nearest((t[0] + t[1] + t[2]) / 3).index], longest = longest_edge(t);
       if (longest > edge * spacing)
         push_quarters(t, pending);
@@ -98,7 +106,7 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
 }
 
 std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge,
-                                         double centroid_below) {
+                                         double centroid_below, const BoundingBox* region) {
   const topology::PointTree tree(nodes.positions);
   const topology::Domain& domain = *incision.domain();
   std::vector<SurfacePoint> points, face;
@@ -111,7 +119,7 @@ std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, con
         pending.pop_back();
         const Vector3 centre = (t[0] + t[1] + t[2]) / 3;
         const double longest = longest_edge(t);
-        if (domain.signed_distance(centre) > longest)
+        if (is_outside(t, region) || domain.signed_distance(centre) > longest)
           continue;
         const double spacing = nodes.spacings[tree.nearest(centre).index];
         if (longest > edge * spacing) {

@@ -54,12 +54,18 @@ struct Scene {
     p.domain = domain;
     p.incision = sweep.incision();
     p.nodes = nodes;
-    p.material = {5000, 0.45, 1000};
+    p.material = {5000, 0.4, 1000};
     for (int i = 0; i < nodes.size(); ++i)
       if (nodes.kinds[i] != NodeKind::interior && nodes.positions[i].z() < -0.03 + 1e-9)
         p.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
     p.prescribed_region = [](const Vector3& x, const Vector3& normal) { return normal.z() < -0.5 && x.z() < -0.029; };
     return p;
+  }
+
+  /// The strip that the next `length` of the known path will cut.
+  [[nodiscard]] topology::SurfaceMesh strip(const Vector3& way, double length) const {
+    return topology::make_rectangle_sheet(tip() + 0.5 * length * way - 0.5 * depth * Vector3::UnitZ(),
+                                          way.cross(Vector3::UnitZ()), Vector3::UnitZ(), length, depth, 0.001);
   }
 
   [[nodiscard]] GrowthOptions options(int ahead, bool fan, SightRule sight) const {
@@ -71,12 +77,10 @@ struct Scene {
     // Known path: the strip ahead. Unknown: a fan of directions, sampled by three strips.
     for (double angle : fan ? std::vector<double>{-0.785, 0, 0.785} : std::vector<double>{0}) {
       const Vector3 way = std::cos(angle) * heading + std::sin(angle) * across;
-      const topology::SurfaceMesh strip =
-          topology::make_rectangle_sheet(tip() + 0.5 * length * way - 0.5 * depth * Vector3::UnitZ(),
-                                         way.cross(Vector3::UnitZ()), Vector3::UnitZ(), length, depth, 0.001);
+      const topology::SurfaceMesh one = strip(way, length);
       const int offset = static_cast<int>(o.way.vertices.size());
-      o.way.vertices.insert(o.way.vertices.end(), strip.vertices.begin(), strip.vertices.end());
-      for (const Triangle& t : strip.triangles)
+      o.way.vertices.insert(o.way.vertices.end(), one.vertices.begin(), one.vertices.end());
+      for (const Triangle& t : one.triangles)
         o.way.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
     }
     for (int i = 0; i < nodes.size(); ++i)
@@ -90,8 +94,8 @@ struct Scene {
 void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
   constexpr int increments = 3;
   GrowthReport sum;
-  double worst = 0, sprinkle_seconds = 0, anew = 0;
-  int count = 0, unknowns = 0, condensed = 0, nodes = 0;
+  double worst = 0, sprinkle_seconds = 0, prepare_seconds = 0, anew = 0;
+  int count = 0, unknowns = 0, factored = 0, unprepared = 0, condensed = 0, nodes = 0;
   for (auto _ : state) {
     Scene scene(static_cast<int>(state.range(0)));
     const auto start = std::chrono::steady_clock::now();
@@ -101,6 +105,8 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
     double seconds = 0;
     for (int k = 0; k < increments; ++k) {
       const auto before = scene.sweep.incision();
+      if (!fan)
+        prepare_seconds += cut.prepare(scene.strip(heading, step));
       scene.advance();
       const auto sprinkle_start = std::chrono::steady_clock::now();
       scene.sprinkling.incision = scene.sweep.incision();
@@ -122,6 +128,8 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
       sum.cells_seconds += report.cells_seconds;
       sum.factor_seconds += report.factor_seconds;
       sum.condense_seconds += report.condense_seconds;
+      factored = std::max(factored, report.factored);
+      unprepared += report.prepared ? 0 : 1;
       unknowns = cut.window_unknowns();
       ++count;
     }
@@ -129,6 +137,9 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
   }
   state.counters["nodes"] = nodes;
   state.counters["window"] = unknowns;
+  state.counters["factored"] = factored;
+  state.counters["unprepared"] = unprepared;
+  state.counters["prepare_ms"] = 1e3 * prepare_seconds / count;
   state.counters["boxes"] = static_cast<double>(sum.boxes) / count;
   state.counters["spheres_ms"] = 1e3 * sum.spheres_seconds / count;
   state.counters["cells_ms"] = 1e3 * sum.cells_seconds / count;

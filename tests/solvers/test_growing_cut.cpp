@@ -131,11 +131,19 @@ TEST_CASE("A cut that grows in its window gives the system built from scratch", 
   check_against_scratch(cut, options.contact.size());
   const MatrixX before = cut.compliance();
   for (int increment = 0; increment < 3; ++increment) {
+    if (increment == 1) // what the next increment leaves alone, eliminated ahead
+      cut.prepare(block.way(block.front, block.front + 0.12));
+    if (increment == 2) // a wrong guess
+      cut.prepare(block.way(-0.5, -0.49));
     const NodeChange change = block.grow(0.12);
     const GrowthReport report = cut.grow(change, block.incision());
     INFO(report.reason);
     CHECK_FALSE(report.condensed_anew);
     CHECK(report.boxes > 0);
+    CHECK(report.factored > 0);
+    CHECK(report.factored <= cut.window_unknowns());
+    if (increment != 1)
+      CHECK_FALSE(report.prepared);
     check_against_scratch(cut, options.contact.size());
   }
   CHECK(cut.compliance().trace() > 1.01 * before.trace()); // a longer cut is softer
