@@ -109,7 +109,8 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
       output.add(session, result);
       progress.step(output.findings().steps, session.steps().size(), step_text(result));
     }
-    output.check_pieces(session);
+    if (output.findings().steps > 0)
+      output.check_pieces(session, session.steps()[output.findings().steps - 1].time);
     output.draw_figures(session);
     output.write_summary(session, end == RunEnd::complete ? RunStatus::complete : RunStatus::interrupted, "");
   } catch (const std::exception& error) {

@@ -2,7 +2,7 @@
 
 #include "src/summary.hpp"
 #include "topology/errors.hpp"
-#include "topology/voxel_pieces.hpp"
+#include "topology/piece_audit.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -107,6 +107,9 @@ void RunOutput::add(const Session& session, const StepResult& step) {
     forces_->write(force_row(step));
   if (step.cut) {
     cuts_->write(cut_row(step.time, *step.cut));
+    const int before = findings_.steps == 0 ? 1 : findings_.cut.pieces;
+    if (step.cut->pieces != before)
+      check_pieces(session, step.time);
     findings_.cut = *step.cut;
     findings_.largest_opening = std::max(findings_.largest_opening, step.cut->opening);
     findings_.increments += step.cut->triangles > 0 ? 1 : 0;
@@ -199,14 +202,27 @@ void RunOutput::keep_profile(const Session& session, const StepResult& step) {
   profile_.series = {std::move(rest), std::move(deformed), std::move(tool)};
 }
 
-void RunOutput::check_pieces(const Session& session) {
-  if (session.incision() == nullptr)
+void RunOutput::check_pieces(const Session& session, double time) {
+  if (session.incision() == nullptr || pieces_checked(time))
     return;
-  const topology::LevelSet organ(session.organ().domain->surface());
-  findings_.voxel_volumes = topology::count_pieces(organ, *session.incision()).volumes;
-  if (const auto pieces = static_cast<int>(findings_.voxel_volumes.size()); pieces != findings_.cut.pieces)
-    remarks_.push_back(fmt::format("the wound has {} pieces, voxels of {:.2g} m tell {}", findings_.cut.pieces,
-                                   organ.voxel_size(), pieces));
+  if (level_set_ == nullptr)
+    level_set_ = std::make_unique<topology::LevelSet>(session.organ().domain->surface());
+  const topology::Wound& wound = *session.wound();
+  const double voxel = level_set_->voxel_size();
+  const topology::VoxelPieces voxels = topology::count_pieces(*level_set_, *session.incision(), 27, true);
+  const auto difference = topology::component_difference(wound);
+  const int pieces = static_cast<int>(wound.pieces.size());
+  findings_.piece_checks.push_back({time, pieces, voxels.volumes, voxel,
+                                    topology::hausdorff_distance(wound, voxels, voxel), !difference.has_value()});
+  if (difference)
+    remarks_.push_back(fmt::format("t = {:.4g} s: {}", time, *difference));
+  if (const auto counted = static_cast<int>(voxels.volumes.size()); counted != pieces)
+    remarks_.push_back(
+        fmt::format("t = {:.4g} s: the wound has {} pieces, voxels of {:.2g} m tell {}", time, pieces, voxel, counted));
+}
+
+bool RunOutput::pieces_checked(double time) const {
+  return !findings_.piece_checks.empty() && findings_.piece_checks.back().time == time;
 }
 
 void RunOutput::draw_figures(const Session& session) {

@@ -5,6 +5,7 @@
 #include "src/output_file.hpp"
 #include "src/session.hpp"
 #include "src/vtp.hpp"
+#include "topology/level_set.hpp"
 
 namespace spherecut::app {
 
@@ -21,7 +22,16 @@ struct RunFindings {
   CutReport cut;                                      // of the last step
   double largest_opening = 0;                         // m
   int increments = 0, refused_cuts = 0;
-  std::vector<double> voxel_volumes; // m3, of the pieces by flooding voxels, largest first; empty: not counted
+  /// Second opinions on the pieces: whenever their number has changed, and at the end.
+  struct PieceCheck {
+    double time = 0;                   // s
+    int pieces = 0;                    // of the wound
+    std::vector<double> voxel_volumes; // m3, of the pieces by flooding voxels, largest first
+    double voxel_size = 0;             // m
+    double hausdorff = 0;              // m, between wound and voxels; infinite when the numbers differ
+    bool components_agree = true;      // with CGAL's count, Euler characteristics and volumes
+  };
+  std::vector<PieceCheck> piece_checks;
 };
 
 class RunOutput {
@@ -33,9 +43,9 @@ class RunOutput {
   /// Adds the row, and the frame when one is due, of the step that the session has just done.
   void add(const Session& session, const StepResult& step);
 
-  /// Counts the pieces of the cut body once more, by flooding voxels of the organ's level set. A count that differs
-  /// from that of the wound is a remark.
-  void check_pieces(const Session& session);
+  /// Counts the pieces of the cut body once more, by CGAL and by flooding voxels of the organ's level set. A count that
+  /// differs from that of the wound is a remark.
+  void check_pieces(const Session& session, double time);
 
   /// Draws the figures. What stops gnuplot is a remark in the summary, the numbers are safe by then.
   void draw_figures(const Session& session);
@@ -47,6 +57,7 @@ class RunOutput {
   [[nodiscard]] const std::vector<std::string>& remarks() const { return remarks_; }
 
  private:
+  [[nodiscard]] bool pieces_checked(double time) const;
   void add_frame(const Session& session, const StepResult& step);
   void draw(const Figure& figure, const std::string& name);
   void keep_profile(const Session& session, const StepResult& step);
@@ -54,6 +65,7 @@ class RunOutput {
   std::filesystem::path folder_;
   std::optional<OutputFile> forces_, cuts_; // with a tool, with a cut
   RunFindings findings_;
+  std::unique_ptr<topology::LevelSet> level_set_; // of the organ, from the first check of pieces on
   std::vector<SeriesEntry> series_;
   std::vector<StepResult> history_;
   Figure profile_;

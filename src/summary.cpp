@@ -2,6 +2,7 @@
 
 #include "src/version.hpp"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace spherecut::app {
@@ -84,6 +85,18 @@ Json solver(const Session& session, const RunFindings& findings) {
   return out;
 }
 
+Json piece_checks(const RunFindings& findings) {
+  Json out = Json::array();
+  for (const RunFindings::PieceCheck& check : findings.piece_checks)
+    out.push_back({{"time_s", check.time},
+                   {"pieces", check.pieces},
+                   {"components_agree", check.components_agree},
+                   {"voxel_size_m", check.voxel_size},
+                   {"voxel_volumes_m3", check.voxel_volumes},
+                   {"hausdorff_m", std::isfinite(check.hausdorff) ? Json(check.hausdorff) : Json(nullptr)}});
+  return out;
+}
+
 Json cut(const Session& session, const RunFindings& findings) {
   const CutReport& last = findings.cut;
   return {{"increments", findings.increments},
@@ -94,7 +107,7 @@ Json cut(const Session& session, const RunFindings& findings) {
           {"pieces", last.pieces},
           {"unheld_pieces", last.unheld},
           {"volumes_m3", last.volumes},
-          {"voxel_volumes_m3", findings.voxel_volumes},
+          {"piece_checks", piece_checks(findings)},
           {"opening_m", last.opening},
           {"largest_opening_m", findings.largest_opening},
           {"opening_volume_m3", last.opening_volume},

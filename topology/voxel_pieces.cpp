@@ -70,7 +70,7 @@ std::vector<openvdb::Coord> near_sheets(const openvdb::BoolTree& inside, const I
 
 } // namespace
 
-VoxelPieces count_pieces(const LevelSet& organ, const Incision& incision, int fewest_voxels) {
+VoxelPieces count_pieces(const LevelSet& organ, const Incision& incision, int fewest_voxels, bool with_skins) {
   openvdb::initialize();
   const double voxel = organ.voxel_size();
   openvdb::BoolTree inside(false);
@@ -127,12 +127,43 @@ VoxelPieces count_pieces(const LevelSet& organ, const Incision& incision, int fe
     totals[pieces.find(i)] += counts[i];
   VoxelPieces result;
   const double volume = std::pow(voxel, 3);
-  for (const double total : totals)
-    if (total >= fewest_voxels)
-      result.volumes.push_back(total * volume);
+  std::vector<int> kept; // numbers of the pieces, largest first
+  for (int i = 1; i < pieces.size(); ++i)
+    if (totals[i] >= fewest_voxels)
+      kept.push_back(i);
     else
-      result.crumbs += total * volume;
-  std::sort(result.volumes.begin(), result.volumes.end(), std::greater<>());
+      result.crumbs += totals[i] * volume;
+  std::stable_sort(kept.begin(), kept.end(), [&](int a, int b) { return totals[a] > totals[b]; });
+  for (const int piece : kept)
+    result.volumes.push_back(totals[piece] * volume);
+  if (!with_skins)
+    return result;
+  std::vector<int> place(pieces.size(), -1);
+  for (std::size_t k = 0; k < kept.size(); ++k)
+    place[kept[k]] = static_cast<int>(k);
+  result.skins.resize(kept.size());
+  for (auto voxels = inside.cbeginValueOn(); voxels; ++voxels) {
+    const openvdb::CoordBBox box = voxels.getBoundingBox(); // of one voxel, or of a tile
+    const Vector3 lower = centre(box.min(), voxel), upper = centre(box.max(), voxel);
+    const bool uncut = !incision.near(0.5 * (lower + upper), 0.5 * (upper - lower).norm() + voxel);
+    openvdb::Coord at;
+    for (at.x() = box.min().x(); at.x() <= box.max().x(); ++at.x())
+      for (at.y() = box.min().y(); at.y() <= box.max().y(); ++at.y())
+        for (at.z() = box.min().z(); at.z() <= box.max().z(); ++at.z())
+          for (int d = 0; d < 3; ++d)
+            for (const int side : {-1, 1}) {
+              openvdb::Coord beside = at;
+              beside[d] += side;
+              const bool in_body = inside.isValueOn(beside);
+              if (uncut && in_body && box.isInside(beside))
+                continue;
+              const int own = pieces.find(piece_of(at));
+              if (place[own] < 0 || (in_body && pieces.find(piece_of(beside)) == own &&
+                                     !incision.blocks(centre(at, voxel), centre(beside, voxel))))
+                continue;
+              result.skins[place[own]].push_back({0.5 * (centre(at, voxel) + centre(beside, voxel)), d});
+            }
+  }
   return result;
 }
 

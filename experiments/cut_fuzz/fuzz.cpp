@@ -2,6 +2,7 @@
 
 #include "topology/errors.hpp"
 #include "topology/organs.hpp"
+#include "topology/piece_audit.hpp"
 #include "topology/surface_check.hpp"
 
 #include <Eigen/Geometry>
@@ -24,47 +25,6 @@ namespace {
 
 constexpr double volume_tolerance = 1e-9; // of the organ's
 
-struct Recount {
-  int components = 0;
-  std::vector<int> component; // per triangle
-  std::vector<double> volume; // m3
-  std::vector<int> euler;
-};
-
-Recount recount(const SurfaceMesh& surface) {
-  std::vector<int> group(surface.vertices.size());
-  std::iota(group.begin(), group.end(), 0);
-  const auto root = [&](int v) {
-    while (group[v] != v)
-      v = group[v] = group[group[v]];
-    return v;
-  };
-  for (const Triangle& t : surface.triangles)
-    for (int e = 0; e < 2; ++e)
-      group[root(t[e])] = root(t[e + 1]);
-  Recount result;
-  std::map<int, int> number;
-  const Vector3 centre = topology::bounds(surface).centre();
-  for (const Triangle& t : surface.triangles) {
-    const int c = number.emplace(root(t[0]), static_cast<int>(number.size())).first->second;
-    result.component.push_back(c);
-    result.volume.resize(number.size(), 0);
-    result.euler.resize(number.size(), 0);
-    const std::vector<Vector3>& x = surface.vertices;
-    result.volume[c] += (x[t[0]] - centre).dot((x[t[1]] - centre).cross(x[t[2]] - centre)) / 6;
-    ++result.euler[c];
-  }
-  result.components = static_cast<int>(number.size());
-  std::set<std::pair<int, int>> edges;
-  for (const Triangle& t : surface.triangles)
-    for (int e = 0; e < 3; ++e)
-      if (edges.insert(std::minmax({t[e], t[(e + 1) % 3]})).second)
-        --result.euler[number.at(root(t[e]))];
-  for (std::size_t v = 0; v < group.size(); ++v)
-    ++result.euler[number.at(root(static_cast<int>(v)))];
-  return result;
-}
-
 } // namespace
 
 std::optional<std::string> wound_defect(const Wound& wound, double organ_volume) {
@@ -79,23 +39,11 @@ std::optional<std::string> wound_defect(const Wound& wound, double organ_volume)
   if (!(std::abs(total / organ_volume - 1) <= volume_tolerance))
     return fmt::format("volume changes by {:.3g} of itself", total / organ_volume - 1);
 
-  const Recount counted = recount(surface);
-  if (counted.components != std::ssize(wound.components))
-    return fmt::format("{} components, recounted {}", wound.components.size(), counted.components);
+  if (auto difference = topology::component_difference(wound))
+    return difference;
   std::vector<double> piece_volumes(wound.pieces.size(), 0);
-  std::vector<bool> seen(wound.components.size(), false);
-  for (std::size_t t = 0; t < counted.component.size(); ++t) {
-    const int mine = wound.component[t], theirs = counted.component[t];
-    if (seen[mine])
-      continue;
-    seen[mine] = true;
-    const topology::WoundComponent& component = wound.components[mine];
-    if (component.euler != counted.euler[theirs])
-      return fmt::format("Euler characteristic {}, recounted {}", component.euler, counted.euler[theirs]);
-    if (!(std::abs(component.volume - counted.volume[theirs]) <= volume_tolerance * organ_volume))
-      return fmt::format("component of {:.6g} m3, recounted {:.6g}", component.volume, counted.volume[theirs]);
-    piece_volumes[component.piece] += counted.volume[theirs];
-  }
+  for (const topology::WoundComponent& component : wound.components)
+    piece_volumes[component.piece] += component.volume;
   for (std::size_t p = 0; p < wound.pieces.size(); ++p)
     if (!(std::abs(wound.pieces[p].volume - piece_volumes[p]) <= volume_tolerance * organ_volume) ||
         wound.pieces[p].components < 1 || !(wound.pieces[p].volume > -volume_tolerance * organ_volume))

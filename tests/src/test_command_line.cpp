@@ -176,8 +176,12 @@ TEST_CASE(
     CHECK_THAT(result.out, Contains("peak force") && Contains("cut of") && Contains("1 piece"));
     const auto summary = nlohmann::json::parse(read_file(out / "summary.json"));
     CHECK(summary["cut"]["pieces"] == 1);
-    REQUIRE(summary["cut"]["voxel_volumes_m3"].size() == 1);
-    CHECK(summary["cut"]["voxel_volumes_m3"][0].get<double>() == Approx(0.06 * 0.06 * 0.03).epsilon(0.05));
+    REQUIRE(summary["cut"]["piece_checks"].size() >= 1);
+    const auto& check = summary["cut"]["piece_checks"].back();
+    CHECK(check["components_agree"] == true);
+    REQUIRE(check["voxel_volumes_m3"].size() == 1);
+    CHECK(check["voxel_volumes_m3"][0].get<double>() == Approx(0.06 * 0.06 * 0.03).epsilon(0.05));
+    CHECK(check["hausdorff_m"].get<double>() <= check["voxel_size_m"].get<double>());
     CHECK(summary["cut"]["opening_m"].get<double>() > 1e-5);
     CHECK(summary["cut"]["area_m2"].get<double>() == Approx(0.06 * 0.012).epsilon(0.05));
     const std::string rows = read_file(out / "cuts.csv");

@@ -1,7 +1,9 @@
 #include "topology/voxel_pieces.hpp"
 
 #include "topology/cut_sheets.hpp"
+#include "topology/errors.hpp"
 #include "topology/organs.hpp"
+#include "topology/piece_audit.hpp"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
@@ -90,4 +92,57 @@ TEST_CASE("A liver cut across is two pieces whose volumes add up to it", "[voxel
   REQUIRE(halves.volumes.size() == 2);
   CHECK(halves.volumes[0] + halves.volumes[1] + halves.crumbs == Approx(whole.volumes[0]));
   CHECK(halves.volumes[1] > 0.2 * whole.volumes[0]);
+}
+
+TEST_CASE("Wound, CGAL and voxels agree on pieces, Euler characteristics and surfaces", "[voxel_pieces]") {
+  struct Scene {
+    SurfaceMesh organ;
+    double voxel;
+    std::vector<SurfaceMesh> sheets;
+    std::size_t pieces;
+  };
+  const Vector3 normal = Vector3(1, 0.3, 0.2).normalized(), centre(0.0204, 0.0203, 0.0151), up(0, 0, 1);
+  const SurfaceMesh small = make_block(Vector3(0.0004, 0.0004, 0.0004), Vector3(0.0504, 0.0404, 0.0304), 0.005);
+  const SurfaceMesh bubble = make_block(Vector3(0.0151, 0.0152, 0.0103), Vector3(0.0252, 0.0254, 0.0207), 0.002);
+  const std::vector<Scene> scenes = {
+      {small, 0.001, {}, 1},
+      {small, 0.001, {make_disc_sheet(centre, normal, 0.01, 0.002)}, 1},
+      {small, 0.001, {make_rectangle_sheet(centre, normal, up, 0.08, 0.08, 0.004)}, 2},
+      {small,
+       0.001,
+       {make_rectangle_sheet(centre, normal, up, 0.09, 0.09, 0.004),
+        make_rectangle_sheet(centre, normal.cross(up), up, 0.09, 0.09, 0.004)},
+       4},
+      {small, 0.001, {bubble}, 2},
+      {make_liver(5000),
+       0.002,
+       {make_rectangle_sheet(Vector3(0.01, 0, 0), Vector3(1, 0.4, 0.1), Vector3(0, 0, 1), 0.3, 0.3, 0.005)},
+       2}};
+  for (std::size_t s = 0; s < scenes.size(); ++s) {
+    const Scene& scene = scenes[s];
+    INFO("scene " << s);
+    const Wound wound = cut_surface(scene.organ, scene.sheets);
+    CHECK(wound.pieces.size() == scene.pieces);
+    CHECK(component_difference(wound).value_or("") == "");
+    const auto domain = make_organ_domain(scene.organ);
+    const VoxelPieces pieces =
+        count_pieces(LevelSet(scene.organ, scene.voxel), Incision(scene.sheets, domain), 27, true);
+    REQUIRE(pieces.volumes.size() == scene.pieces);
+    CHECK(hausdorff_distance(wound, pieces, scene.voxel) <= scene.voxel);
+  }
+}
+
+TEST_CASE("CGAL's count tells a wound whose numbers are wrong", "[voxel_pieces]") {
+  const SurfaceMesh organ = make_block(Vector3(0, 0, 0), Vector3(0.05, 0.04, 0.03), 0.01);
+  Wound wound = cut_surface(
+      organ, {make_rectangle_sheet(Vector3(0.02, 0.02, 0.015), Vector3(1, 0.1, 0), Vector3(0, 0, 1), 0.1, 0.1, 0.01)});
+  REQUIRE(wound.components.size() == 2);
+  CHECK_FALSE(component_difference(wound));
+  wound.components[1].euler += 1;
+  CHECK(component_difference(wound)->find("Euler characteristic 3") != std::string::npos);
+  wound.components.pop_back();
+  CHECK(component_difference(wound)->find("1 components, CGAL tells 2") != std::string::npos);
+  SurfaceMesh open = organ;
+  open.triangles.pop_back();
+  CHECK_THROWS_AS(audit_components(open), InputError);
 }
