@@ -444,7 +444,7 @@ std::vector<Field> Collocation::force_responses(const std::vector<int>& candidat
 // A force at a point goes to the cells around it in the shares of the shape functions there, which keep its sum and,
 // since they reproduce linear fields, its moment.
 std::vector<Field> Collocation::pattern_responses(const std::vector<ForcePattern>& patterns) const {
-  const MatrixX loads = pattern_loads(patterns);
+  const MatrixX loads = pattern_loads(spheres_, patterns);
   MatrixX right = MatrixX::Zero(report_.unknowns, loads.cols());
   for (int i = 0; i < problem_.nodes.size(); ++i)
     for (int c = 0; c < 3; ++c)

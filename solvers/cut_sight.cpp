@@ -9,6 +9,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
@@ -46,6 +47,9 @@ Scratch& scratch_of_this_thread() {
   thread_local Scratch scratch;
   return scratch;
 }
+
+using Clock = std::chrono::steady_clock;
+thread_local Clock::duration sight_time{};
 
 /// The moving least squares problem on the first `size` basis functions. `slope` holds the derivatives of P at x. The
 /// arrays of `out` have n entries. Returns the 1-norm condition of the moment matrix scaled to a unit diagonal.
@@ -109,6 +113,10 @@ void blend(ShapeFunctions& out, const ShapeFunctions& other, double share, const
 }
 
 } // namespace
+
+double sight_seconds() {
+  return std::chrono::duration<double>(sight_time).count();
+}
 
 Branch branch_at(const topology::Incision& incision, const FrontFrame& frame, const Vector3& x) {
   const Vector3 d = x - frame.point;
@@ -222,6 +230,7 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
   const bool may_hide = incision.near(x, largest_radius);
   const bool may_enrich = bends && sight_.rule == SightRule::enriched && enrich == Enrich::where_near && !second;
   std::optional<FrontFrame> front;
+  const Clock::time_point looked = Clock::now();
   if (bends && (may_enrich || may_hide))
     front = incision.front_frame(x, std::max(may_enrich ? longest_reach_ : 0, may_hide ? largest_radius : 0));
 
@@ -260,6 +269,7 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
     ++n;
   }
   support.count = n;
+  sight_time += Clock::now() - looked;
 
   const double reach = front ? sight_.reach * front_spacing_[front->segment] : 0;
   const bool enriched = may_enrich && front && front->distance < reach && front->distance > 1e-9 * reach;

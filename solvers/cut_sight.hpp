@@ -60,4 +60,8 @@ class CutSight {
   double smallest_radius_ = 0;         // m
 };
 
+/// Wall clock that this thread has spent so far on what points see around cuts (sight lines, ways around the front, the
+/// frame of the nearest front), s. Take differences.
+double sight_seconds();
+
 } // namespace spherecut::solvers

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
+#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -56,15 +57,21 @@ void check_problem(const Problem& problem) {
 }
 
 NodalSupports nodal_supports(const Spheres& spheres) {
+  std::vector<int> all(static_cast<std::size_t>(spheres.size()));
+  std::iota(all.begin(), all.end(), 0);
+  return nodal_supports(spheres, all);
+}
+
+NodalSupports nodal_supports(const Spheres& spheres, const std::vector<int>& nodes) {
   NodalSupports supports;
-  const int count = spheres.size();
+  const std::size_t count = nodes.size();
   supports.start.assign(1, 0);
   supports.start.reserve(count + 1);
   supports.nodes.reserve(32 * count);
   supports.value.reserve(32 * count);
   supports.gradient.reserve(32 * count);
   ShapeFunctions shape;
-  for (int i = 0; i < count; ++i) {
+  for (const int i : nodes) {
     if (!evaluate(spheres, spheres.centres()[i], shape))
       throw NumericalError(fmt::format("node {}: its support has {} nodes and moment condition {:.1e}; it is not sound",
                                        i, shape.size(), shape.moment_condition));
@@ -108,12 +115,17 @@ ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double fro
   report_.supports_seconds = watch.seconds();
 }
 
+VectorX NodalSupports::displacements(const Field& field) const {
+  const Eigen::Index count = std::ssize(start) - 1;
+  VectorX result = VectorX::Zero(3 * count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    for (int k = start[i]; k < start[i + 1]; ++k)
+      result.segment<3>(3 * i) += value[k] * field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(nodes[k]));
+  return result;
+}
+
 VectorX ElasticBody::nodal_displacements(const Field& field) const {
-  VectorX displacements = VectorX::Zero(3 * problem_.nodes.size());
-  for (int i = 0; i < problem_.nodes.size(); ++i)
-    for (int k = supports_.start[i]; k < supports_.start[i + 1]; ++k)
-      displacements.segment<3>(3 * i) += supports_.value[k] * field.coefficients.segment<3>(3 * supports_.nodes[k]);
-  return displacements;
+  return supports_.displacements(field);
 }
 
 std::vector<Vector3> ElasticBody::constraint_points() const {
@@ -134,13 +146,13 @@ MatrixX ElasticBody::contact_displacements(const std::vector<int>& nodes, const 
   return displacements;
 }
 
-MatrixX ElasticBody::pattern_loads(const std::vector<ForcePattern>& patterns) const {
-  MatrixX loads = MatrixX::Zero(3 * static_cast<Eigen::Index>(problem_.nodes.size()), std::ssize(patterns));
+MatrixX pattern_loads(const Spheres& spheres, const std::vector<ForcePattern>& patterns) {
+  MatrixX loads = MatrixX::Zero(3 * static_cast<Eigen::Index>(spheres.size()), std::ssize(patterns));
   ShapeFunctions shape;
   for (std::size_t p = 0; p < patterns.size(); ++p)
     for (std::size_t q = 0; q < patterns[p].points.size(); ++q) {
       const Vector3& x = patterns[p].points[q];
-      if (!evaluate(spheres_, x, shape))
+      if (!evaluate(spheres, x, shape))
         throw NumericalError(
             fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
       for (int k = 0; k < shape.size(); ++k)
@@ -152,7 +164,7 @@ MatrixX ElasticBody::pattern_loads(const std::vector<ForcePattern>& patterns) co
 
 MatrixX ElasticBody::pattern_displacements(const std::vector<ForcePattern>& patterns,
                                            const std::vector<Field>& fields) const {
-  const MatrixX loads = pattern_loads(patterns);
+  const MatrixX loads = pattern_loads(spheres_, patterns);
   MatrixX displacements(std::ssize(patterns), std::ssize(fields));
   for (std::size_t f = 0; f < fields.size(); ++f)
     displacements.col(static_cast<Eigen::Index>(f)) = loads.transpose() * fields[f].coefficients;
@@ -161,8 +173,16 @@ MatrixX ElasticBody::pattern_displacements(const std::vector<ForcePattern>& patt
 
 PointState ElasticBody::at(const Vector3& x, const Field& field) const {
   thread_local ShapeFunctions shape;
-  if (!evaluate(spheres_, x, shape))
+  require_support(spheres_, x, shape);
+  return state_from(problem_, shape, field);
+}
+
+void require_support(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape) {
+  if (!evaluate(spheres, x, shape))
     throw InputError(fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+}
+
+PointState state_from(const Problem& problem, const ShapeFunctions& shape, const Field& field) {
   PointState state;
   double pressure = 0;
   for (int k = 0; k < shape.size(); ++k) {
@@ -175,14 +195,13 @@ PointState ElasticBody::at(const Vector3& x, const Field& field) const {
   }
   state.strain = 0.5 * (state.gradient + state.gradient.transpose());
   // The initial strain acts with the loads. A pressure unknown holds the volumetric part, -lambda tr(strain - initial).
-  const Matrix3& initial = problem_.loads.initial_strain;
+  const Matrix3& initial = problem.loads.initial_strain;
   if (field.pressure.size() > 0)
-    state.stress = 2 * problem_.material.shear_modulus() *
+    state.stress = 2 * problem.material.shear_modulus() *
                        (state.strain - field.load_factor * 0.5 * (initial + initial.transpose())) -
                    pressure * Matrix3::Identity();
   else
-    state.stress =
-        stress_from_gradient(problem_.material, state.gradient) - field.load_factor * initial_stress(problem_);
+    state.stress = stress_from_gradient(problem.material, state.gradient) - field.load_factor * initial_stress(problem);
   return state;
 }
 

@@ -18,10 +18,14 @@ struct NodalSupports {
   std::vector<double> value;
   std::vector<Vector3> gradient; // 1/m
   double worst_moment_condition = 0;
+  /// u_h(x_i), 3 a node, m.
+  [[nodiscard]] VectorX displacements(const Field& field) const;
 };
 
-/// Evaluates the shape functions at all nodes. Throws NumericalError naming the node whose support is not sound.
+/// Evaluates the shape functions at all nodes, or at those listed. Throws NumericalError naming the node whose support
+/// is not sound.
 NodalSupports nodal_supports(const Spheres& spheres);
+NodalSupports nodal_supports(const Spheres& spheres, const std::vector<int>& nodes);
 
 /// Throws InputError for bad material, fewer than 4 nodes, arrays of unequal length, non-finite positions, a
 /// prescribed node out of range, a component prescribed twice, or nothing prescribed (the body would float: 6 rigid
@@ -41,6 +45,16 @@ Matrix3 initial_stress(const Problem& problem);
 /// of a straight crack in mode II 0.3 against 1.6 %) and an increment of a cut changes less than half as much.
 Sight sight_about_cut(const Problem& problem, SightRule rule, double front_radius_factor = 1);
 
+/// Force of each pattern on each node's coefficients, sum of h_j(x) f over its points: 3N rows, a column a pattern.
+/// Throws NumericalError at a point without a sound support.
+MatrixX pattern_loads(const Spheres& spheres, const std::vector<ForcePattern>& patterns);
+
+/// Shape functions at x. Throws InputError when no support covers it.
+void require_support(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape);
+
+/// Everything at a point whose shape functions are known.
+PointState state_from(const Problem& problem, const ShapeFunctions& shape, const Field& field);
+
 /// Shared part of the two finite-sphere discretisations.
 class ElasticBody : public Discretisation {
  public:
@@ -58,8 +72,6 @@ class ElasticBody : public Discretisation {
  protected:
   /// Spheres at the front of a cut are larger by `front_radius_factor`.
   ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor = 1);
-  /// Force of each pattern on each node's coefficients, sum of h_j(x) f over its points: 3N rows, a column a pattern.
-  [[nodiscard]] MatrixX pattern_loads(const std::vector<ForcePattern>& patterns) const;
   Problem problem_;
   AssemblyReport report_;
   Spheres spheres_;

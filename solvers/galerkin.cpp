@@ -55,7 +55,9 @@ class Galerkin final : public ElasticBody {
   }
 
   Method method() const override { return Method::galerkin; }
-  OrderedStiffness stiffness() const { return {stiffness_, order_, anchors_, held_, cells_, spheres_}; }
+  OrderedStiffness stiffness() const {
+    return {stiffness_, order_, anchors_, held_, cells_, spheres_, elastic_stiffness(), !dropped_.empty()};
+  }
 
   Field solve() const override {
     VectorX prescribed = prescribed_values(problem_);
@@ -74,7 +76,7 @@ class Galerkin final : public ElasticBody {
   }
 
   std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override {
-    return fields_of(solve_ordered(pattern_loads(patterns)));
+    return fields_of(solve_ordered(pattern_loads(spheres_, patterns)));
   }
 
   Field prescribed_response(const std::vector<Vector3>& values) const override {
@@ -139,12 +141,13 @@ class Galerkin final : public ElasticBody {
     const Vector3 gap = prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - held_[k].of(coefficients);
     return constraint_stiffness(problem_, entry.node) * held_part(entry, gap);
   }
+  [[nodiscard]] Eigen::Map<const SparseMatrix> elastic_stiffness() const {
+    return {stiffness_.rows(),          stiffness_.cols(),          stiffness_.nonZeros(),
+            stiffness_.outerIndexPtr(), stiffness_.innerIndexPtr(), elastic_.data()};
+  }
   /// Stiffness without the prescribed means times the coefficients, both in node order.
   [[nodiscard]] VectorX elastic_forces(const VectorX& coefficients) const {
-    const Eigen::Map<const SparseMatrix> elastic(stiffness_.rows(), stiffness_.cols(), stiffness_.nonZeros(),
-                                                 stiffness_.outerIndexPtr(), stiffness_.innerIndexPtr(),
-                                                 elastic_.data());
-    return unordered(elastic.selfadjointView<Eigen::Lower>() * VectorX(ordered(coefficients)));
+    return unordered(elastic_stiffness().selfadjointView<Eigen::Lower>() * VectorX(ordered(coefficients)));
   }
   /// The large penalties round off the elastic entries they are added to. One correction, from a residual that keeps
   /// the two apart, takes that back.

@@ -14,6 +14,8 @@ struct OrderedStiffness {
   const std::vector<DisplacementMean>& held; // what each entry of Problem::prescribed holds
   const BackgroundCells& cells;
   const Spheres& spheres;
+  Eigen::Map<const SparseMatrix> elastic; // `lower` without the penalties of the held means
+  bool dropped = false;                   // whether unknowns of severed pieces are taken out
 };
 
 /// Support radius over spacing that the options ask for, or the default for this material.

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <numeric>
+#include <unordered_map>
 #include <utility>
 
 namespace spherecut::solvers {
@@ -111,41 +112,170 @@ Changes changes_between(const topology::Incision* before, const topology::Incisi
 /// Distance to the nearest of some points, infinite when there are none.
 class Nearness {
  public:
-  explicit Nearness(const std::vector<Vector3>& points) {
+  explicit Nearness(const std::vector<Vector3>& points) : points_(points) {
     if (!points.empty())
       tree_.emplace(points);
+  }
+  [[nodiscard]] std::optional<Vector3> place(const Vector3& x) const {
+    return tree_ ? std::optional(points_[static_cast<std::size_t>(tree_->nearest(x).index)]) : std::nullopt;
   }
   [[nodiscard]] double operator()(const Vector3& x) const {
     return tree_ ? std::sqrt(tree_->nearest(x).squared_distance) : std::numeric_limits<double>::infinity();
   }
 
  private:
+  std::vector<Vector3> points_;
   std::optional<topology::PointTree> tree_;
 };
 
+/// Which places a change of the cut can reach: a point x sees a node y of sphere radius R another way only where some
+/// changed place p of faces or front lies on the way, |x - p| + |p - y| < R. Coarse nodes far from the change have
+/// large spheres that it does not concern.
+class Reach {
+ public:
+  /// `radii` of the spheres about `nodes`, 0: absent. `slack` m: how far places between the given ones may be off.
+  Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front, const std::vector<Vector3>& nodes,
+        const std::vector<double>& radii, double slack)
+      : to_faces_(faces), to_front_(front), slack_(slack) {
+    std::vector<Vector3> present;
+    for (std::size_t j = 0; j < nodes.size(); ++j) {
+      if (!(radii[j] > 0))
+        continue;
+      present.push_back(nodes[j]);
+      present_radii_.push_back(radii[j]);
+      if (const double spare = radii[j] - to_faces_(nodes[j]) + slack; spare > 0)
+        by_faces_.push_back({nodes[j], radii[j], spare});
+      if (const double spare = radii[j] - to_front_(nodes[j]) + slack; spare > 0)
+        by_front_.push_back({nodes[j], radii[j], spare});
+    }
+    present_.emplace(present);
+  }
+
+  /// Whether something within `half` m of x sees or is hidden differently.
+  [[nodiscard]] bool sees(const Vector3& x, double half) const {
+    const double faces = to_faces_(x) - half - slack_, front = to_front_(x) - half - slack_;
+    const auto concerns = [&](const std::vector<Eye>& eyes, double distance) {
+      return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) {
+        return distance < eye.spare && (eye.position - x).squaredNorm() < (eye.radius + half) * (eye.radius + half);
+      });
+    };
+    return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front);
+  }
+  /// Whether a place within `half` m of x is nearer to the front, or to the faces, than `radii` sphere radii there.
+  [[nodiscard]] bool near_front(const Vector3& x, double half, double radii) const {
+    return to_front_(x) - half - slack_ < radii * radius_beside(to_front_, x);
+  }
+  [[nodiscard]] bool near_faces(const Vector3& x, double half, double radii) const {
+    return to_faces_(x) - half - slack_ < radii * radius_beside(to_faces_, x);
+  }
+
+ private:
+  struct Eye {
+    Vector3 position;
+    double radius, spare;
+  };
+  /// Radius of the sphere about the node nearest to the change's place nearest to x.
+  [[nodiscard]] double radius_beside(const Nearness& change, const Vector3& x) const {
+    const std::optional<Vector3> place = change.place(x);
+    return place ? present_radii_[static_cast<std::size_t>(present_->nearest(*place).index)] : 0;
+  }
+
+  Nearness to_faces_, to_front_;
+  std::optional<topology::PointTree> present_;
+  std::vector<double> present_radii_;
+  std::vector<Eye> by_faces_, by_front_;
+  double slack_;
+};
+
+NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed) {
+  NodeCloud present;
+  for (int i = 0; i < nodes.size(); ++i)
+    if (removed[i] == 0)
+      present.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+  return present;
+}
+
+/// The surface shared out among the present nodes, as the ordinary discretisation does it.
+struct Shares {
+  NodeCloud nodes;
+  std::vector<int> compact; // place of each node of the problem in `nodes`
+  SurfacePatches patches;
+
+  Shares(const Problem& problem, const std::vector<char>& removed,
+         const std::optional<BoundingBox>& region = std::nullopt)
+      : nodes(present_nodes(problem.nodes, removed)), patches(*problem.domain, nodes, problem.incision, region) {
+    int place = 0;
+    for (const char gone : removed)
+      compact.push_back(gone != 0 ? -1 : place++);
+  }
+};
+
 /// What each prescribed entry holds, as the ordinary discretisation takes it.
-std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& spheres) {
-  std::vector<int> nodes;
-  nodes.reserve(problem.prescribed.size());
-  for (const Prescribed& entry : problem.prescribed)
-    nodes.push_back(entry.node);
-  if (problem.prescribed_region)
-    return SurfacePatches(*problem.domain, problem.nodes, problem.incision)
-        .means(nodes, spheres, problem.prescribed_region);
+std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& spheres, const Shares& shares) {
+  if (problem.prescribed_region) {
+    std::vector<int> nodes;
+    nodes.reserve(problem.prescribed.size());
+    for (const Prescribed& entry : problem.prescribed)
+      nodes.push_back(shares.compact[entry.node]);
+    return shares.patches.means(nodes, spheres, problem.prescribed_region);
+  }
   std::vector<DisplacementMean> means;
-  means.reserve(nodes.size());
-  for (int node : nodes)
-    means.push_back(value_at(spheres, problem.nodes.positions[node]));
+  means.reserve(problem.prescribed.size());
+  for (const Prescribed& entry : problem.prescribed)
+    means.push_back(value_at(spheres, problem.nodes.positions[entry.node]));
   return means;
 }
 
+/// A held mean that the two do not have in common: from one it has to go, to the other it has to come.
+struct HeldChange {
+  int before = -1, now = -1; // entries, -1: none
+};
+
+std::vector<HeldChange> held_changes(const std::vector<Prescribed>& before, const std::vector<DisplacementMean>& old,
+                                     const std::vector<Prescribed>& now, const std::vector<DisplacementMean>& held) {
+  std::unordered_map<int, int> entry;
+  for (int k = 0; k < std::ssize(before); ++k)
+    entry.emplace(before[k].node, k);
+  std::vector<HeldChange> changes;
+  for (int k = 0; k < std::ssize(now); ++k) {
+    const auto known = entry.find(now[k].node);
+    if (known == entry.end()) {
+      changes.push_back({-1, k});
+      continue;
+    }
+    const int b = known->second;
+    entry.erase(known);
+    if (held[k].nodes != old[b].nodes || held[k].weights != old[b].weights || now[k].components != before[b].components)
+      changes.push_back({b, k});
+  }
+  for (int k = 0; k < std::ssize(before); ++k)
+    if (entry.contains(before[k].node))
+      changes.push_back({k, -1});
+  return changes;
+}
+
 } // namespace
+
+double window_share(const Problem& problem, const DiscretisationOptions& method, const topology::SurfaceMesh& way) {
+  const std::vector<double>& spacings = problem.nodes.spacings;
+  const double rho = galerkin_support_radius(problem, method);
+  const double finest = *std::min_element(spacings.begin(), spacings.end());
+  const Nearness to_way(sample_points(way, 0, finest));
+  // Cells that a change within a sphere of it can reach, and the nodes whose spheres reach those.
+  const double reach = (1 + node_margin) * rho * finest + method.cell_size * finest;
+  int inside = 0;
+  for (std::size_t i = 0; i < spacings.size(); ++i)
+    inside += to_way(problem.nodes.positions[i]) < reach + rho * spacings[i] ? 1 : 0;
+  return static_cast<double>(inside) / static_cast<double>(spacings.size());
+}
 
 struct GrowingCut::State {
   struct Box {
     BackgroundBox box;
     std::vector<CellShapes> cells;                    // by node ids
     std::vector<std::vector<QuadraturePoint>> points; // of each cell, kept where loads need them
+    bool exchanged = false;                           // since the condensation
+    std::vector<CellShapes> first{};                  // then: as they were at it
   };
 
   Problem problem;
@@ -160,10 +290,16 @@ struct GrowingCut::State {
   std::vector<int> slot;        // block of three slots of every node in the window, -1 outside
   std::vector<int> window_node; // node of every block of slots, -1 for room
   int next_room = 0;
-  VectorX cell_loads;    // 3N: body force and initial strain
-  VectorX first_loads;   // 3N at condensation, all loads
-  VectorX loads;         // 3N as they stand
-  MatrixX reduced_first; // by slots
+  VectorX cell_loads;                     // 3N: body force and initial strain
+  VectorX first_loads;                    // 3N at condensation, all loads
+  VectorX external;                       // 3N as they stand, without those of prescribed displacements
+  VectorX loads;                          // 3N as they stand
+  MatrixX reduced_first;                  // by slots
+  mutable std::unique_ptr<Shares> shares; // null: not needed so far
+  AssemblyReport report;                  // of the condensation
+  std::vector<Anchor> anchors;            // by ids
+  SparseMatrix elastic;                   // stiffness at condensation without held means, in its elimination order
+  std::vector<int> elastic_order;         // node of every rank there
   std::vector<DisplacementMean> contact;
   MatrixX compliance;
   VectorX base;
@@ -231,9 +367,9 @@ struct GrowingCut::State {
     }
   }
 
-  /// The same of a held mean.
-  void scatter(const DisplacementMean& mean, const Prescribed& entry, double sign) {
-    const double factor = sign * constraint_stiffness(problem, entry.node);
+  /// The same of a held mean of problem `of`.
+  void scatter(const DisplacementMean& mean, const Problem& of, const Prescribed& entry, double sign) {
+    const double factor = sign * constraint_stiffness(of, entry.node);
     for (std::size_t i = 0; i < mean.nodes.size(); ++i)
       for (std::size_t j = 0; j < mean.nodes.size(); ++j)
         if (slot[mean.nodes[i]] >= slot[mean.nodes[j]])
@@ -266,8 +402,21 @@ struct GrowingCut::State {
       }
   }
 
-  /// Tractions on the surface and the lips, and the prescribed displacements.
-  [[nodiscard]] VectorX surface_loads() const {
+  /// All loads as they stand.
+  void find_loads() {
+    external = cell_loads + tractions();
+    loads = external;
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      const Prescribed& entry = problem.prescribed[k];
+      const Vector3 value = problem.prescribed_field ? problem.prescribed_field(held[k].centroid) : entry.value;
+      const Vector3 force = constraint_stiffness(problem, entry.node) * held_part(entry, value);
+      for (std::size_t j = 0; j < held[k].nodes.size(); ++j)
+        loads.segment<3>(3 * static_cast<Eigen::Index>(held[k].nodes[j])) += held[k].weights[j] * force;
+    }
+  }
+
+  /// Of tractions on the surface and the lips.
+  [[nodiscard]] VectorX tractions() const {
     VectorX right = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
     ShapeFunctions shape;
     const auto add = [&](const SurfacePoint& point, const Vector3& traction) {
@@ -279,33 +428,29 @@ struct GrowingCut::State {
       for (int k = 0; k < shape.size(); ++k)
         right.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += point.weight * shape.value[k] * traction;
     };
-    const NodeCloud present = present_nodes();
+    if (!problem.loads.traction && !problem.loads.lip_traction)
+      return right;
+    const NodeCloud present = present_nodes(problem.nodes, removed);
     if (problem.loads.traction)
       for (const SurfacePoint& point : surface_quadrature(*problem.domain, present, 0.5, 0, problem.incision.get()))
         add(point, problem.loads.traction(point.position, point.normal));
     if (problem.loads.lip_traction && problem.incision != nullptr)
       for (const SurfacePoint& point : lip_quadrature(*problem.incision, present))
         add(point, problem.loads.lip_traction(point.position, point.normal));
-    for (std::size_t k = 0; k < held.size(); ++k) {
-      const Prescribed& entry = problem.prescribed[k];
-      const Vector3 value = problem.prescribed_field ? problem.prescribed_field(held[k].centroid) : entry.value;
-      const Vector3 force = constraint_stiffness(problem, entry.node) * held_part(entry, value);
-      for (std::size_t j = 0; j < held[k].nodes.size(); ++j)
-        right.segment<3>(3 * static_cast<Eigen::Index>(held[k].nodes[j])) += held[k].weights[j] * force;
-    }
     return right;
   }
 
-  [[nodiscard]] NodeCloud present_nodes() const {
-    NodeCloud present;
-    for (int i = 0; i < problem.nodes.size(); ++i)
-      if (removed[i] == 0)
-        present.add(problem.nodes.positions[i], problem.nodes.spacings[i], problem.nodes.kinds[i],
-                    problem.nodes.normals[i]);
-    return present;
+  [[nodiscard]] DisplacementMean mean(int node) const {
+    if (removed[node] != 0)
+      throw InputError(fmt::format("node {} has been removed by the cut", node));
+    if (shares == nullptr)
+      shares = std::make_unique<Shares>(problem, removed);
+    return shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region);
   }
 
+  /// Candidates that the cut has removed are none any more.
   void find_contact() {
+    std::erase_if(options.contact, [&](int node) { return removed[node] != 0; });
     contact.clear();
     if (options.contact.empty())
       return;
@@ -315,23 +460,26 @@ struct GrowingCut::State {
       region.lower = region.lower.cwiseMin((problem.nodes.positions[node].array() - room).matrix());
       region.upper = region.upper.cwiseMax((problem.nodes.positions[node].array() + room).matrix());
     }
-    const SurfacePatches patches(*problem.domain, problem.nodes, problem.incision, region);
+    const Shares regional(problem, removed, region);
     for (int node : options.contact)
-      contact.push_back(patches.mean(node, *spheres, problem.prescribed_region));
+      contact.push_back(regional.patches.mean(regional.compact[node], *spheres, problem.prescribed_region));
   }
 
   /// Whether an increment along `way` may change what lies within `half` of x, m.
   [[nodiscard]] auto reach_of(const topology::SurfaceMesh& way) const {
-    const double finest = *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
-    return [this, finest, to_way = std::make_shared<Nearness>(sample_points(way, 0, 0.5 * finest))](const Vector3& x,
-                                                                                                    double half) {
-      return (*to_way)(x)-half - 0.5 * finest < radius_at(x) * std::max(1 + node_margin, enrichment_reach());
+    const double slack = 0.5 * *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
+    const std::vector<Vector3> places = sample_points(way, 0, slack);
+    return [reach = std::make_shared<Reach>(places, places, problem.nodes.positions, spheres->radii(), slack),
+            radii = std::max(1 + node_margin, enrichment_reach())](const Vector3& x, double half) {
+      return reach->sees(x, half) || reach->near_faces(x, half, radii);
     };
   }
 
   void condense_all();
   void condense_contact();
   [[nodiscard]] VectorX window_right(const VectorX& right) const;
+  [[nodiscard]] MatrixX respond(const MatrixX& forces) const;
+  [[nodiscard]] VectorX elastic_forces(const VectorX& coefficients) const;
 };
 
 /// Builds everything from the problem as it stands. Removed nodes leave the arrays first: nothing refers to them yet
@@ -345,15 +493,24 @@ void GrowingCut::State::condense_all() {
       id.push_back(i);
     }
   Problem present = problem;
-  present.nodes = present_nodes();
+  present.nodes = present_nodes(problem.nodes, removed);
   for (Prescribed& entry : present.prescribed)
     entry.node = compact[entry.node];
-  DiscretisationOptions method = options.method;
-  method.estimate_condition = false;
-  const std::unique_ptr<Discretisation> body = discretise(std::move(present), method);
+  const std::unique_ptr<Discretisation> body = discretise(std::move(present), options.method);
   const OrderedStiffness stiffness = stiffness_of(*body);
+  if (stiffness.dropped)
+    throw InputError("a severed piece that leaves the computation cannot be followed by an update");
+  report = body->report();
+  anchors = stiffness.anchors;
+  for (Anchor& anchor : anchors)
+    anchor.node = id[anchor.node];
+  elastic = stiffness.elastic;
+  elastic_order.clear();
+  for (const int node : stiffness.order)
+    elastic_order.push_back(id[node]);
 
   spheres = make_spheres();
+  shares.reset();
   held = stiffness.held;
   for (DisplacementMean& mean : held)
     for (int& node : mean.nodes)
@@ -426,7 +583,8 @@ void GrowingCut::State::condense_all() {
     }
   }
   next_room = changing;
-  loads = first_loads = cell_loads + surface_loads();
+  find_loads();
+  first_loads = loads;
   VectorX ordered(3 * std::ssize(order));
   for (Eigen::Index k = 0; k < std::ssize(order); ++k)
     ordered.segment<3>(3 * k) = first_loads.segment<3>(3 * id[stiffness.order[order[k]]]);
@@ -447,6 +605,61 @@ VectorX GrowingCut::State::window_right(const VectorX& right) const {
   return by_slot;
 }
 
+/// Coefficients under forces (3N rows) anywhere. What acts on the window alone need not pass the far part first.
+MatrixX GrowingCut::State::respond(const MatrixX& forces) const {
+  const Eigen::Index size = window->far() + window->slots() - 3 * static_cast<Eigen::Index>(options.room);
+  MatrixX ordered = MatrixX::Zero(size, forces.cols());
+  for (Eigen::Index k = 0; k < std::ssize(far_order); ++k)
+    ordered.middleRows<3>(3 * k) = forces.middleRows<3>(3 * static_cast<Eigen::Index>(far_order[k]));
+  const bool far = !ordered.isZero(0);
+  MatrixX right = far ? window->reduce(ordered) : MatrixX::Zero(window->slots(), forces.cols());
+  for (Eigen::Index s = 0; s < std::ssize(window_node); ++s)
+    if (const Eigen::Index node = window_node[s]; node >= 0)
+      right.middleRows<3>(3 * s) += forces.middleRows<3>(3 * node);
+  const MatrixX in_window = window->solve(right);
+  const MatrixX recovered = far ? window->recover(in_window, ordered) : window->recover(in_window);
+  MatrixX coefficients = MatrixX::Zero(forces.rows(), forces.cols());
+  for (Eigen::Index k = 0; k < std::ssize(far_order); ++k)
+    coefficients.middleRows<3>(3 * static_cast<Eigen::Index>(far_order[k])) = recovered.middleRows<3>(3 * k);
+  for (Eigen::Index s = 0; s < std::ssize(window_node); ++s)
+    if (const Eigen::Index node = window_node[s]; node >= 0)
+      coefficients.middleRows<3>(3 * node) = in_window.middleRows<3>(3 * s);
+  return coefficients;
+}
+
+/// The stiffness as the cells make it, not as the window has it: that at condensation, and what the exchanged boxes are
+/// now less what they were.
+VectorX GrowingCut::State::elastic_forces(const VectorX& coefficients) const {
+  VectorX ordered(elastic.rows());
+  for (Eigen::Index k = 0; k < std::ssize(elastic_order); ++k)
+    ordered.segment<3>(3 * k) = coefficients.segment<3>(3 * static_cast<Eigen::Index>(elastic_order[k]));
+  const VectorX product = elastic.selfadjointView<Eigen::Lower>() * ordered;
+  VectorX forces = VectorX::Zero(coefficients.size());
+  for (Eigen::Index k = 0; k < std::ssize(elastic_order); ++k)
+    forces.segment<3>(3 * static_cast<Eigen::Index>(elastic_order[k])) = product.segment<3>(3 * k);
+  const auto add = [&](const CellShapes& cell, double sign) {
+    for (int q = 0; q < cell.points; ++q) {
+      const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
+      const double *y = x + cell.stride, *z = y + cell.stride;
+      Matrix3 gradient = Matrix3::Zero();
+      for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+        gradient += coefficients.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) *
+                    Eigen::RowVector3d(x[k], y[k], z[k]);
+      const Matrix3 stress = sign * stress_from_gradient(problem.material, gradient);
+      for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+        forces.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) += stress * Vector3(x[k], y[k], z[k]);
+    }
+  };
+  for (const Box& box : boxes)
+    if (box.exchanged) {
+      for (const CellShapes& cell : box.first)
+        add(cell, -1);
+      for (const CellShapes& cell : box.cells)
+        add(cell, 1);
+    }
+  return forces;
+}
+
 void GrowingCut::State::condense_contact() {
   const auto count = static_cast<Eigen::Index>(contact.size());
   MatrixX functionals = MatrixX::Zero(window->slots(), 3 * count);
@@ -462,6 +675,7 @@ void GrowingCut::State::condense_contact() {
 GrowingCut::GrowingCut(Problem problem, GrowthOptions options)
     : state_(std::make_unique<State>(std::move(problem), std::move(options))) {
   state_->condense_all();
+  state_->options.method.estimate_condition = false; // once is enough
 }
 
 GrowingCut::~GrowingCut() = default;
@@ -481,7 +695,8 @@ GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
   return report;
 }
 
-GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision) {
+GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
+                              const std::function<topology::SurfaceMesh()>& way_ahead) {
   const Stopwatch total;
   GrowthReport report;
   State& s = *state_;
@@ -491,9 +706,12 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     if (node < 0 || node >= s.problem.nodes.size() || s.removed[node] != 0)
       throw InputError(fmt::format("node {} cannot be removed: it is not there", node));
 
-  const auto anew = [&](const char* reason, Problem problem, std::vector<char> removed) {
+  const auto anew = [&](const char* reason, Problem problem, std::vector<char> removed, bool is_overwritten = false) {
     auto fresh = std::make_unique<State>(std::move(problem), s.options);
     fresh->removed = std::move(removed);
+    if (way_ahead && !is_overwritten) // it may look at the body as it was
+      if (topology::SurfaceMesh way = way_ahead(); !way.triangles.empty())
+        fresh->options.way = std::move(way);
     fresh->condense_all();
     state_ = std::move(fresh);
     report.condensed_anew = true;
@@ -514,8 +732,12 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   removed.resize(next.nodes.size(), 0);
   const std::shared_ptr<const topology::Incision> before = s.problem.incision;
   next.incision = incision;
+  if (change.prescribed)
+    next.prescribed = *change.prescribed;
+  if (change.loads)
+    next.loads = *change.loads;
   for (const Prescribed& entry : next.prescribed)
-    if (removed[entry.node] != 0)
+    if (entry.node < 0 || entry.node >= next.nodes.size() || removed[entry.node] != 0)
       throw InputError(fmt::format("node {} is prescribed; the cut cannot remove it", entry.node));
   if (!continues(before.get(), *incision))
     return anew("the sheets do not continue those before", std::move(next), std::move(removed));
@@ -559,6 +781,10 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     include(x, largest);
   for (const Vector3& x : changes.front)
     include(x, largest * std::max(1.0, s.enrichment_reach()));
+  std::vector<double> radii = fresh_spheres->radii();
+  for (std::size_t i = 0; i < old_radii.size(); ++i)
+    radii[i] = std::max(radii[i], old_radii[i]);
+  const Reach reach(changes.faces, changes.front, next.nodes.positions, radii, slack);
   std::vector<std::pair<Vector3, double>> balls;
   for (int i : changed_nodes) {
     const double radius = std::max(i < std::ssize(old_radii) ? old_radii[i] : 0.0, fresh_spheres->radii()[i]);
@@ -571,12 +797,11 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
         ((touched.upper - leaf.centre).array() < -leaf.half.array()).any())
       continue;
-    const double half = leaf.half.norm(), radius = s.radius_at(leaf.centre);
-    const bool is_touched = to_faces(leaf.centre) - half - slack < radius ||
-                            to_front(leaf.centre) - half - slack < radius * std::max(1.0, s.enrichment_reach()) ||
-                            std::any_of(balls.begin(), balls.end(), [&](const auto& ball) {
-                              return (ball.first - leaf.centre).norm() < ball.second + half;
-                            });
+    const double half = leaf.half.norm();
+    const bool is_touched =
+        reach.sees(leaf.centre, half) || reach.near_front(leaf.centre, half, std::max(1.0, s.enrichment_reach())) ||
+        std::any_of(balls.begin(), balls.end(),
+                    [&](const auto& ball) { return (ball.first - leaf.centre).norm() < ball.second + half; });
     if (!is_touched)
       continue;
     State::Box box{leaf, {}, {}};
@@ -612,22 +837,26 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     return to_surface_changes(mean.centroid) < share_size * s.problem.nodes.spacings[node];
   };
   std::vector<DisplacementMean> held = s.held;
-  bool reshaped = false;
-  for (std::size_t k = 0; k < held.size(); ++k)
-    reshaped = reshaped || is_reshaped(held[k], next.prescribed[k].node);
-  if (reshaped)
-    held = held_means(next, *fresh_spheres);
-  else
+  std::unique_ptr<Shares> shares;
+  bool reshaped = !std::equal(
+      next.prescribed.begin(), next.prescribed.end(), s.problem.prescribed.begin(), s.problem.prescribed.end(),
+      [](const Prescribed& a, const Prescribed& b) { return a.node == b.node && a.components == b.components; });
+  for (std::size_t k = 0; k < held.size() && !reshaped; ++k)
+    reshaped = is_reshaped(held[k], s.problem.prescribed[k].node);
+  if (reshaped) {
+    shares = std::make_unique<Shares>(next, removed);
+    held = held_means(next, *fresh_spheres, *shares);
+  } else {
     for (DisplacementMean& mean : held)
       if (is_near(mean))
         mean = reweighed(mean, *fresh_spheres);
-  const auto differs = [&](std::size_t k) {
-    return held[k].nodes != s.held[k].nodes || held[k].weights != s.held[k].weights;
-  };
-  for (std::size_t k = 0; k < held.size(); ++k)
-    if (differs(k))
-      for (const DisplacementMean* one : {&held[k], &s.held[k]})
-        for (int node : one->nodes)
+  }
+  const std::vector<HeldChange> exchanged_means = held_changes(s.problem.prescribed, s.held, next.prescribed, held);
+  for (const HeldChange& one : exchanged_means)
+    for (const DisplacementMean* mean :
+         {one.before < 0 ? nullptr : &s.held[one.before], one.now < 0 ? nullptr : &held[one.now]})
+      if (mean != nullptr)
+        for (int node : mean->nodes)
           if (new_slot[node] < 0)
             outside = "the cut came to the held region";
   if (outside != nullptr)
@@ -662,14 +891,19 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     for (std::size_t c = 0; c < box.cells.size(); ++c)
       if (!is_same(c))
         s.scatter(box.cells[c], 1, numbering, by_slot);
+    if (box.exchanged = true; s.boxes[b].exchanged)
+      box.first = std::move(s.boxes[b].first);
+    else
+      box.first = std::move(s.boxes[b].cells);
     s.boxes[b] = std::move(box);
     s.add_cell_loads(s.boxes[b], 1, *fresh_spheres, s.cell_loads);
   }
-  for (std::size_t k = 0; k < held.size(); ++k)
-    if (differs(k)) {
-      s.scatter(s.held[k], next.prescribed[k], -1);
-      s.scatter(held[k], next.prescribed[k], 1);
-    }
+  for (const HeldChange& one : exchanged_means) {
+    if (one.before >= 0)
+      s.scatter(s.held[one.before], s.problem, s.problem.prescribed[one.before], -1);
+    if (one.now >= 0)
+      s.scatter(held[one.now], next, next.prescribed[one.now], 1);
+  }
   s.held = std::move(held);
   for (int node : change.removed) {
     for (int c = 0; c < 3; ++c)
@@ -682,7 +916,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.problem = std::move(next);
   s.removed = std::move(removed);
   s.spheres = std::move(fresh_spheres);
-  s.loads = s.cell_loads + s.surface_loads();
+  s.shares = std::move(shares);
+  s.find_loads();
   report.boxes = static_cast<int>(exchanged.size());
   report.cells_seconds = cell_watch.seconds();
 
@@ -709,7 +944,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     Problem wanted = s.problem;
     std::vector<char> wanted_removed = s.removed;
     try {
-      return anew("the window became singular", std::move(wanted), std::move(wanted_removed));
+      return anew("the window became singular", std::move(wanted), std::move(wanted_removed), true);
     } catch (...) {
       auto back = std::make_unique<State>(std::move(previous), s.options);
       back->removed = std::move(previously_removed);
@@ -766,6 +1001,32 @@ const VectorX& GrowingCut::base_displacement() const {
   return state_->base;
 }
 
+const Spheres& GrowingCut::spheres() const {
+  return *state_->spheres;
+}
+const std::vector<DisplacementMean>& GrowingCut::held() const {
+  return state_->held;
+}
+DisplacementMean GrowingCut::mean(int node) const {
+  return state_->mean(node);
+}
+const AssemblyReport& GrowingCut::report() const {
+  return state_->report;
+}
+bool GrowingCut::is_anchored(int node) const {
+  return std::any_of(state_->anchors.begin(), state_->anchors.end(),
+                     [&](const Anchor& anchor) { return anchor.node == node; });
+}
+const VectorX& GrowingCut::external_loads() const {
+  return state_->external;
+}
+MatrixX GrowingCut::respond(const MatrixX& forces) const {
+  return state_->respond(forces);
+}
+VectorX GrowingCut::elastic_forces(const VectorX& coefficients) const {
+  return state_->elastic_forces(coefficients);
+}
+
 VectorX GrowingCut::coefficients(const std::vector<Vector3>& contact_forces) const {
   const State& s = *state_;
   VectorX right = s.loads;
@@ -813,8 +1074,8 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
       }
     }
   }
-  const SurfacePatches patches(*problem.domain, problem.nodes, problem.incision);
-  const std::vector<DisplacementMean> held = held_means(problem, *spheres);
+  const Shares shares(problem, s.removed);
+  const std::vector<DisplacementMean> held = held_means(problem, *spheres, shares);
   for (std::size_t p = 0; p < held.size(); ++p) {
     const Prescribed& entry = problem.prescribed[p];
     const double penalty = constraint_stiffness(problem, entry.node);
@@ -834,7 +1095,7 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
   MatrixX right = MatrixX::Zero(size, 3 * count + 1);
   std::vector<DisplacementMean> means;
   for (int node : s.options.contact)
-    means.push_back(patches.mean(node, *spheres, problem.prescribed_region));
+    means.push_back(shares.patches.mean(shares.compact[node], *spheres, problem.prescribed_region));
   right.col(3 * count) = s.loads;
   for (Eigen::Index c = 0; c < count; ++c)
     for (std::size_t n = 0; n < means[c].nodes.size(); ++n) {

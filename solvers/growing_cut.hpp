@@ -7,7 +7,7 @@
 // it to the contact.
 #pragma once
 
-#include "solvers/discretisation.hpp"
+#include "solvers/surface_patches.hpp"
 
 #include <memory>
 
@@ -17,6 +17,10 @@ namespace spherecut::solvers {
 struct NodeChange {
   std::vector<int> removed;
   NodeCloud added;
+  /// Held nodes and loads after the change (ids of added nodes count on from those there were); empty: as before. Body
+  /// force and initial strain stay what they are.
+  std::optional<std::vector<Prescribed>> prescribed{};
+  std::optional<Loads> loads{};
 };
 
 struct GrowthOptions {
@@ -27,6 +31,10 @@ struct GrowthOptions {
   std::vector<int> contact; // candidates of the tool: free surface nodes
   int room = 200;           // nodes that may be added before the window is condensed anew
 };
+
+/// About which part of the nodes the window along a way would hold, from 0 to 1. Where it is most of them the window's
+/// dense system costs more than it saves.
+double window_share(const Problem& problem, const DiscretisationOptions& method, const topology::SurfaceMesh& way);
 
 /// What one increment took. Seconds are wall clock.
 struct GrowthReport {
@@ -50,8 +58,10 @@ class GrowingCut {
 
   /// The cut becomes `incision`, whose sheets continue those before it triangle by triangle (as topology::BladeSweep
   /// appends them), and the nodes change with it. Whatever the window does not cover is condensed anew and said. Throws
-  /// as the constructor when the new body cannot be solved; the state is then the one before.
-  GrowthReport grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision);
+  /// as the constructor when the new body cannot be solved; the state is then the one before. `way_ahead` is asked for
+  /// the predicted way when the window has to be condensed anew; null: it stays what it was.
+  GrowthReport grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
+                    const std::function<topology::SurfaceMesh()>& way_ahead = {});
 
   /// Work ahead of the next increment, whose new faces are expected along `next`: eliminates the part of the window
   /// that it will not touch. Returns the seconds it took (those of the background, not of the increment). A wrong guess
@@ -73,6 +83,17 @@ class GrowingCut {
 
   /// Nodal coefficients (3N, zero for removed nodes) under the loads and the given forces on the candidates, N.
   [[nodiscard]] VectorX coefficients(const std::vector<Vector3>& contact_forces) const;
+
+  // What a discretisation on top of it asks for (growing_body.hpp). Vectors have 3 entries a node, removed ones
+  // included.
+  [[nodiscard]] const Spheres& spheres() const;
+  [[nodiscard]] const std::vector<DisplacementMean>& held() const;         // one per entry of problem().prescribed
+  [[nodiscard]] DisplacementMean mean(int node) const;                     // where a force on this node acts
+  [[nodiscard]] const AssemblyReport& report() const;                      // of the last condensation
+  [[nodiscard]] bool is_anchored(int node) const;                          // by a spring that holds a severed piece
+  [[nodiscard]] const VectorX& external_loads() const;                     // N, prescribed displacements left out
+  [[nodiscard]] MatrixX respond(const MatrixX& forces) const;              // coefficients, one column per column
+  [[nodiscard]] VectorX elastic_forces(const VectorX& coefficients) const; // N, held means left out
 
   /// Compliance and coefficients from a system that is assembled and factored from scratch (dense) on the same boxes
   /// and nodes: what the updated ones must equal.

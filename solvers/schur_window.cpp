@@ -19,6 +19,10 @@ namespace spherecut::solvers {
 
 namespace {
 
+/// Of its diagonal entry: a smaller pivot is rounding. A severed piece leaves 1e-16, bodies that are held 1e-9 and
+/// more.
+constexpr double singular_pivot = 1e-13;
+
 /// B = L^-1 B or L^-T B for the leading dimension `lda` of L.
 void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& right) {
   const int rows = static_cast<int>(right.rows()), columns = static_cast<int>(right.cols());
@@ -31,6 +35,7 @@ void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& ri
 /// Dense Cholesky factor in place.
 void cholesky(const std::vector<int>& slots, std::vector<double>& square) {
   const int n = static_cast<int>(slots.size());
+  const VectorX diagonal = Eigen::Map<const MatrixX>(square.data(), n, n).diagonal();
   int info = 0;
   if (n > 0)
     dpotrf_("L", &n, square.data(), &n, &info);
@@ -38,6 +43,11 @@ void cholesky(const std::vector<int>& slots, std::vector<double>& square) {
     throw NumericalError(fmt::format("the window of {} unknowns is not positive definite (slot {}): a piece that "
                                      "nothing holds, or an unsound support",
                                      n, info > 0 ? slots[info - 1] : info));
+  for (Eigen::Index j = 0; j < n; ++j)
+    if (const double pivot = square[static_cast<std::size_t>(j * n + j)];
+        !(pivot * pivot > singular_pivot * diagonal[j]))
+      throw NumericalError(fmt::format(
+          "the window of {} unknowns is singular to rounding (slot {}): a piece that nothing holds", n, slots[j]));
 }
 
 /// B = L B or L^T B.
@@ -233,11 +243,18 @@ SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const V
 }
 
 MatrixX SchurWindow::recover(const MatrixX& window, const MatrixX& right) const {
+  return recover_from(cholesky_->forward(right), window);
+}
+
+MatrixX SchurWindow::recover(const MatrixX& window) const {
+  return recover_from(MatrixX::Zero(far_ + changing_ + contact_, window.cols()), window);
+}
+
+MatrixX SchurWindow::recover_from(MatrixX halfway, const MatrixX& window) const {
   const int size = changing_ + contact_;
   MatrixX known(size, window.cols());
   known.topRows(changing_) = window.topRows(changing_);
   known.bottomRows(contact_) = window.bottomRows(contact_);
-  MatrixX halfway = cholesky_->forward(right);
   triangular_product(true, trailing_, known);
   halfway.bottomRows(size) = known;
   return cholesky_->backward(halfway);

@@ -50,7 +50,7 @@ class SchurWindow {
   void prepare(const std::vector<char>& kept);
 
   /// Factors the active part of S. Whether what was prepared could be used. Throws NumericalError naming the slot where
-  /// S is not positive definite.
+  /// S is not positive definite, or singular to rounding.
   bool factor();
   /// Unknowns that the last factor() had to do, and those done ahead.
   [[nodiscard]] int factored() const { return static_cast<int>(order_.size()); }
@@ -71,11 +71,14 @@ class SchurWindow {
 
   /// Solution in elimination order of K from that of the window (slots) and the right-hand sides given to reduce().
   [[nodiscard]] MatrixX recover(const MatrixX& window, const MatrixX& right) const;
+  /// The same where nothing acts on the far unknowns.
+  [[nodiscard]] MatrixX recover(const MatrixX& window) const;
 
  private:
   void gather(const std::vector<int>& slots, std::vector<double>& square) const;
   /// L^-1 right, the part done ahead and the rest.
   void forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) const;
+  [[nodiscard]] MatrixX recover_from(MatrixX halfway, const MatrixX& window) const;
 
   int far_, changing_, room_, contact_;
   std::unique_ptr<OrderedCholesky> cholesky_;

@@ -11,6 +11,8 @@ namespace {
 
 constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
 constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
+constexpr double largest_share = 0.5;  // of the nodes in a window that is worth its while
+constexpr int room = 600;              // nodes that increments may add before the window is condensed anew
 constexpr double rim = 1e-2; // of its spacing: a lip node so near to the surface stands on the rim of its wound
 
 bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& nodes, int node) {
@@ -113,13 +115,73 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
   return prescribed;
 }
 
-void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model) {
+void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
+              const topology::SurfaceMesh& way_ahead, const std::vector<int>& candidates) {
   solvers::DiscretisationOptions options = scenario.method;
   options.unheld = scenario.cut.unheld;
   if (scenario.cut.sight)
     options.sight = *scenario.cut.sight;
-  model.body = solvers::discretise(problem_of(scenario, domain, model), options);
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
+  solvers::Problem problem = problem_of(scenario, domain, model);
+  if (way_ahead.triangles.empty() || solvers::window_share(problem, options, way_ahead) > largest_share)
+    model.body = solvers::discretise(std::move(problem), options);
+  else
+    model.body = std::make_unique<solvers::GrowingBody>(
+        std::move(problem),
+        solvers::GrowthOptions{.method = options, .way = way_ahead, .contact = candidates, .room = room});
+}
+
+std::string hindrance_to_growth(const Scenario& scenario, bool severed) {
+  if (scenario.method.method != solvers::Method::galerkin)
+    return fmt::format("method {} is not updated", solvers::to_string(scenario.method.method));
+  if (severed && scenario.cut.unheld == solvers::UnheldPieces::drop)
+    return "a severed piece has left the computation";
+  return "";
+}
+
+solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const solvers::SprinkleOptions& options,
+                                          const BodyModel& before, solvers::Sprinkling& after) {
+  const solvers::NodeCloud& nodes = before.sprinkling.nodes;
+  solvers::SprinkleIncrement change = solvers::extend_sprinkling(domain, options, nodes, before.incision.get());
+  after = {};
+  after.report = before.sprinkling.report;
+  auto removed = change.removed.begin();
+  for (int i = 0; i < nodes.size(); ++i) {
+    if (removed != change.removed.end() && *removed == i) {
+      ++removed;
+      continue;
+    }
+    after.nodes.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+    after.kept_from.push_back(i);
+  }
+  const solvers::NodeCloud& added = change.added;
+  for (int i = 0; i < added.size(); ++i) {
+    after.nodes.add(added.positions[i], added.spacings[i], added.kinds[i], added.normals[i]);
+    after.kept_from.push_back(-1);
+  }
+  const auto count = [&](solvers::NodeKind kind) {
+    return static_cast<int>(std::count(after.nodes.kinds.begin(), after.nodes.kinds.end(), kind));
+  };
+  after.report.surface_nodes = count(solvers::NodeKind::surface);
+  after.report.edge_nodes = count(solvers::NodeKind::edge);
+  after.report.interior_nodes = count(solvers::NodeKind::interior);
+  after.report.lip_nodes = count(solvers::NodeKind::lip);
+  return change;
+}
+
+solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                               const solvers::SprinkleIncrement& change,
+                               const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
+                               BodyModel& after) {
+  auto* body = dynamic_cast<solvers::GrowingBody*>(before.body.get());
+  if (body == nullptr)
+    return {"the first cut after a full build", {}};
+  solvers::BodyGrowth growth = body->grow(change, problem_of(scenario, domain, after), way_ahead);
+  if (growth.uncovered[0] != '\0')
+    return growth;
+  after.pairs = solvers::lip_pairs(after.sprinkling.nodes);
+  after.body = std::move(before.body);
+  return growth;
 }
 
 void condense(const std::vector<int>& candidates, BodyModel& model) {

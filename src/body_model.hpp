@@ -2,6 +2,7 @@
 // that a refused cut leaves the old one standing.
 #pragma once
 
+#include "solvers/growing_body.hpp"
 #include "solvers/lip_contact.hpp"
 #include "src/scenario.hpp"
 
@@ -15,6 +16,7 @@ struct RebuildSeconds {
 struct BodyModel {
   std::shared_ptr<const topology::Incision> incision; // null: uncut
   solvers::Sprinkling sprinkling;
+  double coarseness = 1; // of its spacings, in those of the scenario
   std::vector<solvers::LipPair> pairs;
   std::unique_ptr<solvers::Discretisation> body; // null before the first load, touch or cut
   solvers::Field base;                           // without tool and contact
@@ -37,9 +39,26 @@ inline bool on_surface(solvers::NodeKind kind) {
 std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const topology::Domain& domain,
                                              const solvers::NodeCloud& nodes);
 
-/// Assembles and factors the body of a scenario on the model's nodes and incision: the one place where a cut rebuilds
-/// the system. Throws as solvers::discretise does.
-void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model);
+/// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead (method
+/// galerkin) the body is one that can follow it. Throws as solvers::discretise does.
+void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
+              const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
+
+/// Why no body of this scenario can follow its cut; empty: one can.
+std::string hindrance_to_growth(const Scenario& scenario, bool severed);
+
+/// What a cut changes in the nodes of `before`: those beside the new part of the cut are exchanged, the others keep
+/// their order. Throws as solvers::extend_sprinkling does.
+solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const solvers::SprinkleOptions& options,
+                                          const BodyModel& before, solvers::Sprinkling& after);
+
+/// The body of `before` follows the cut to the nodes and incision of `after` and goes over to it; only what the cut
+/// touched is computed. Where it cannot, both models stay as they are and the growth says why. Throws as
+/// solvers::GrowingBody::grow does, and all stays as it was.
+solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                               const solvers::SprinkleIncrement& change,
+                               const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
+                               BodyModel& after);
 
 /// Condenses the model onto tool candidates; none: the tool is far. Forgets the state.
 void condense(const std::vector<int>& candidates, BodyModel& model);

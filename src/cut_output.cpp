@@ -30,7 +30,7 @@ std::string_view cut_columns() {
   return "time_s,triangles,refused,sheets,area_m2,front_m,pieces,unheld,volumes_m3,opening_m,opening_volume_m3,lip_"
          "pairs,"
          "closed_pairs,lips_converged,nodes,kept_nodes,surface_hash,topology_s,level_sets_s,visibility_s,sprinkling_s,"
-         "assembly_s,solve_s,reason\n";
+         "assembly_s,solve_s,update,update_reason,reason\n";
 }
 
 std::string hash_text(std::uint64_t hash) {
@@ -43,11 +43,11 @@ std::string cut_row(double time, const CutReport& r) {
     volumes += fmt::format("{}{:.12g}", volumes.empty() ? "" : ";", volume);
   return fmt::format(
       "{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
-      "{:.4g},{}\n",
+      "{:.4g},{},{},{}\n",
       time, r.triangles, r.refused ? 1 : 0, r.sheets, r.area, r.front_length, r.pieces, r.unheld, volumes, r.opening,
       r.opening_volume, r.lip_pairs, r.closed_pairs, r.lips_converged ? 1 : 0, r.nodes, r.kept_nodes,
       hash_text(r.surface_hash), r.seconds.topology, r.seconds.level_sets, r.seconds.visibility, r.seconds.sprinkling,
-      r.seconds.assembly, r.seconds.solve, quoted(r.reason));
+      r.seconds.assembly, r.seconds.solve, to_string(r.update), quoted(r.update_reason), quoted(r.reason));
 }
 
 void write_wound(const std::filesystem::path& file, const Session& session) {

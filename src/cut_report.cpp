@@ -18,6 +18,20 @@ Vector3 area_vector(const topology::SurfaceMesh& surface, const Triangle& triang
 
 } // namespace
 
+std::string_view to_string(SystemUpdate update) {
+  switch (update) {
+  case SystemUpdate::none:
+    return "";
+  case SystemUpdate::updated:
+    return "updated";
+  case SystemUpdate::condensed_anew:
+    return "condensed anew";
+  case SystemUpdate::rebuilt:
+    return "rebuilt";
+  }
+  return "";
+}
+
 double opening_volume(const topology::Wound& wound, const BodyModel& model) {
   std::vector<std::optional<Vector3>> displacement(wound.surface.vertices.size());
   const auto moved = [&](int vertex) {

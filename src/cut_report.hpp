@@ -6,6 +6,15 @@
 
 namespace spherecut::app {
 
+/// How the system of equations came to the cut of a step.
+enum class SystemUpdate : std::uint8_t {
+  none,           // nothing was cut
+  updated,        // only what the cut touched was computed
+  condensed_anew, // updated, after everything away from the predicted way had been eliminated anew
+  rebuilt,        // from scratch
+};
+std::string_view to_string(SystemUpdate update);
+
 /// The cut at the end of a step.
 struct CutReport {
   int triangles = 0;                 // of sheet, added in this step
@@ -20,7 +29,9 @@ struct CutReport {
   double opening_volume = 0;   // m3, between the faces
   int lip_pairs = 0, closed_pairs = 0;
   bool lips_converged = true;
-  int nodes = 0, kept_nodes = 0;  // kept: with the place they had before this step's cut
+  int nodes = 0, kept_nodes = 0; // kept: with the place they had before this step's cut
+  SystemUpdate update = SystemUpdate::none;
+  std::string update_reason;      // why not merely updated
   RebuildSeconds seconds;         // of this step
   std::uint64_t surface_hash = 0; // of the wound at rest
 };

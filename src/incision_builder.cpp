@@ -4,6 +4,7 @@
 #include "topology/errors.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 
 namespace spherecut::app {
@@ -33,12 +34,12 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
       fields_(std::make_unique<topology::CutFields>(edge)) {
   for (const PrecutSettings& precut : scenario.precuts) {
     try { // one at a time, so that an unusable sheet is told with its line
-      earlier_.push_back(sheet_of(precut, edge));
-      incision_ = std::make_shared<const topology::Incision>(earlier_, domain_, revision_);
-      wound_->grow(earlier_);
+      precuts_.push_back(sheet_of(precut, edge));
+      incision_ = std::make_shared<const topology::Incision>(precuts_, domain_, revision_);
+      wound_->grow(precuts_);
     } catch (const InputError& error) {
       throw InputError(
-          fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, earlier_.size(), error.what()));
+          fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, precuts_.size(), error.what()));
     }
   }
   if (!scenario.blade)
@@ -46,40 +47,63 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
   blade_ = topology::Blade{scenario.blade->edge, scenario.blade->edge_radius};
   options_.edge = edge;
   try {
-    start_blade();
+    sweep_.emplace(*blade_, domain_, options_);
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}:{}: {}", scenario.file.string(), scenario.blade->line, error.what()));
   }
 }
 
-void IncisionBuilder::start_blade() {
-  sweep_ = std::make_unique<topology::BladeSweep>(*blade_, domain_, options_);
-}
-
 std::vector<topology::SurfaceMesh> IncisionBuilder::sheets() const {
-  std::vector<topology::SurfaceMesh> all = earlier_;
-  if (sweep_ != nullptr) {
+  std::vector<topology::SurfaceMesh> all = precuts_;
+  if (sweep_) {
     const std::vector<topology::SurfaceMesh> swept = sweep_->sheets();
     all.insert(all.end(), swept.begin(), swept.end());
   }
   return all;
 }
 
+// Whether the whole edge is farther from the body than the sweep reaches.
+bool IncisionBuilder::is_outside(const topology::BladePose& pose, const topology::RestMap& to_rest) const {
+  for (std::size_t i = 1; i < blade_->edge.size(); ++i) {
+    const Vector3 along = blade_->edge[i] - blade_->edge[i - 1];
+    const int parts = std::max(1, static_cast<int>(std::ceil(along.norm() / options_.edge)));
+    for (int k = 0; k <= parts; ++k) {
+      const Vector3 x = pose.orientation * (blade_->edge[i - 1] + along * k / parts) + pose.position;
+      if (domain_->signed_distance(to_rest ? to_rest(x) : x) < options_.edge)
+        return false;
+    }
+  }
+  return true;
+}
+
 topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, const topology::RestMap& to_rest) {
   sheets_before_ = sheets();
   incision_before_ = incision_;
-  topology::SweepResult swept = sweep_->move_to(pose, to_rest);
-  if (swept.triangles == 0)
-    return swept;
+  sweep_before_ = sweep_;
+  missed_before_ = missed_;
+  missed_before_.push_back(pose);
   try {
+    if (!missed_.empty() && is_outside(missed_.back(), to_rest)) {
+      sweep_->lift();
+      sweep_->move_to(missed_.back(), to_rest);
+      missed_.clear();
+    }
+    topology::SweepResult swept;
+    for (const topology::BladePose& missed : missed_)
+      swept.triangles += sweep_->move_to(missed, to_rest).triangles;
+    topology::SweepResult last = sweep_->move_to(pose, to_rest);
+    missed_.clear();
+    last.triangles += swept.triangles;
+    if (last.triangles == 0)
+      return last;
     const std::vector<topology::SurfaceMesh> grown = sheets();
     incision_ = std::make_shared<const topology::Incision>(grown, domain_, ++revision_);
     wound_->grow(grown);
+    return last;
   } catch (...) {
-    take_back(pose, to_rest);
+    take_back();
     throw;
   }
-  return swept;
 }
 
 void IncisionBuilder::update_fields() {
@@ -87,19 +111,42 @@ void IncisionBuilder::update_fields() {
     fields_->update(incision_);
 }
 
-void IncisionBuilder::take_back(const topology::BladePose& pose, const topology::RestMap& to_rest) {
+void IncisionBuilder::take_back() {
+  const bool grew = incision_ != incision_before_;
   incision_ = incision_before_;
-  earlier_ = sheets_before_;
+  *sweep_ = *sweep_before_;
+  missed_ = missed_before_;
+  if (!grew)
+    return;
   auto wound = std::make_unique<topology::IncrementalWound>(domain_->surface());
-  if (!earlier_.empty())
-    wound->grow(earlier_);
+  if (!sheets_before_.empty())
+    wound->grow(sheets_before_);
   wound_ = std::move(wound);
   if (incision_ != nullptr)
     fields_->update(incision_);
   else
     fields_ = std::make_unique<topology::CutFields>(options_.edge);
-  start_blade();
-  sweep_->move_to(pose, to_rest);
+}
+
+topology::SurfaceMesh IncisionBuilder::way_through(const std::vector<topology::BladePose>& poses,
+                                                   const topology::RestMap& to_rest) const {
+  topology::SurfaceMesh way;
+  topology::BladeSweep ahead = *sweep_;
+  try {
+    for (const topology::BladePose& pose : poses)
+      for (const topology::AddedTriangles& added : ahead.move_to(pose, to_rest).added) {
+        const topology::SurfaceMesh sheet = ahead.sheets()[static_cast<std::size_t>(added.sheet)];
+        for (int t = added.first; t < added.first + added.count; ++t) {
+          const int first = static_cast<int>(way.vertices.size());
+          for (const int vertex : sheet.triangles[static_cast<std::size_t>(t)])
+            way.vertices.push_back(sheet.vertices[static_cast<std::size_t>(vertex)]);
+          way.triangles.push_back({first, first + 1, first + 2});
+        }
+      }
+  } catch (const std::exception&) { // as far as it can be told
+    return way;
+  }
+  return way;
 }
 
 } // namespace spherecut::app

@@ -19,32 +19,41 @@ class IncisionBuilder {
   [[nodiscard]] const std::shared_ptr<const topology::Incision>& incision() const { return incision_; }
 
   /// Moves the blade and lets incision and wound grow; the first call only places it. Throws InputError and
-  /// NumericalError; everything is then as it was, and the blade is placed at the pose.
+  /// NumericalError; everything is then as it was. A motion that was not made, or taken back, is made up for by the
+  /// next one: that starts where the blade last cut and passes all poses since. When the blade has been out of the body
+  /// in between it starts there.
   topology::SweepResult move_to(const topology::BladePose& pose, const topology::RestMap& to_rest);
 
   /// Brings the level sets to the incision. Throws InputError when they need too much memory.
   void update_fields();
   [[nodiscard]] const topology::CutFields& fields() const { return *fields_; }
 
-  /// Takes the last growth back: the material there is whole again. The blade is placed at the pose, for the next
-  /// motion to start from.
-  void take_back(const topology::BladePose& pose, const topology::RestMap& to_rest);
+  /// Takes the last growth back: the material there is whole again.
+  void take_back();
+
+  /// What the edge will sweep on its way through `poses`, in the rest frame; what cannot be mapped there is left out.
+  [[nodiscard]] topology::SurfaceMesh way_through(const std::vector<topology::BladePose>& poses,
+                                                  const topology::RestMap& to_rest) const;
 
  private:
   [[nodiscard]] std::vector<topology::SurfaceMesh> sheets() const;
-  void start_blade();
+  [[nodiscard]] bool is_outside(const topology::BladePose& pose, const topology::RestMap& to_rest) const;
 
   std::shared_ptr<const topology::Domain> domain_;
   std::optional<topology::Blade> blade_;
   topology::SweepOptions options_;
-  std::vector<topology::SurfaceMesh> earlier_; // precuts, then what the blade cut before it was last started anew
-  std::unique_ptr<topology::BladeSweep> sweep_;
+  std::vector<topology::SurfaceMesh> precuts_;
+  std::optional<topology::BladeSweep> sweep_;
   std::unique_ptr<topology::IncrementalWound> wound_;
   std::unique_ptr<topology::CutFields> fields_;
   std::shared_ptr<const topology::Incision> incision_;
   int revision_ = 0;
-  std::vector<topology::SurfaceMesh> sheets_before_; // before the last growth
+  std::vector<topology::BladePose> missed_; // since the place of sweep_
+  // Before the last motion:
+  std::vector<topology::SurfaceMesh> sheets_before_;
   std::shared_ptr<const topology::Incision> incision_before_;
+  std::optional<topology::BladeSweep> sweep_before_;
+  std::vector<topology::BladePose> missed_before_; // and the pose of that motion
 };
 
 } // namespace spherecut::app

@@ -1,6 +1,7 @@
 #include "src/session.hpp"
 
 #include "src/blas_threads.hpp"
+#include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -17,22 +18,6 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
-constexpr double rest_tolerance = 1e-4;     // of the fine spacing: of a place carried back to rest
-constexpr double coarse_tolerance = 0.02;   // the same where the field jumps by a little, as ahead of a front
-constexpr double gap_reach = 1;             // fine spacings from a sheet: a place without material lies in its opening
-
-// Adds its lifetime to a stage of the profile.
-class StageTimer {
- public:
-  explicit StageTimer(double& seconds) : seconds_(seconds) {}
-  ~StageTimer() { seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-  StageTimer(const StageTimer&) = delete;
-  StageTimer& operator=(const StageTimer&) = delete;
-
- private:
-  double& seconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 Organ timed_organ(const OrganSettings& settings, double& seconds) {
   const StageTimer timer(seconds);
@@ -122,6 +107,8 @@ StepResult Session::step(const StepSample& sample) {
   if (cuts())
     result.cut.emplace();
   const bool solved = sample.blade && cut(sample, *result.cut);
+  if (sample.blade)
+    last_blade_ = sample.blade;
   // Without any load the organ keeps its rest shape until the tool is on it.
   const bool touched = touch_ && result.contact.depth > 0;
   const bool loaded = (touch_ || cuts()) && (touched || model_.body != nullptr || scenario_.gravity ||
@@ -205,13 +192,14 @@ void Session::sprinkle(const solvers::NodeCloud* previous, BodyModel& model) {
   const solvers::SprinkleOptions options = sprinkle_options(model);
   model.sprinkling = previous == nullptr ? solvers::sprinkle(*organ_.domain, options)
                                          : solvers::resprinkle(*organ_.domain, options, *previous);
+  model.coarseness = coarseness_;
 }
 
 // Surface nodes near the contact on its side of the organ, without those that are held.
 std::vector<int> Session::candidates(const BodyModel& model) const {
   const solvers::NodeCloud& nodes = model.sprinkling.nodes;
   std::vector<char> held(nodes.positions.size(), 0);
-  for (const solvers::Prescribed& entry : model.body->problem().prescribed)
+  for (const solvers::Prescribed& entry : fixed_nodes(scenario_, *organ_.domain, nodes))
     held[entry.node] = 1;
   std::vector<int> near;
   for (int i = 0; i < nodes.size(); ++i)
@@ -238,15 +226,18 @@ bool Session::tool_in_reach() const {
 }
 
 void Session::build(BodyModel& model) {
-  {
-    const StageTimer timer(profile_.discretise);
-    assemble(scenario_, organ_.domain, model);
-    const solvers::SprinkleReport& report = model.sprinkling.report;
-    say_(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",
-                     model.sprinkling.nodes.size(), report.surface_nodes + report.edge_nodes, report.lip_nodes,
-                     model.body->problem().prescribed.size()));
-  }
-  condense(tool_in_reach() ? candidates(model) : std::vector<int>{}, model);
+  const std::vector<int> near = tool_in_reach() ? candidates(model) : std::vector<int>{};
+  assemble(model, {}, near);
+  condense(near, model);
+}
+
+void Session::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near) {
+  const StageTimer timer(profile_.discretise);
+  app::assemble(scenario_, organ_.domain, model, way_ahead, near);
+  const solvers::SprinkleReport& report = model.sprinkling.report;
+  say_(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",
+                   model.sprinkling.nodes.size(), report.surface_nodes + report.edge_nodes, report.lip_nodes,
+                   model.body->problem().prescribed.size()));
 }
 
 void Session::condense(const std::vector<int>& candidates, BodyModel& model) {
@@ -299,138 +290,6 @@ std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pos
             -patch_gap * zone_.spacing.fine)
       missed.push_back(i);
   return missed;
-}
-
-// Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
-// its surface. A place in the opening of a cut, where there is no material, belongs to the sheet.
-Vector3 Session::rest_position(const Vector3& x) const {
-  const topology::Domain& domain = *organ_.domain;
-  const auto displacement = [&](const Vector3& rest) {
-    return at(domain.signed_distance(rest) <= 0 ? rest : domain.closest_surface_point(rest)).displacement;
-  };
-  for (const double tolerance : {rest_tolerance, coarse_tolerance})
-    try {
-      return topology::rest_position(x, displacement, tolerance * zone_.spacing.fine);
-    } catch (const NumericalError&) {
-      if (tolerance == rest_tolerance)
-        continue;
-      Vector3 guess = x - displacement(x);
-      if (model_.incision != nullptr)
-        if (const auto on = model_.incision->closest(guess, gap_reach * zone_.spacing.fine))
-          return on->point;
-      if (domain.signed_distance(guess) <= 0) // outside no material is cut
-        throw;
-      return guess;
-    }
-  return x;
-}
-
-// Moves the blade; true when that cut something and the body with the new cut is built and solved. A refusal leaves
-// body, incision and wound as they were.
-bool Session::cut(const StepSample& sample, CutReport& report) {
-  topology::RestMap to_rest;
-  if (model_.state)
-    to_rest = [this](const Vector3& x) { return rest_position(x); };
-  topology::SweepResult swept;
-  const auto refuse = [&](const char* why) {
-    report.triangles = 0;
-    report.refused = true;
-    report.reason = why;
-    warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, why));
-  };
-  {
-    const StageTimer timer(report.seconds.topology);
-    try {
-      swept = incisions_->move_to(*sample.blade, to_rest);
-    } catch (const InputError& error) {
-      refuse(error.what());
-    } catch (const NumericalError& error) {
-      refuse(error.what());
-    }
-  }
-  report.triangles = swept.triangles;
-  if (swept.triangles == 0) {
-    if (!report.refused)
-      report.reason = swept.refused;
-    return false;
-  }
-  try {
-    BodyModel next;
-    next.incision = incisions_->incision();
-    require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
-    check_pieces(sample.time);
-    {
-      const StageTimer timer(report.seconds.level_sets);
-      incisions_->update_fields();
-    }
-    {
-      const StageTimer timer(report.seconds.sprinkling);
-      sprinkle(&model_.sprinkling.nodes, next);
-    }
-    build(next);
-    const solvers::AssemblyReport& assembly = next.body->report();
-    report.seconds.visibility = assembly.supports_seconds;
-    report.seconds.assembly = assembly.assembly_seconds;
-    {
-      const StageTimer timer(report.seconds.solve);
-      solve(sample, next);
-    }
-    report.seconds.solve += assembly.factor_seconds;
-    const std::vector<int>& from = next.sprinkling.kept_from;
-    report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
-    profile_.topology += report.seconds.topology;
-    profile_.level_sets += report.seconds.level_sets;
-    model_ = std::move(next);
-    return true;
-  } catch (const InputError& error) {
-    refuse(error.what());
-  } catch (const NumericalError& error) {
-    refuse(error.what());
-  }
-  incisions_->take_back(*sample.blade, to_rest);
-  return false;
-}
-
-void Session::check_pieces(double time) {
-  const topology::Wound& wound = incisions_->wound();
-  require_pieces(wound, zone_.spacing);
-  const std::vector<int> unheld = unheld_pieces(wound, scenario_.fixed);
-  if (unheld.empty())
-    return;
-  const double volume = wound.pieces[static_cast<std::size_t>(unheld.front())].volume;
-  const std::string what = fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region",
-                                       unheld.size(), wound.pieces.size(), volume, unheld.size() == 1 ? "is" : "are");
-  if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
-    throw InputError(fmt::format("{}; allowed by cut.unheld = \"refuse\": none", what));
-  warn(fmt::format("unheld {}", unheld.size()),
-       fmt::format("t = {:g} s: {}: {}", time, what,
-                   scenario_.cut.unheld == solvers::UnheldPieces::hold ? "soft springs hold it"
-                                                                       : "it leaves the computation"));
-}
-
-void Session::report_cut(CutReport& report) const {
-  const topology::Wound& wound = incisions_->wound();
-  if (model_.incision != nullptr) {
-    report.area = model_.incision->area();
-    report.front_length = model_.incision->front_length();
-    report.sheets = static_cast<int>(model_.incision->sheets().size());
-  }
-  report.pieces = static_cast<int>(wound.pieces.size());
-  for (const topology::WoundPiece& piece : wound.pieces)
-    report.volumes.push_back(piece.volume);
-  std::sort(report.volumes.rbegin(), report.volumes.rend());
-  report.unheld = static_cast<int>(unheld_pieces(wound, scenario_.fixed).size());
-  report.nodes = model_.sprinkling.nodes.size();
-  report.lip_pairs = static_cast<int>(model_.pairs.size());
-  if (model_.state) {
-    for (const double opening : normal_openings(model_))
-      report.opening = std::max(report.opening, opening);
-    report.opening_volume = opening_volume(wound, model_);
-    for (const char closed : model_.state->lips.closed)
-      report.closed_pairs += closed;
-    report.lips_converged = model_.state->lips.converged;
-  }
-  report.surface_hash = topology::surface_hash(wound.surface);
 }
 
 void Session::evaluate(StepResult& result) {

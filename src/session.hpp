@@ -99,10 +99,13 @@ class Session {
   [[nodiscard]] std::vector<int> candidates(const BodyModel& model) const;
   [[nodiscard]] bool tool_in_reach() const;
   void build(BodyModel& model);
+  void assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near);
   void condense(const std::vector<int>& candidates, BodyModel& model);
   void solve(const StepSample& sample, BodyModel& model);
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
   bool cut(const StepSample& sample, CutReport& report);
+  void build_cut(const StepSample& sample, const topology::RestMap& to_rest, BodyModel& next, CutReport& report);
+  [[nodiscard]] std::vector<topology::BladePose> blade_ahead(const StepSample& sample) const;
   [[nodiscard]] Vector3 rest_position(const Vector3& x) const;
   void check_pieces(double time);
   void report_cut(CutReport& report) const;
@@ -123,6 +126,7 @@ class Session {
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
   BodyModel model_;
   std::optional<topology::SurfaceContact> last_contact_;
+  std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
   std::vector<solvers::PointState> node_states_;
   VectorX node_displacements_; // m, 3 a node, in the last step
   bool force_only_ = false;

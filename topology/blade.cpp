@@ -446,6 +446,11 @@ BladeSweep::BladeSweep(Blade blade, std::shared_ptr<const Domain> domain, const 
   state_ = std::make_unique<State>(std::move(blade), std::move(domain), options);
 }
 BladeSweep::~BladeSweep() = default;
+BladeSweep::BladeSweep(const BladeSweep& other) : state_(std::make_unique<State>(*other.state_)) {}
+BladeSweep& BladeSweep::operator=(const BladeSweep& other) {
+  state_ = std::make_unique<State>(*other.state_);
+  return *this;
+}
 BladeSweep::BladeSweep(BladeSweep&&) noexcept = default;
 BladeSweep& BladeSweep::operator=(BladeSweep&&) noexcept = default;
 

@@ -59,6 +59,8 @@ class BladeSweep {
   /// Throws InputError when the blade or an option is not usable.
   BladeSweep(Blade blade, std::shared_ptr<const Domain> domain, const SweepOptions& options = {});
   ~BladeSweep();
+  BladeSweep(const BladeSweep& other);
+  BladeSweep& operator=(const BladeSweep& other);
   BladeSweep(BladeSweep&&) noexcept;
   BladeSweep& operator=(BladeSweep&&) noexcept;
 

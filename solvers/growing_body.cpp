@@ -1,0 +1,275 @@
+#include "solvers/growing_body.hpp"
+
+#include "solvers/galerkin.hpp"
+#include "solvers/pieces.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+
+namespace {
+
+template <typename Column>
+void add_force(const DisplacementMean& mean, const Vector3& force, Column&& right) {
+  for (std::size_t k = 0; k < mean.nodes.size(); ++k)
+    right.template segment<3>(3 * static_cast<Eigen::Index>(mean.nodes[k])) += mean.weights[k] * force;
+}
+
+/// Pieces by sight, with what holds them.
+std::vector<Piece> pieces_of(const Problem& problem) {
+  if (problem.incision == nullptr)
+    return {};
+  const std::vector<int> piece_of = node_pieces(problem.nodes, *problem.incision);
+  std::vector<Piece> pieces(static_cast<std::size_t>(*std::max_element(piece_of.begin(), piece_of.end())) + 1);
+  for (int i = 0; i < std::ssize(piece_of); ++i) {
+    pieces[piece_of[i]].nodes.push_back(i);
+    pieces[piece_of[i]].centroid += problem.nodes.positions[i];
+  }
+  for (Piece& piece : pieces)
+    piece.centroid /= static_cast<double>(piece.nodes.size());
+  for (const Prescribed& entry : problem.prescribed)
+    if (entry.components[0] || entry.components[1] || entry.components[2])
+      pieces[piece_of[entry.node]].held = true;
+  return pieces;
+}
+
+auto unheld(const std::vector<Piece>& pieces) {
+  return std::count_if(pieces.begin(), pieces.end(), [](const Piece& piece) { return !piece.held; });
+}
+
+/// Places in an array of which some entries go, -1 for those.
+std::vector<int> places_without(int count, const std::vector<int>& removed) {
+  std::vector<int> place(count, 0);
+  for (const int i : removed)
+    place[i] = -1;
+  int next = 0;
+  for (int& p : place)
+    if (p == 0)
+      p = next++;
+  return place;
+}
+
+} // namespace
+
+GrowingBody::GrowingBody(Problem problem, GrowthOptions options)
+    : problem_(problem), cut_(std::make_unique<GrowingCut>(std::move(problem), std::move(options))) {
+  report_ = cut_->report();
+  number_nodes();
+  if (problem_.incision != nullptr)
+    report_.pieces = pieces_of(problem_);
+}
+
+void GrowingBody::number_nodes() {
+  id_.clear();
+  compact_.clear();
+  for (const char gone : cut_->removed()) {
+    if (gone == 0)
+      id_.push_back(static_cast<int>(compact_.size()));
+    compact_.push_back(gone == 0 ? static_cast<int>(id_.size()) - 1 : -1);
+  }
+  supports_ = nodal_supports(cut_->spheres(), id_);
+  for (int& node : supports_.nodes)
+    node = compact_[node];
+}
+
+BodyGrowth GrowingBody::grow(const SprinkleIncrement& change, Problem grown,
+                             const std::function<topology::SurfaceMesh()>& way_ahead) {
+  const int count = problem_.nodes.size();
+  for (const int node : change.removed)
+    if (node < 0 || node >= count)
+      throw InputError(fmt::format("node {} cannot be removed: there are {}", node, count));
+  const std::vector<int> place = places_without(count, change.removed);
+  const int kept = count - static_cast<int>(std::count(place.begin(), place.end(), -1));
+  if (grown.nodes.size() != kept + change.added.size())
+    throw InputError(fmt::format("the grown body has {} nodes; {} stay and {} are added", grown.nodes.size(), kept,
+                                 change.added.size()));
+  std::vector<Piece> pieces = pieces_of(grown);
+  if (unheld(pieces) > unheld(report_.pieces))
+    return {"a piece came free", {}};
+  NodeChange by_id;
+  by_id.added = change.added;
+  std::vector<int> id(static_cast<std::size_t>(grown.nodes.size()));
+  for (int i = 0; i < count; ++i)
+    if (place[i] >= 0)
+      id[place[i]] = id_[i];
+    else
+      by_id.removed.push_back(id_[i]);
+  for (int k = 0; k < change.added.size(); ++k)
+    id[kept + k] = cut_->problem().nodes.size() + k;
+  for (const int node : by_id.removed)
+    if (cut_->is_anchored(node))
+      return {"a spring that holds a severed piece lost its node", {}};
+  by_id.prescribed = grown.prescribed;
+  for (Prescribed& entry : *by_id.prescribed)
+    entry.node = id[entry.node];
+  by_id.loads = grown.loads;
+  BodyGrowth growth{"", cut_->grow(by_id, grown.incision, way_ahead)};
+  problem_ = std::move(grown);
+  number_nodes();
+  report_.nodes = problem_.nodes.size();
+  report_.unknowns = 3 * report_.nodes;
+  report_.pieces = std::move(pieces);
+  report_.grown_supports = cut_->spheres().grown();
+  if (growth.update.condensed_anew) {
+    const double condition = report_.condition_estimate;
+    const AssemblyReport& anew = cut_->report();
+    report_.supports_seconds = anew.supports_seconds;
+    report_.assembly_seconds = std::max(0.0, growth.update.total_seconds - anew.supports_seconds - anew.factor_seconds);
+    report_.factor_seconds = anew.factor_seconds;
+    report_.worst_moment_condition = anew.worst_moment_condition;
+    report_.condition_estimate = condition;
+  } else {
+    report_.supports_seconds = growth.update.spheres_seconds;
+    report_.assembly_seconds = growth.update.cells_seconds;
+    report_.factor_seconds = growth.update.factor_seconds + growth.update.condense_seconds;
+  }
+  return growth;
+}
+
+MatrixX GrowingBody::expanded(const MatrixX& present) const {
+  MatrixX all = MatrixX::Zero(3 * std::ssize(compact_), present.cols());
+  for (Eigen::Index i = 0; i < std::ssize(id_); ++i)
+    all.middleRows<3>(3 * static_cast<Eigen::Index>(id_[i])) = present.middleRows<3>(3 * i);
+  return all;
+}
+
+MatrixX GrowingBody::compacted(const MatrixX& all) const {
+  MatrixX present(3 * std::ssize(id_), all.cols());
+  for (Eigen::Index i = 0; i < std::ssize(id_); ++i)
+    present.middleRows<3>(3 * i) = all.middleRows<3>(3 * static_cast<Eigen::Index>(id_[i]));
+  return present;
+}
+
+Vector3 GrowingBody::constraint_force(std::size_t k, const VectorX& coefficients, const VectorX& prescribed) const {
+  const Prescribed& entry = problem_.prescribed[k];
+  const Vector3 gap = prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) - cut_->held()[k].of(coefficients);
+  return constraint_stiffness(problem_, entry.node) * held_part(entry, gap);
+}
+
+VectorX GrowingBody::holding_forces(const VectorX& coefficients, const VectorX& prescribed) const {
+  VectorX right = VectorX::Zero(coefficients.size());
+  for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
+    add_force(cut_->held()[k], constraint_force(k, coefficients, prescribed), right);
+  return right;
+}
+
+/// Coefficients of all nodes the system knows, with one correction against the rounding of the penalties.
+VectorX GrowingBody::solved(const VectorX& loads, const VectorX& prescribed) const {
+  VectorX coefficients = cut_->respond(loads + holding_forces(VectorX::Zero(loads.size()), prescribed));
+  coefficients += cut_->respond(loads + holding_forces(coefficients, prescribed) - cut_->elastic_forces(coefficients));
+  return coefficients;
+}
+
+Field GrowingBody::solve() const {
+  VectorX prescribed = prescribed_values(problem_);
+  if (problem_.prescribed_field)
+    for (std::size_t k = 0; k < cut_->held().size(); ++k)
+      prescribed.segment<3>(3 * static_cast<Eigen::Index>(k)) = cut_->held()[k].of(problem_.prescribed_field);
+  Field field{compacted(solved(cut_->external_loads(), prescribed)), {}, 1, prescribed};
+  require_finite(field, report_);
+  return field;
+}
+
+std::vector<Field> GrowingBody::responses_to(const MatrixX& forces) const {
+  const MatrixX solution = compacted(cut_->respond(forces));
+  const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));
+  std::vector<Field> responses;
+  responses.reserve(static_cast<std::size_t>(solution.cols()));
+  for (Eigen::Index k = 0; k < solution.cols(); ++k) {
+    responses.push_back({solution.col(k), {}, 0, no_displacement});
+    require_finite(responses.back(), report_);
+  }
+  return responses;
+}
+
+std::vector<Field> GrowingBody::force_responses(const std::vector<int>& candidates) const {
+  MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), 3 * std::ssize(candidates));
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const DisplacementMean mean = cut_->mean(id_[candidates[c]]);
+    for (int axis = 0; axis < 3; ++axis)
+      add_force(mean, Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
+  }
+  return responses_to(right);
+}
+
+std::vector<Field> GrowingBody::pattern_responses(const std::vector<ForcePattern>& patterns) const {
+  return responses_to(pattern_loads(cut_->spheres(), patterns));
+}
+
+MatrixX GrowingBody::pattern_displacements(const std::vector<ForcePattern>& patterns,
+                                           const std::vector<Field>& fields) const {
+  const MatrixX loads = compacted(pattern_loads(cut_->spheres(), patterns));
+  MatrixX displacements(std::ssize(patterns), std::ssize(fields));
+  for (std::size_t f = 0; f < fields.size(); ++f)
+    displacements.col(static_cast<Eigen::Index>(f)) = loads.transpose() * fields[f].coefficients;
+  return displacements;
+}
+
+Field GrowingBody::prescribed_response(const std::vector<Vector3>& values) const {
+  const VectorX prescribed = prescribed_values(problem_, values);
+  Field field{compacted(solved(VectorX::Zero(3 * std::ssize(compact_)), prescribed)), {}, 0, prescribed};
+  require_finite(field, report_);
+  return field;
+}
+
+std::vector<Vector3> GrowingBody::constraint_points() const {
+  std::vector<Vector3> points;
+  for (const DisplacementMean& mean : cut_->held())
+    points.push_back(mean.centroid);
+  return points;
+}
+
+Vector3 GrowingBody::contact_point(int node) const {
+  return cut_->mean(id_[node]).centroid;
+}
+
+MatrixX GrowingBody::contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const {
+  MatrixX displacements(3 * std::ssize(nodes), std::ssize(fields));
+  for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
+    DisplacementMean mean = cut_->mean(id_[nodes[c]]);
+    for (int& node : mean.nodes)
+      node = compact_[node];
+    for (Eigen::Index f = 0; f < displacements.cols(); ++f)
+      displacements.col(f).segment<3>(3 * c) = mean.of(fields[f].coefficients);
+  }
+  return displacements;
+}
+
+VectorX GrowingBody::nodal_displacements(const Field& field) const {
+  return supports_.displacements(field);
+}
+
+PointState GrowingBody::at(const Vector3& x, const Field& field) const {
+  thread_local ShapeFunctions shape;
+  require_support(cut_->spheres(), x, shape);
+  for (int& node : shape.nodes)
+    node = compact_[node];
+  return state_from(problem_, shape, field);
+}
+
+std::vector<Vector3> GrowingBody::constraint_forces(const Field& field) const {
+  const VectorX coefficients = expanded(field.coefficients);
+  std::vector<Vector3> forces;
+  forces.reserve(problem_.prescribed.size());
+  for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
+    forces.push_back(constraint_force(k, coefficients, field.prescribed));
+  return forces;
+}
+
+double GrowingBody::residual(const Field& field, const std::vector<int>& loaded_nodes,
+                             const std::vector<Vector3>& nodal_forces) const {
+  const VectorX coefficients = expanded(field.coefficients);
+  VectorX applied = field.load_factor * cut_->external_loads();
+  for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
+    add_force(cut_->mean(id_[loaded_nodes[k]]), nodal_forces[k], applied);
+  const VectorX rows = cut_->elastic_forces(coefficients) - holding_forces(coefficients, field.prescribed);
+  const double unbalanced = compacted(rows - applied).lpNorm<Eigen::Infinity>();
+  double largest = applied.lpNorm<Eigen::Infinity>();
+  for (const Vector3& force : constraint_forces(field))
+    largest = std::max(largest, force.lpNorm<Eigen::Infinity>());
+  return largest > 0 ? unbalanced / largest : 0;
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,225 @@
+// The cuts of a session: the blade carried to the tissue at rest, the incision it makes, and the body that follows it.
+#include "solvers/cut_sight.hpp"
+#include "src/session.hpp"
+#include "src/stage_timer.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double rest_tolerance = 1e-4;   // of the fine spacing: of a place carried back to rest
+constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a little, as ahead of a front
+constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
+constexpr double way_spacings = 3;        // fine spacings: so far ahead of the blade a cut is prepared for
+constexpr double same_place = 1e-6;       // of the fine spacing: nearer to its path a blade is on it
+
+} // namespace
+
+// Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
+// its surface. A place in the opening of a cut, where there is no material, belongs to the sheet.
+Vector3 Session::rest_position(const Vector3& x) const {
+  const topology::Domain& domain = *organ_.domain;
+  const auto displacement = [&](const Vector3& rest) {
+    return at(domain.signed_distance(rest) <= 0 ? rest : domain.closest_surface_point(rest)).displacement;
+  };
+  for (const double tolerance : {rest_tolerance, coarse_tolerance})
+    try {
+      return topology::rest_position(x, displacement, tolerance * zone_.spacing.fine);
+    } catch (const NumericalError&) {
+      if (tolerance == rest_tolerance)
+        continue;
+      Vector3 guess = x - displacement(x);
+      if (model_.incision != nullptr)
+        if (const auto on = model_.incision->closest(guess, gap_reach * zone_.spacing.fine))
+          return on->point;
+      if (domain.signed_distance(guess) <= 0) // outside no material is cut
+        throw;
+      return guess;
+    }
+  return x;
+}
+
+// Poses on the next way of the blade, about way_spacings long: those of its path, or straight on where something else
+// leads it.
+std::vector<topology::BladePose> Session::blade_ahead(const StepSample& sample) const {
+  const auto travel = [&](const topology::BladePose& a, const topology::BladePose& b) {
+    double largest = 0;
+    for (const Vector3& x : scenario_.blade->edge)
+      largest = std::max(largest, (b.orientation * x + b.position - a.orientation * x - a.position).norm());
+    return largest;
+  };
+  const double fine = zone_.spacing.fine;
+  const topology::BladePose& here = *sample.blade;
+  std::vector<topology::BladePose> poses;
+  const auto scripted = blade_pose(*scenario_.blade, sample.time);
+  if (scripted && travel(*scripted, here) < same_place * fine) {
+    double way = 0;
+    for (const StepSample& step : steps_)
+      if (step.blade && step.time > sample.time && way < way_spacings * fine) {
+        way += travel(poses.empty() ? here : poses.back(), *step.blade);
+        poses.push_back(*step.blade);
+      }
+  } else if (last_blade_) {
+    const Vector3 motion = here.position - last_blade_->position;
+    for (int k = 1; k <= static_cast<int>(way_spacings) && motion.norm() > 0; ++k)
+      poses.push_back({here.time + k, here.position + k * fine * motion.normalized(), here.orientation});
+  }
+  return poses;
+}
+
+// Nodes and system of the body with the new cut: of what was there, what the cut did not touch stays.
+void Session::build_cut(const StepSample& sample, const topology::RestMap& to_rest, BodyModel& next,
+                        CutReport& report) {
+  const auto way_ahead = [&] { return incisions_->way_through(blade_ahead(sample), to_rest); };
+  const std::string hindrance =
+      model_.coarseness != coarseness_
+          ? "the spacing has changed"
+          : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+  std::optional<solvers::SprinkleIncrement> change;
+  report.update = SystemUpdate::rebuilt;
+  report.update_reason = hindrance;
+  {
+    const StageTimer timer(report.seconds.sprinkling);
+    if (hindrance.empty())
+      try {
+        const StageTimer sprinkle_timer(profile_.sprinkle);
+        change = exchange_nodes(*organ_.domain, sprinkle_options(next), model_, next.sprinkling);
+        next.coarseness = coarseness_;
+      } catch (const NumericalError& error) {
+        report.update_reason = error.what();
+      }
+    if (!change)
+      sprinkle(&model_.sprinkling.nodes, next);
+  }
+  const std::vector<int> near = tool_in_reach() ? candidates(next) : std::vector<int>{};
+  const double seen = solvers::sight_seconds();
+  {
+    const StageTimer timer(report.seconds.assembly);
+    if (change) {
+      const StageTimer growth_timer(profile_.discretise);
+      const solvers::BodyGrowth growth = follow_cut(scenario_, organ_.domain, *change, way_ahead, model_, next);
+      report.update_reason = growth.uncovered;
+      if (next.body != nullptr) {
+        report.update = growth.update.condensed_anew ? SystemUpdate::condensed_anew : SystemUpdate::updated;
+        report.update_reason = growth.update.reason;
+      }
+    }
+    if (next.body == nullptr)
+      assemble(next, hindrance.empty() ? way_ahead() : topology::SurfaceMesh{}, near);
+  }
+  report.seconds.visibility = solvers::sight_seconds() - seen;
+  report.seconds.solve = next.body->report().factor_seconds;
+  report.seconds.assembly -= report.seconds.visibility + report.seconds.solve;
+  const StageTimer timer(report.seconds.solve);
+  condense(near, next);
+}
+
+// Moves the blade; true when that cut something and the body with the new cut is built and solved. A refusal leaves
+// body, incision and wound as they were.
+bool Session::cut(const StepSample& sample, CutReport& report) {
+  topology::RestMap to_rest;
+  if (model_.state)
+    to_rest = [this](const Vector3& x) { return rest_position(x); };
+  topology::SweepResult swept;
+  const bool had_body = model_.body != nullptr;
+  const auto refuse = [&](const char* why) {
+    report.triangles = 0;
+    report.refused = true;
+    report.reason = why;
+    report.update = SystemUpdate::none;
+    report.update_reason.clear();
+    warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, why));
+  };
+  {
+    const StageTimer timer(report.seconds.topology);
+    try {
+      swept = incisions_->move_to(*sample.blade, to_rest);
+    } catch (const InputError& error) {
+      refuse(error.what());
+    } catch (const NumericalError& error) {
+      refuse(error.what());
+    }
+  }
+  report.triangles = swept.triangles;
+  if (swept.triangles == 0) {
+    if (!report.refused)
+      report.reason = swept.refused;
+    return false;
+  }
+  try {
+    BodyModel next;
+    next.incision = incisions_->incision();
+    require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
+    check_pieces(sample.time);
+    {
+      const StageTimer timer(report.seconds.level_sets);
+      incisions_->update_fields();
+    }
+    build_cut(sample, to_rest, next, report);
+    {
+      const StageTimer timer(report.seconds.solve);
+      solve(sample, next);
+    }
+    const std::vector<int>& from = next.sprinkling.kept_from;
+    report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+    profile_.topology += report.seconds.topology;
+    profile_.level_sets += report.seconds.level_sets;
+    model_ = std::move(next);
+    return true;
+  } catch (const InputError& error) {
+    refuse(error.what());
+  } catch (const NumericalError& error) {
+    refuse(error.what());
+  }
+  incisions_->take_back();
+  if (had_body && model_.body == nullptr) // it had followed the cut before that was refused
+    app::assemble(scenario_, organ_.domain, model_);
+  return false;
+}
+
+void Session::check_pieces(double time) {
+  const topology::Wound& wound = incisions_->wound();
+  require_pieces(wound, zone_.spacing);
+  const std::vector<int> unheld = unheld_pieces(wound, scenario_.fixed);
+  if (unheld.empty())
+    return;
+  const double volume = wound.pieces[static_cast<std::size_t>(unheld.front())].volume;
+  const std::string what = fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region",
+                                       unheld.size(), wound.pieces.size(), volume, unheld.size() == 1 ? "is" : "are");
+  if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
+    throw InputError(fmt::format("{}; allowed by cut.unheld = \"refuse\": none", what));
+  warn(fmt::format("unheld {}", unheld.size()),
+       fmt::format("t = {:g} s: {}: {}", time, what,
+                   scenario_.cut.unheld == solvers::UnheldPieces::hold ? "soft springs hold it"
+                                                                       : "it leaves the computation"));
+}
+
+void Session::report_cut(CutReport& report) const {
+  const topology::Wound& wound = incisions_->wound();
+  if (model_.incision != nullptr) {
+    report.area = model_.incision->area();
+    report.front_length = model_.incision->front_length();
+    report.sheets = static_cast<int>(model_.incision->sheets().size());
+  }
+  report.pieces = static_cast<int>(wound.pieces.size());
+  for (const topology::WoundPiece& piece : wound.pieces)
+    report.volumes.push_back(piece.volume);
+  std::sort(report.volumes.rbegin(), report.volumes.rend());
+  report.unheld = static_cast<int>(unheld_pieces(wound, scenario_.fixed).size());
+  report.nodes = model_.sprinkling.nodes.size();
+  report.lip_pairs = static_cast<int>(model_.pairs.size());
+  if (model_.state) {
+    for (const double opening : normal_openings(model_))
+      report.opening = std::max(report.opening, opening);
+    report.opening_volume = opening_volume(wound, model_);
+    for (const char closed : model_.state->lips.closed)
+      report.closed_pairs += closed;
+    report.lips_converged = model_.state->lips.converged;
+  }
+  report.surface_hash = topology::surface_hash(wound.surface);
+}
+
+} // namespace spherecut::app
