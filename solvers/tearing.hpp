@@ -1,0 +1,43 @@
+// When and where the front of a cut moves by itself: linear elastic fracture mechanics at every point of the front.
+#pragma once
+
+#include "solvers/stress_intensity.hpp"
+
+namespace spherecut::solvers {
+
+/// Direction in which a front runs on, rad, in the plane across it: 0 ahead, positive to the + side of the sheet. The
+/// direction of largest hoop stress [Erdogan and Sih 1963],
+///
+///   cos t = (3 K_II^2 + K_I sqrt(K_I^2 + 8 K_II^2)) / (K_I^2 + 9 K_II^2),  t against the sign of K_II,
+///
+/// +-70.5 degrees in pure mode II. K_III does not turn it. Faces that are pressed together (K_I < 0) do not open: K_I
+/// then counts as zero.
+double kink_angle(const Intensities& k);
+
+/// G of the intensities that drive a tear, J/m2: as energy_release_rate(), K_I < 0 counting as zero.
+double driving_release_rate(const Material& material, const Intensities& k);
+
+/// One place of the front.
+struct FrontState {
+  topology::FrontFrame frame;
+  Intensities intensities = Intensities::Zero(); // Pa sqrt(m)
+  double release = 0;                            // G, J/m2
+  double toughness = 0;                          // G_c there, J/m2
+  double angle = 0;                              // kink_angle, rad
+  bool by_integral = true; // false: by the jump behind the front, where the tube of the integral does not fit
+};
+
+/// Intensities along the whole front at places about `spacing` m apart: by interaction integral, by displacement
+/// correlation where the tube leaves the body or the front turns within it. `toughness` at a point of the body at rest,
+/// J/m2. Places where neither can be had (nearer to the surface than the correlation reaches) take those of the nearest
+/// place. Throws InputError when `spacing` or a toughness is not positive.
+std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
+                                     const std::function<double(const Vector3&)>& toughness, double spacing);
+
+/// How the front moves in one step of quasi-static growth: where G >= G_c by up to `longest` m, in proportion to
+/// (G / G_c - 1) over its largest, never less than a tenth of it where G >= G_c; elsewhere not. Directions and lengths
+/// are averaged along the front over about `smoothing` m. The states must not be empty.
+std::function<Vector3(const topology::FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest,
+                                                                double smoothing);
+
+} // namespace spherecut::solvers
