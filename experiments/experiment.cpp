@@ -42,6 +42,10 @@ const std::vector<Experiment>& all_experiments() {
        run_extrapolation},
       {"force_continuity", "the largest step of the force from tick to tick, against the solved force's own",
        run_force_continuity},
+      {"passivity", "a light hand on stiff tissue: the loop gives no more energy than it got", run_passivity},
+      {"haptic_loop", "60 s of palpating and cutting a liver in real time: time and lateness of every tick",
+       run_haptic_loop},
+      {"solve_rate", "whole steps from contact to force a second, uncut and while cutting", run_solve_rate},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
   };
   return experiments;

@@ -22,5 +22,8 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context);
 std::vector<Check> run_sever(const ExperimentContext& context);
 std::vector<Check> run_extrapolation(const ExperimentContext& context);
 std::vector<Check> run_force_continuity(const ExperimentContext& context);
+std::vector<Check> run_passivity(const ExperimentContext& context);
+std::vector<Check> run_haptic_loop(const ExperimentContext& context);
+std::vector<Check> run_solve_rate(const ExperimentContext& context);
 
 } // namespace spherecut::experiments

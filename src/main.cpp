@@ -2,6 +2,7 @@
 // 3 numerical failure, 130 interrupted.
 #include "experiments/experiment.hpp"
 #include "src/blas_threads.hpp"
+#include "src/haptics/run_haptics.hpp"
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
 #include "src/version.hpp"
@@ -70,6 +71,16 @@ int run(int argc, char** argv) {
   auto* check = commands.add_subcommand("check", "Check a scenario without running it");
   check->add_option("scenario", scenario, "TOML file")->required();
 
+  app::HapticCommand haptic;
+  auto* haptics = commands.add_subcommand("haptics", "Hold the tool of a scenario in real time, with a force at 1 kHz");
+  haptics->add_option("scenario", haptic.scenario, "TOML file")->required();
+  haptics->add_option("--out", haptic.out, "Folder for the results; must not hold results yet")->required();
+  haptics->add_option("--duration", haptic.duration, "Length of the session, s; default 10");
+  haptics->add_flag("--virtual", haptic.in_virtual_time,
+                    "Without clock and threads: a solve every budget, the same bits every time");
+  haptics->add_option("--solved-every", haptic.solved_stride,
+                      "Afterwards solve at every so many ticks for the model's error; 0: not; default 10");
+
   auto* experiment = commands.add_subcommand("experiment", "List or run the experiments");
   experiment->require_subcommand(1);
   auto* list = experiment->add_subcommand("list", "List the experiments");
@@ -94,6 +105,8 @@ int run(int argc, char** argv) {
 
   if (run_command->parsed())
     return app::run_scenario(scenario, out, stdout) == app::RunEnd::complete ? 0 : status_interrupted;
+  if (haptics->parsed())
+    return app::run_haptics(haptic, stdout) == app::RunEnd::complete ? 0 : status_interrupted;
   if (check->parsed())
     app::check_scenario(scenario, stdout);
   else if (list->parsed())

@@ -153,6 +153,29 @@ ToolSettings tool(const Section& section, Offences& offences) {
   return tool;
 }
 
+HapticSettings haptics(const Section& section) {
+  HapticSettings haptics;
+  haptics.rate = section.number("rate");
+  haptics.model = force_model_from_string(section.text("model"));
+  haptics.hand_over = section.number("hand_over");
+  haptics.budget = section.number("budget");
+  haptics.passivity = section.boolean("passivity");
+  haptics.viewer_rate = section.number("viewer_rate");
+  haptics.device = section.text("device") == "script" ? HeldDevice::script : HeldDevice::hand;
+  const Section limits = section.table("limits");
+  haptics.limits = {limits.number("gain"),
+                    limits.number("force"),
+                    limits.number("slew"),
+                    limits.number("stiffness"),
+                    limits.number("damping"),
+                    limits.number("resolution"),
+                    static_cast<int>(limits.integer("delay"))};
+  const Section hand = section.table("hand");
+  haptics.hand = {hand.number("mass"),       hand.number("stiffness"), hand.number("damping"),
+                  haptics.limits.resolution, haptics.limits.delay,     true};
+  return haptics;
+}
+
 } // namespace
 
 bool FixedRegion::holds(const Vector3& x) const {
@@ -202,6 +225,7 @@ Scenario read_scenario(const std::filesystem::path& file) {
     scenario.blade = blade(root.table("blade"), offences);
   if (!scenario.tool && !scenario.blade && scenario.precuts.empty())
     offences.add(1, "there is no tool, no blade and no precut: nothing to compute; allowed: one of them or more");
+  scenario.haptics = haptics(root.table("haptics"));
   const Section output = root.table("output");
   scenario.output = {static_cast<int>(output.integer("vtp_every")), output.boolean("figures")};
   offences.throw_if_any();

@@ -4,6 +4,7 @@
 #include "solvers/contact_solver.hpp"
 #include "solvers/discretisation.hpp"
 #include "src/cut_settings.hpp"
+#include "src/haptics/haptic_settings.hpp"
 #include "topology/tool.hpp"
 
 #include <cstdint>
@@ -110,6 +111,7 @@ struct Scenario {
   std::vector<PrecutSettings> precuts;
   CutSettings cut;
   std::optional<BladeSettings> blade;
+  HapticSettings haptics;
   OutputSettings output;
 };
 

@@ -30,9 +30,10 @@ struct Outcome {
 
 Outcome run_models(const SolvedMotion& one, int solve_rate) {
   Outcome outcome;
+  const std::vector<app::LoopRecords> records = run_motion(one, {models.begin(), models.end()}, solve_rate);
   for (std::size_t m = 0; m < models.size(); ++m) {
-    outcome.ticks[m] = run_motion(one, models[m], solve_rate).ticks;
-    const ForceError error = force_error(outcome.ticks[m], one.solved);
+    outcome.ticks[m] = records[m].ticks;
+    const app::ModelError error = app::model_error(outcome.ticks[m], one.solved);
     outcome.rms[m] = error.rms / one.peak;
     outcome.largest[m] = error.largest / one.peak;
   }

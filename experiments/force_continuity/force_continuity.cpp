@@ -16,32 +16,6 @@ namespace {
 using app::ForceModelKind;
 using solvers::Method;
 
-/// Largest steps of a force per tick, N: anywhere, and by what happens at the tick.
-struct Steps {
-  double any = 0, hand_over = 0, onset = 0, cut = 0;
-};
-
-Steps steps_of(const app::LoopRecords& records) {
-  Steps steps;
-  std::vector<char> cut(records.ticks.size() + 1, 0);
-  for (const app::SolveRecord& solve : records.solves)
-    if (solve.cut_triangles > 0 && solve.event.arrival_tick < records.ticks.size())
-      cut[solve.event.arrival_tick] = 1;
-  for (std::size_t i = 1; i < records.ticks.size(); ++i) {
-    const app::TickRecord& now = records.ticks[i];
-    const app::TickRecord& before = records.ticks[i - 1];
-    const double step = (now.tissue - before.tissue).norm();
-    steps.any = std::max(steps.any, step);
-    if (now.arrived)
-      steps.hand_over = std::max(steps.hand_over, step);
-    if ((now.active > 0) != (before.active > 0))
-      steps.onset = std::max(steps.onset, step);
-    if (cut[i] != 0)
-      steps.cut = std::max(steps.cut, step);
-  }
-  return steps;
-}
-
 double largest_step(const std::vector<app::SolvedForce>& solved) {
   double largest = 0;
   for (std::size_t i = 1; i < solved.size(); ++i)
@@ -65,12 +39,15 @@ std::vector<Check> run_force_continuity(const ExperimentContext& context) {
         continue;
       const SolvedMotion one = solve_motion(method, motion);
       const double exact = largest_step(one.solved) / one.peak;
-      for (const ForceModelKind model : {ForceModelKind::hold, ForceModelKind::linear_in_time, ForceModelKind::tangent})
-        for (const int rate : {30, 100, 300}) {
-          if (context.quick && (rate == 300 || model == ForceModelKind::linear_in_time))
-            continue;
-          const app::LoopRecords records = run_motion(one, model, rate);
-          const Steps steps = steps_of(records);
+      const std::vector models{ForceModelKind::hold, ForceModelKind::linear_in_time, ForceModelKind::tangent};
+      for (const int rate : {30, 100, 300}) {
+        if (context.quick && rate == 300)
+          continue;
+        const std::vector<app::LoopRecords> runs = run_motion(one, models, rate);
+        for (std::size_t m = 0; m < models.size(); ++m) {
+          const ForceModelKind model = models[m];
+          const app::LoopRecords& records = runs[m];
+          const app::ForceSteps steps = app::force_steps(records);
           const std::string name =
               fmt::format("{}_{}_{}_{}", solvers::to_string(method), motion.name, app::to_string(model), rate);
           context.say(fmt::format("{}: largest step {:.2f} % of the peak, of the solved force {:.2f} %; at hand-overs "
@@ -94,6 +71,7 @@ std::vector<Check> run_force_continuity(const ExperimentContext& context) {
             figure.series.push_back(felt);
           }
         }
+      }
       if (method == Method::galerkin && motion.name == "slide") {
         app::Series solved{"solved at every tick", {}, {}, app::SeriesStyle::lines};
         for (const app::SolvedForce& force : one.solved) {

@@ -48,8 +48,8 @@ std::vector<HapticMotion> haptic_motions() {
     const double phase = 2 * pi * (s + 0.5 * 4 * s * s / 1.5);
     return Vector3(0, 0, entered(t, 0.0035) + 0.003 * std::sin(phase) * ease(s / 0.1));
   }));
-  motions.push_back(motion_of("cut", 1.2, [](double t) {
-    return Vector3(0, 0, entered(t, 0.0025) + 0.0015 * std::sin(2 * pi * 2 * std::max(0.0, t - 0.1)));
+  motions.push_back(motion_of("cut", 0.6, [](double t) {
+    return Vector3(0, 0, entered(t, 0.0025) + 0.0015 * std::sin(2 * pi * 4 * std::max(0.0, t - 0.1)));
   }));
   motions.back().cut = true;
   return motions;
@@ -78,8 +78,8 @@ app::Scenario haptic_block(const HapticMotion& motion, solvers::Method method) {
     blade.edge = {{0, 0, 0}, {0, 0, 0.014}};
     blade.edge_radius = 1e-4;
     blade.path = {{0.1, {0.014, -0.034, top - 0.010}, Vector3::Zero()},
-                  {1.2, {0.014, -0.023, top - 0.010}, Vector3::Zero()}};
-    scenario.cut.front_spacing = 0.0032;
+                  {0.6, {0.014, -0.029, top - 0.010}, Vector3::Zero()}};
+    scenario.nodes.fine_spacing = scenario.cut.front_spacing = 0.004;
   }
   return scenario;
 }
@@ -97,34 +97,20 @@ SolvedMotion solve_motion(solvers::Method method, const HapticMotion& motion) {
   return result;
 }
 
-app::LoopRecords run_motion(const SolvedMotion& motion, app::ForceModelKind model, int solve_rate) {
+std::vector<app::LoopRecords> run_motion(const SolvedMotion& motion, const std::vector<app::ForceModelKind>& models,
+                                         int solve_rate) {
   const auto count = static_cast<std::uint64_t>(motion.solved.size());
   const auto period = static_cast<std::uint64_t>(std::lround(tick_rate / solve_rate));
-  app::HapticSettings settings;
-  settings.model = model;
-  settings.passivity = false;
-  settings.limits.force = settings.limits.slew = 1e6;
+  std::vector<app::HapticSettings> settings;
+  for (const app::ForceModelKind model : models) {
+    app::HapticSettings& one = settings.emplace_back();
+    one.model = model;
+    one.passivity = false;
+    one.limits.force = one.limits.slew = 1e6;
+  }
   app::HapticSimulation simulation(haptic_block(motion.motion, motion.method));
   app::ScriptedPath device(motion.motion.path, tick_rate);
   return app::run_virtual(settings, simulation, device, app::regular_solves(count, period, period), count);
-}
-
-ForceError force_error(const std::vector<app::TickRecord>& ticks, const std::vector<app::SolvedForce>& solved) {
-  ForceError error;
-  double sum = 0;
-  int count = 0;
-  for (const app::SolvedForce& truth : solved) {
-    error.peak = std::max(error.peak, truth.force.norm());
-    const Vector3& felt = ticks[truth.tick].tissue;
-    const double off = (felt - truth.force).norm();
-    error.largest = std::max(error.largest, off);
-    if (truth.force.norm() == 0 && felt.norm() == 0)
-      continue;
-    sum += off * off;
-    ++count;
-  }
-  error.rms = count > 0 ? std::sqrt(sum / count) : 0;
-  return error;
 }
 
 } // namespace spherecut::experiments

@@ -1,7 +1,7 @@
 // Motions of a ball on a block, and the errors of the force models on them: ground of the haptic experiments.
 #pragma once
 
-#include "src/haptics/virtual_loop.hpp"
+#include "src/haptics/haptic_report.hpp"
 
 #include <string>
 #include <vector>
@@ -17,7 +17,7 @@ struct HapticMotion {
 };
 
 /// press: 4 mm deep in 0.4 s and out. tap: three times in and out of contact at 0.1 m/s. slide: 3 mm deep, 16 mm along
-/// the surface at up to 50 mm/s. sine: 1 to 5 Hz about 3 mm of depth, up to 0.1 m/s. cut: 2 Hz about 2.5 mm of depth
+/// the surface at up to 50 mm/s. sine: 1 to 5 Hz about 3.5 mm of depth, up to 0.1 m/s. cut: 4 Hz about 2.5 mm of depth
 /// while a blade cuts past the ball at 10 mm/s.
 std::vector<HapticMotion> haptic_motions();
 
@@ -35,13 +35,7 @@ SolvedMotion solve_motion(solvers::Method method, const HapticMotion& motion);
 
 /// The loop in virtual time on the motion, without device limits or controller: `solve_rate` solves a second, each of
 /// which takes the whole time until the next.
-app::LoopRecords run_motion(const SolvedMotion& motion, app::ForceModelKind model, int solve_rate);
-
-/// Error of the recorded tissue force against the solved one over the ticks in contact, N.
-struct ForceError {
-  double rms = 0, largest = 0; // N
-  double peak = 0;             // N, of the solved force
-};
-ForceError force_error(const std::vector<app::TickRecord>& ticks, const std::vector<app::SolvedForce>& solved);
+std::vector<app::LoopRecords> run_motion(const SolvedMotion& motion, const std::vector<app::ForceModelKind>& models,
+                                         int solve_rate);
 
 } // namespace spherecut::experiments

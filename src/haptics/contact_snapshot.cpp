@@ -15,6 +15,8 @@ void clear(ContactSnapshot& snapshot) {
   snapshot.force.setZero();
   snapshot.asymmetry = 0;
   snapshot.reach = 0;
+  snapshot.rest_sum = 0;
+  snapshot.compliance_sum = 0;
 }
 
 void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state,
@@ -39,10 +41,13 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
   snapshot.reach = 0;
   const auto size = static_cast<std::size_t>(3 * snapshot.count);
   double skew = 0;
+  snapshot.rest_sum = 0;
+  snapshot.compliance_sum = 0;
   double sum = 0;
   for (int k = 0; k < snapshot.count; ++k) {
     const int c = chosen[static_cast<std::size_t>(k)];
     snapshot.rest[k] = patch.rest[c];
+    snapshot.rest_sum += patch.rest[c].dot(Vector3(1, 1.7, 2.9)) * (1 + k);
     snapshot.normals[k] = patch.normals[c];
     snapshot.base[k] = patch.base_displacement.segment<3>(3 * c);
     snapshot.displacement[k] = state.displacement.segment<3>(3 * c);
@@ -56,6 +61,7 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
         for (int j = 0; j < 3; ++j) {
           const double here = patch.compliance(3 * c + i, 3 * d + j);
           const double there = patch.compliance(3 * d + j, 3 * c + i);
+          snapshot.compliance_sum += here * (1 + i + 3 * j + 9 * (k % 7));
           skew += (here - there) * (here - there);
           sum += (here + there) * (here + there);
           snapshot.compliance[static_cast<std::size_t>(3 * l + j) * size + static_cast<std::size_t>(3 * k + i)] =

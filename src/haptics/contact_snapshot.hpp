@@ -28,17 +28,18 @@ struct ContactSnapshot {
   topology::SurfaceContact contact; // deepest point on the surface at rest
   solvers::ContactCondition condition = solvers::ContactCondition::frictionless;
 
-  int count = 0;                     // candidates; 0: the tool is far
-  std::vector<Vector3> rest;         // m
-  std::vector<Vector3> normals;      // outward, of the surface at rest
-  std::vector<Vector3> base;         // m, displacement without tool
-  std::vector<Vector3> displacement; // m, in the solve
-  std::vector<Vector3> forces;       // N on the body, in the solve
-  std::vector<Vector3> bond;         // m, bonded: displacement of an active node that moves with the tool
-  std::vector<char> active;          // in contact
-  std::vector<double> compliance;    // m/N, column-major 3 count x 3 count
-  double asymmetry = 0;              // |C - C^T| / |C + C^T| of the compliance before it was made symmetric
-  double reach = 0;                  // m, of the candidates about the contact's point
+  int count = 0;                           // candidates; 0: the tool is far
+  std::vector<Vector3> rest;               // m
+  std::vector<Vector3> normals;            // outward, of the surface at rest
+  std::vector<Vector3> base;               // m, displacement without tool
+  std::vector<Vector3> displacement;       // m, in the solve
+  std::vector<Vector3> forces;             // N on the body, in the solve
+  std::vector<Vector3> bond;               // m, bonded: displacement of an active node that moves with the tool
+  std::vector<char> active;                // in contact
+  std::vector<double> compliance;          // m/N, column-major 3 count x 3 count
+  double asymmetry = 0;                    // |C - C^T| / |C + C^T| of the compliance before it was made symmetric
+  double rest_sum = 0, compliance_sum = 0; // of all entries: equal sums mean the same candidates, the same body
+  double reach = 0;                        // m, of the candidates about the contact's point
 
   bool resprinkled = false; // the nodes have followed the tool since the last snapshot
   int cut_triangles = 0;    // added to the cut since the last snapshot

@@ -11,7 +11,10 @@ namespace {
 
 class HoldModel : public ForceModel {
  public:
-  void solved(const ContactSnapshot& snapshot) noexcept override { force_ = snapshot.force; }
+  bool solved(const ContactSnapshot& snapshot) noexcept override {
+    force_ = snapshot.force;
+    return false;
+  }
   ModelForce at(const topology::ToolPose& /*pose*/, double /*time*/) noexcept override {
     ModelForce result;
     result.force = force_;
@@ -26,13 +29,14 @@ class HoldModel : public ForceModel {
 /// the force away.
 class LinearInTimeModel : public ForceModel {
  public:
-  void solved(const ContactSnapshot& snapshot) noexcept override {
+  bool solved(const ContactSnapshot& snapshot) noexcept override {
     const double interval = snapshot.time - time_;
     slope_ = solves_ > 0 && interval > 0 ? Vector3((snapshot.force - force_) / interval) : Vector3(Vector3::Zero());
     longest_ = 3 * interval;
     force_ = snapshot.force;
     time_ = snapshot.time;
     ++solves_;
+    return false;
   }
   ModelForce at(const topology::ToolPose& /*pose*/, double time) noexcept override {
     ModelForce result;

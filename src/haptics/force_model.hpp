@@ -22,8 +22,9 @@ struct ModelForce {
 class ForceModel {
  public:
   virtual ~ForceModel() = default;
-  /// A new solve; the snapshot stays what it is until the next call.
-  virtual void solved(const ContactSnapshot& snapshot) noexcept = 0;
+  /// A new solve; the snapshot stays what it is until the next call. True: it changes nothing in the force, which goes
+  /// on as before.
+  virtual bool solved(const ContactSnapshot& snapshot) noexcept = 0;
   /// Force with the tool at `pose` at `time` (s); zero before the first solve.
   virtual ModelForce at(const topology::ToolPose& pose, double time) noexcept = 0;
 };

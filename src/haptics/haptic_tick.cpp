@@ -52,16 +52,9 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
   return model_->at(pose, device.time);
 }
 
-void HapticTick::leave(const DeviceState& device) noexcept {
-  locate(device);
-  bool outside = false;
-  before_ = ask(device, outside).force + difference_;
-}
-
 void HapticTick::arrive(const ContactSnapshot& snapshot) noexcept {
-  model_->solved(snapshot);
+  arrived_ = !model_->solved(snapshot) || arrived_;
   snapshot_ = &snapshot;
-  arrived_ = true;
 }
 
 TickResult HapticTick::tick(const DeviceState& device) noexcept {
@@ -69,14 +62,18 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   locate(device);
   result.contact = contact_;
   result.model = ask(device, result.outside);
-  if (arrived_) {
+  const bool arrives = arrived_;
+  if (arrives) {
     arrived_ = false;
-    difference_ = before_ - result.model.force;
+    // Where the old snapshot would have had the force now: on from its last two ticks.
+    difference_ += 2 * last_model_ - model_before_ - result.model.force;
     fading_ = difference_ / std::max(1.0, std::round(settings_.hand_over * settings_.rate));
   } else if (difference_.squaredNorm() > 0) {
     difference_ =
         difference_.squaredNorm() > fading_.squaredNorm() ? Vector3(difference_ - fading_) : Vector3(Vector3::Zero());
   }
+  model_before_ = arrives ? result.model.force : last_model_;
+  last_model_ = result.model.force;
   result.tissue = result.model.force + difference_;
   const DeviceLimits& limits = settings_.limits;
   std::optional<double> stored = result.model.stored;

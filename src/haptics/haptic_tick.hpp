@@ -24,12 +24,11 @@ struct TickResult {
   bool outside = false;             // the contact has left the candidates of the snapshot
 };
 
-/// Neither allocates, locks, waits nor throws after construction. A tick with a new snapshot is
-///   leave(state); (take the snapshot over, the old one may go) arrive(snapshot); tick(state);
-/// any other is tick(state).
+/// Neither allocates, locks, waits nor throws after construction. A tick with a new snapshot is arrive(snapshot);
+/// tick(state); any other is tick(state). From arrive() on the snapshot before may go.
 ///
-/// At a new snapshot the force goes on from where the old one had it: the difference of the two at the tool's pose is
-/// added and fades linearly within HapticSettings::hand_over. When the contact leaves the candidates, the patch is
+/// At a new snapshot the force goes on from where the old one would have had it, by its last two ticks: the difference
+/// is added and fades linearly within HapticSettings::hand_over. When the contact leaves the candidates, the patch is
 /// taken along with the tool: the model is asked as if the tool were still at their rim. A device that does not answer
 /// brings the force to zero at the slew limit.
 class HapticTick {
@@ -39,7 +38,6 @@ class HapticTick {
 
   /// Where the walk over the surface starts; before the first tick.
   void start(const DeviceState& device);
-  void leave(const DeviceState& device) noexcept;
   void arrive(const ContactSnapshot& snapshot) noexcept;
   TickResult tick(const DeviceState& device) noexcept;
 
@@ -56,11 +54,11 @@ class HapticTick {
   PassivityControl passivity_;
   const ContactSnapshot* snapshot_ = nullptr;
   topology::SurfaceContact contact_;
-  std::uint64_t located_ = 0;            // tick after which contact_ was found, plus one; 0: never
-  bool arrived_ = false;                 // a snapshot has come since the last tick
-  Vector3 before_ = Vector3::Zero();     // N, by the model that was left
-  Vector3 difference_ = Vector3::Zero(); // N, still to fade
-  Vector3 fading_ = Vector3::Zero();     // N, per tick
+  std::uint64_t located_ = 0; // tick after which contact_ was found, plus one; 0: never
+  bool arrived_ = false;      // a snapshot that changes the force has come since the last tick
+  Vector3 last_model_ = Vector3::Zero(), model_before_ = Vector3::Zero(); // N, of the last two ticks
+  Vector3 difference_ = Vector3::Zero();                                  // N, still to fade
+  Vector3 fading_ = Vector3::Zero();                                      // N, per tick
   Vector3 sent_ = Vector3::Zero();
 };
 

@@ -9,7 +9,9 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double reserve = 2e-5; // J, surplus that is kept
+constexpr double reserve = 2e-5;   // J, surplus that is kept
+constexpr double make_up = 0.003;  // s, in which a deficit is made up
+constexpr double smoothing = 0.25; // of the way to the wanted damping in a tick
 
 } // namespace
 
@@ -51,11 +53,13 @@ Vector3 PassivityControl::control(const Vector3& position, const Vector3& wanted
   surplus_ = std::min(surplus_ + gained - (now - stored_), reserve);
   stored_ = now;
   damping_forces_[0].setZero();
-  if (!active_ || surplus_ >= 0)
+  if (!active_)
     return wanted;
-  const double power = velocity.squaredNorm() / rate_; // J per N s/m in a tick
-  const double damping = power > 0 ? std::min(-surplus_ / power, limits_.damping) : 0;
-  damping_forces_[0] = -damping * velocity;
+  const double deficit = -surplus_ - std::sqrt(3.0) * wanted.norm() * limits_.resolution;
+  const double power = velocity.squaredNorm();
+  const double needed = deficit > 0 && power > 0 ? std::min(deficit / (power * make_up), limits_.damping) : 0;
+  damping_ += smoothing * (needed - damping_);
+  damping_forces_[0] = -damping_ * velocity;
   return wanted + damping_forces_[0];
 }
 

@@ -45,6 +45,7 @@ class PassivityControl {
   static constexpr std::size_t longest_delay = 15;
   std::array<Vector3, longest_delay + 1> sent_, damping_forces_; // N, newest first
   double energy_ = 0, lowest_ = 0, damped_ = 0;
+  double damping_ = 0;              // N s/m, added now
   double surplus_ = 0, stored_ = 0; // J: D, and U at the last tick
 };
 

@@ -12,19 +12,47 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double still = 1e-7;       // m, displacements that move by less between two rounds stand still
+constexpr double still = 5e-7;       // m, displacements that move by less between two rounds stand still
 constexpr double gap_slack = 1e-9;   // m, of a gap that counts as closed
-constexpr int most_rounds = 6;       // in a tick
+constexpr int most_rounds = 4;       // in a tick
 constexpr int most_pivots = 16;      // in a tick, over all rounds
 constexpr double singular = 1e-12;   // pivot over diagonal at which a block is not positive definite
 constexpr int patience_of_block = 4; // pivots of many candidates at once without progress
+constexpr double margin = 0.15;      // of the tip radius: candidates farther from the tool are not looked at
+constexpr double lever = 0.05;       // m, about the tool's point, over which a turn of its axis counts as motion
 constexpr int ld = 3 * most_candidates;
 constexpr int most_bonded = most_candidates - 1; // the factor has room for one that is tried
+
+// Chosen once at start for the machine's vectors. Thread sanitizer cannot run the chooser.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__)
+#define SPHERECUT_VECTORS __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define SPHERECUT_VECTORS
+#endif
+
+// y += a x.
+SPHERECUT_VECTORS void add_scaled(double* __restrict y, const double* __restrict x, double a, std::size_t size) {
+  for (std::size_t i = 0; i < size; ++i)
+    y[i] += a * x[i];
+}
+
+// y = a_0 x_0 + a_1 x_1 + a_2 x_2 for three columns of `size`.
+SPHERECUT_VECTORS void combine(double* __restrict y, const double* __restrict columns, const double* a,
+                               std::size_t size) {
+  const double a0 = a[0];
+  const double a1 = a[1];
+  const double a2 = a[2];
+  const double* __restrict second = columns + size;
+  const double* __restrict third = second + size;
+  for (std::size_t i = 0; i < size; ++i)
+    y[i] = a0 * columns[i] + a1 * second[i] + a2 * third[i];
+}
 
 } // namespace
 
 TangentModel::TangentModel(const topology::ToolShape& tool)
-    : tool_(tool), factor_(static_cast<std::size_t>(ld) * ld), right_(ld) {
+    : tool_(tool), factor_(static_cast<std::size_t>(ld) * ld), right_(ld + 1),
+      response_(static_cast<std::size_t>(most_candidates) * ld) {
   displacement_.fill(Vector3::Zero());
   moved_.fill(Vector3::Zero());
   normal_.fill(Vector3::UnitZ());
@@ -36,6 +64,9 @@ TangentModel::TangentModel(const topology::ToolShape& tool)
   chosen_.fill(0);
   step_.fill(Vector3::Zero());
   wrong_.fill(0);
+  near_.fill(0);
+  fresh_.fill(0);
+  clearance_.fill(0);
 }
 
 std::span<const Vector3> TangentModel::rest() const {
@@ -46,8 +77,18 @@ std::span<const Vector3> TangentModel::normals() const {
   return {snapshot_->normals.data(), static_cast<std::size_t>(snapshot_->count)};
 }
 
-void TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
+bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
+  const bool same_places = count_ == snapshot.count && rest_sum_ == snapshot.rest_sum;
+  const bool same_body = same_places && compliance_sum_ == snapshot.compliance_sum;
+  const bool bonded = snapshot.condition == solvers::ContactCondition::bonded;
   snapshot_ = &snapshot;
+  count_ = snapshot.count;
+  rest_sum_ = snapshot.rest_sum;
+  compliance_sum_ = snapshot.compliance_sum;
+  travelled_ = 0;
+  clearance_.fill(0);
+  if (bonded ? same_body : same_places)
+    return same_body; // what has been found since is nearer to the tool's place now than the solve
   pose_ = snapshot.pose;
   chosen_count_ = 0;
   for (int c = 0; c < snapshot.count; ++c) {
@@ -56,10 +97,11 @@ void TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
     bond_[c] = snapshot.bond[c];
     bond_force_[c].setZero();
   }
-  if (snapshot.condition == solvers::ContactCondition::bonded)
+  if (bonded)
     for (int c = 0; c < snapshot.count; ++c)
       if (active_[c] != 0 && !catch_node(c))
         active_[c] = 0;
+  return false;
 }
 
 ModelForce TangentModel::at(const topology::ToolPose& pose, double /*time*/) noexcept {
@@ -68,58 +110,54 @@ ModelForce TangentModel::at(const topology::ToolPose& pose, double /*time*/) noe
   return snapshot_->condition == solvers::ContactCondition::bonded ? follow(pose) : press(pose);
 }
 
-// Pressures of the active candidates that close their gaps: N^T C N p = -q by Cholesky. False: the block is not
-// positive definite, and the candidate that made it so has been let go.
+// Pressures of the active candidates that close their gaps: N^T C N p = -q by Cholesky, column by column. False: the
+// block is not positive definite, and the candidate that made it so has been let go.
 bool TangentModel::solve_active() noexcept {
-  const std::vector<double>& compliance = snapshot_->compliance;
   const auto rows = static_cast<std::size_t>(3 * snapshot_->count);
   chosen_count_ = 0;
-  for (int c = 0; c < snapshot_->count; ++c) {
+  for (int k = 0; k < near_count_; ++k) {
+    const int c = near_[k];
     pressure_[c] = 0;
     if (active_[c] != 0)
       chosen_[chosen_count_++] = c;
   }
-  for (int a = 0; a < chosen_count_; ++a) {
-    double* row = &factor_[static_cast<std::size_t>(a) * ld];
+  const auto size = static_cast<std::size_t>(chosen_count_);
+  for (std::size_t a = 0; a < size; ++a) {
     const int c = chosen_[a];
-    const double* block = &compliance[static_cast<std::size_t>(3 * c) * rows]; // three columns; the matrix is symmetric
-    const Vector3& n = normal_[c];
-    for (int b = 0; b <= a; ++b) {
-      const int d = chosen_[b];
-      const double* p = block + static_cast<std::size_t>(3 * d);
-      double value = 0;
-      for (int j = 0; j < 3; ++j)
-        value += normal_[d][j] * (n[0] * p[j] + n[1] * p[rows + j] + n[2] * p[2 * rows + j]);
-      row[b] = value;
+    double* response = &response_[static_cast<std::size_t>(c) * ld];
+    if (fresh_[c] == 0) {
+      combine(response, &snapshot_->compliance[static_cast<std::size_t>(3 * c) * rows], normal_[c].data(), rows);
+      fresh_[c] = 1;
     }
-    // Row a of the factor from those above it.
-    for (int b = 0; b < a; ++b) {
-      const double* other = &factor_[static_cast<std::size_t>(b) * ld];
-      double value = row[b];
-      for (int k = 0; k < b; ++k)
-        value -= row[k] * other[k];
-      row[b] = value / other[b];
+    double* column = &factor_[a * most_candidates];
+    for (std::size_t b = a; b < size; ++b)
+      column[b] = normal_[chosen_[b]].dot(Eigen::Map<const Vector3>(response + 3 * chosen_[b]));
+    right_[a] = -gap_[c];
+  }
+  for (std::size_t a = 0; a < size; ++a) {
+    double* column = &factor_[a * most_candidates];
+    const double before = column[a];
+    for (std::size_t k = 0; k < a; ++k) {
+      const double* other = &factor_[k * most_candidates];
+      add_scaled(column + a, other + a, -other[a], size - a);
     }
-    double pivot = row[a];
-    const double before = pivot;
-    double right = -gap_[c];
-    for (int k = 0; k < a; ++k) {
-      pivot -= row[k] * row[k];
-      right -= row[k] * right_[k];
-    }
-    if (!(pivot > singular * before)) {
-      active_[c] = 0;
+    if (!(column[a] > singular * before)) {
+      active_[chosen_[a]] = 0;
       return false;
     }
-    row[a] = std::sqrt(pivot);
-    right_[a] = right / row[a];
+    const double scale = 1 / std::sqrt(column[a]);
+    for (std::size_t b = a; b < size; ++b)
+      column[b] *= scale;
+    right_[a] /= column[a];
+    add_scaled(&right_[a + 1], column + a + 1, -right_[a], size - a - 1);
   }
-  for (int a = chosen_count_ - 1; a >= 0; --a) {
-    const double* row = &factor_[static_cast<std::size_t>(a) * ld];
-    const double value = right_[a] / row[a];
-    for (int k = 0; k < a; ++k)
-      right_[k] -= row[k] * value;
-    pressure_[chosen_[a]] = value;
+  for (std::size_t a = size; a-- > 0;) {
+    const double* column = &factor_[a * most_candidates];
+    double value = right_[a];
+    for (std::size_t b = a + 1; b < size; ++b)
+      value -= column[b] * right_[b];
+    right_[a] = value / column[a];
+    pressure_[chosen_[a]] = right_[a];
   }
   return true;
 }
@@ -130,33 +168,50 @@ void TangentModel::displace() noexcept {
   const bool bonded = snapshot_->condition == solvers::ContactCondition::bonded;
   double* u = moved_[0].data(); // Vector3 is three doubles without padding
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
-  for (int c = 0; c < snapshot_->count; ++c)
-    moved_[c] = snapshot_->base[c];
+  std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, moved_.begin());
   for (int a = 0; a < chosen_count_; ++a) {
-    const int c = chosen_[a];
-    const Vector3 force = bonded ? bond_force_[c] : Vector3(pressure_[c] * normal_[c]);
-    const double* first = &snapshot_->compliance[static_cast<std::size_t>(3 * c) * rows];
-    const double* second = first + rows;
-    const double* third = second + rows;
-    for (std::size_t i = 0; i < rows; ++i)
-      u[i] += force[0] * first[i] + force[1] * second[i] + force[2] * third[i];
+    const auto c = static_cast<std::size_t>(chosen_[a]);
+    double* response = &response_[c * ld];
+    if (bonded)
+      combine(response, &snapshot_->compliance[3 * c * rows], bond_force_[c].data(), rows);
+    add_scaled(u, response, bonded ? 1 : pressure_[c], rows);
+  }
+}
+
+// Candidates near enough to the tool to meet it in this tick. The others were farther when last looked at than tool and
+// surface have moved since.
+void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
+  travelled_ += (tool.pose.point - pose_.point).norm() + lever * (tool.pose.axis - pose_.axis).norm();
+  const double far = margin * topology::tip_radius(tool_);
+  near_count_ = 0;
+  for (int c = 0; c < snapshot_->count; ++c) {
+    if (active_[c] == 0 && clearance_[c] - travelled_ > far)
+      continue;
+    const double gap = solvers::contact_gap(tool, snapshot_->rest[c] + displacement_[c]).distance;
+    clearance_[c] = gap + travelled_;
+    if (active_[c] != 0 || gap <= 2 * far)
+      near_[near_count_++] = c;
   }
 }
 
 ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
   const int count = snapshot_->count;
   const solvers::PressingTool tool = solvers::pressing(tool_, pose, rest(), normals());
+  look_around(tool);
   ModelForce result;
   result.converged = false;
   int pivots = 0;
+  double went = 0; // m, of any candidate in this tick
   double relaxation = 1;
   double last_square = 0; // of the last step, and its product with this one, for Aitken's factor
   while (result.rounds < most_rounds) {
     ++result.rounds;
-    for (int c = 0; c < count; ++c) {
+    for (int k = 0; k < near_count_; ++k) {
+      const int c = near_[k];
       const solvers::Gap gap = solvers::contact_gap(tool, snapshot_->rest[c] + displacement_[c]);
       normal_[c] = gap.normal;
       gap_[c] = gap.distance + gap.normal.dot(snapshot_->base[c] - displacement_[c]);
+      fresh_[c] = 0;
     }
     int fewest = std::numeric_limits<int>::max();
     int patience = patience_of_block;
@@ -171,11 +226,14 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
         return active_[c] != 0 ? pressure_[c] < 0
                                : gap_[c] + normal_[c].dot(moved_[c] - snapshot_->base[c]) < -gap_slack;
       };
-      for (int c = 0; c < count; ++c)
-        if (is_wrong(c)) {
+      for (int k = 0; k < near_count_; ++k) {
+        const int c = near_[k];
+        wrong_[c] = is_wrong(c) ? 1 : 0;
+        if (wrong_[c] != 0) {
           ++wrong;
           last = c;
         }
+      }
       complementary = wrong == 0;
       if (complementary || pivots >= most_pivots)
         break;
@@ -186,15 +244,10 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       } else {
         --patience;
       }
-      // All at once while that helps, else one by one [Judice and Pires 1994]. All are judged before any changes.
-      if (patience > 0) {
-        for (int c = 0; c < count; ++c)
-          wrong_[c] = is_wrong(c) ? 1 : 0;
-        for (int c = 0; c < count; ++c)
-          active_[c] = wrong_[c] != 0 ? static_cast<char>(active_[c] == 0) : active_[c];
-      } else {
-        active_[last] = static_cast<char>(active_[last] == 0);
-      }
+      // All at once while that helps, else one by one [Judice and Pires 1994].
+      for (int k = 0; k < near_count_; ++k)
+        if (const int c = near_[k]; patience > 0 ? wrong_[c] != 0 : c == last)
+          active_[c] = static_cast<char>(active_[c] == 0);
     }
     double largest = 0;
     double square = 0;
@@ -206,6 +259,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       square += now.squaredNorm();
       step_[c] = now;
     }
+    went += largest;
     if (largest < still && complementary) {
       for (int c = 0; c < count; ++c)
         displacement_[c] = moved_[c];
@@ -234,8 +288,11 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     }
   }
   result.stored = stored;
-  for (int c = 0; c < count; ++c)
+  for (int k = 0; k < near_count_; ++k) {
+    const int c = near_[k];
     result.sinking = std::max(result.sinking, -(gap_[c] + normal_[c].dot(moved_[c] - snapshot_->base[c])));
+  }
+  travelled_ += went;
   pose_ = pose;
   return result;
 }

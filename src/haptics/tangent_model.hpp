@@ -4,6 +4,8 @@
 
 #include "src/haptics/force_model.hpp"
 
+#include "solvers/tool_gap.hpp"
+
 #include <array>
 #include <span>
 
@@ -15,7 +17,7 @@ namespace spherecut::app {
 class TangentModel : public ForceModel {
  public:
   explicit TangentModel(const topology::ToolShape& tool);
-  void solved(const ContactSnapshot& snapshot) noexcept override;
+  bool solved(const ContactSnapshot& snapshot) noexcept override;
   ModelForce at(const topology::ToolPose& pose, double time) noexcept override;
 
  private:
@@ -26,6 +28,7 @@ class TangentModel : public ForceModel {
   ModelForce follow(const topology::ToolPose& pose) noexcept;
   [[nodiscard]] bool solve_active() noexcept;
   void displace() noexcept;
+  void look_around(const solvers::PressingTool& tool) noexcept;
   [[nodiscard]] bool catch_node(int candidate) noexcept;
   [[nodiscard]] std::span<const Vector3> rest() const;
   [[nodiscard]] std::span<const Vector3> normals() const;
@@ -45,8 +48,16 @@ class TangentModel : public ForceModel {
   PerCandidate<Vector3> bond_force_; // N
   PerCandidate<int> chosen_;         // active candidates, in the order of the factor's rows
   int chosen_count_ = 0;
-  std::vector<double> factor_; // Cholesky factor of the active block, row-major
-  std::vector<double> right_;  // right-hand sides of it
+  PerCandidate<int> near_; // looked at in this tick
+  int near_count_ = 0;
+  PerCandidate<char> fresh_;       // whose response_ is that to normal_
+  PerCandidate<double> clearance_; // m, gap when last looked at, plus travelled_ then
+  double travelled_ = 0;           // m, of tool and surface towards one another, at most
+  int count_ = 0;                  // of the last snapshot, and its sums
+  double rest_sum_ = 0, compliance_sum_ = 0;
+  std::vector<double> factor_;   // Cholesky factor of the active block: by columns; bonded: by rows
+  std::vector<double> right_;    // right-hand sides of it
+  std::vector<double> response_; // displacement of all candidates to a force on one, m per N, or m
 };
 
 } // namespace spherecut::app

@@ -101,42 +101,55 @@ std::vector<SolveEvent> regular_solves(std::uint64_t ticks, std::uint64_t period
   return events;
 }
 
-LoopRecords run_virtual(const HapticSettings& settings, HapticSimulation& simulation, Device& device,
-                        const std::vector<SolveEvent>& events, std::uint64_t ticks) {
+std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings, HapticSimulation& simulation,
+                                     Device& device, const std::vector<SolveEvent>& events, std::uint64_t ticks) {
   check_events(events);
-  LoopRecords records;
-  records.ticks.reserve(ticks);
   const topology::ContactQuery query(simulation.session().organ().domain->surface());
-  HapticTick core(settings, simulation.tool(), simulation.session().scenario().tool ? &query : nullptr);
+  std::vector<std::unique_ptr<HapticTick>> cores;
+  for (const HapticSettings& one : settings)
+    cores.push_back(
+        std::make_unique<HapticTick>(one, simulation.tool(), simulation.session().scenario().tool ? &query : nullptr));
+  std::vector<LoopRecords> records(settings.size());
+  std::vector<SolveRecord> solves;
   InFlight flights;
   auto next = events.begin();
   for (std::uint64_t tick = 0; tick < ticks; ++tick) {
     const DeviceState state = device.read(tick);
     if (tick == 0) {
       simulation.prepare(state);
-      core.start(state);
+      for (const auto& core : cores)
+        core->start(state);
     }
     for (; next != events.end() && next->pose_tick <= tick; ++next) {
       ContactSnapshot& snapshot = flights.launch(*next);
       try {
         simulation.solve(state, next->degradation, snapshot);
         snapshot.sequence = next->sequence;
-        records.solves.push_back(record_of(*next, snapshot));
+        solves.push_back(record_of(*next, snapshot));
       } catch (const NumericalError& error) {
         flights.fail();
-        records.solves.push_back({.event = *next, .failed = true, .reason = error.what()});
+        solves.push_back({.event = *next, .failed = true, .reason = error.what()});
       }
     }
     const bool arrives = flights.due(tick);
-    if (arrives) {
-      core.leave(state);
-      core.arrive(flights.land(tick));
+    const ContactSnapshot* arrived = arrives ? &flights.land(tick) : nullptr;
+    for (std::size_t m = 0; m < cores.size(); ++m) {
+      if (arrives)
+        cores[m]->arrive(*arrived);
+      const TickResult result = cores[m]->tick(state);
+      if (m == 0)
+        device.apply(result.force);
+      records[m].ticks.push_back(record_of(state, result, arrives));
     }
-    const TickResult result = core.tick(state);
-    device.apply(result.force);
-    records.ticks.push_back(record_of(state, result, arrives));
   }
+  for (LoopRecords& one : records)
+    one.solves = solves;
   return records;
+}
+
+LoopRecords run_virtual(const HapticSettings& settings, HapticSimulation& simulation, Device& device,
+                        const std::vector<SolveEvent>& events, std::uint64_t ticks) {
+  return std::move(run_virtual(std::vector{settings}, simulation, device, events, ticks).front());
 }
 
 std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std::vector<TickRecord>& ticks,

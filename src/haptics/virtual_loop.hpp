@@ -15,6 +15,10 @@ std::vector<SolveEvent> regular_solves(std::uint64_t ticks, std::uint64_t period
 LoopRecords run_virtual(const HapticSettings& settings, HapticSimulation& simulation, Device& device,
                         const std::vector<SolveEvent>& events, std::uint64_t ticks);
 
+/// The same for several settings beside one another on the same solves; the device feels the first.
+std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings, HapticSimulation& simulation,
+                                     Device& device, const std::vector<SolveEvent>& events, std::uint64_t ticks);
+
 /// Force on the tool solved at every `stride`-th recorded pose in order, by a simulation that has not moved yet: what
 /// the force models are judged by.
 struct SolvedForce {

@@ -127,3 +127,15 @@ TEST_CASE("Quick extrapolation: the force between solves against solving at ever
 TEST_CASE("Quick force continuity: no step beyond that of the solved force") {
   require_quick_run_passes("force_continuity");
 }
+
+TEST_CASE("Quick passivity: the port takes energy up to the device's limit, and swings up beyond it uncontrolled") {
+  require_quick_run_passes("passivity");
+}
+
+TEST_CASE("Quick haptic loop: every tick of a short session on a liver is made") {
+  require_quick_run_passes("haptic_loop");
+}
+
+TEST_CASE("Quick solve rate: the steps that are timed give forces") {
+  require_quick_run_passes("solve_rate");
+}

@@ -1,0 +1,234 @@
+#include "src/haptics/haptic_report.hpp"
+
+#include "src/figure.hpp"
+#include "src/output_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double us = 1e6; // per s
+
+std::string line_of(const Percentiles& p) {
+  return fmt::format("p50 {:.1f}, p99 {:.1f}, p99.9 {:.1f}, max {:.1f} us", us * p.p50, us * p.p99, us * p.p999,
+                     us * p.largest);
+}
+
+nlohmann::json json_of(const Percentiles& p) {
+  return {{"p50", p.p50}, {"p99", p.p99}, {"p99.9", p.p999}, {"max", p.largest}};
+}
+
+void write_ticks(const std::filesystem::path& file, const LoopRecords& records,
+                 const std::vector<SolvedForce>& solved) {
+  OutputFile out(file);
+  out.write("tick,time_s,x_m,y_m,z_m,force_x_N,force_y_N,force_z_N,tissue_N,solved_N,energy_J,depth_m,sinking_m,"
+            "sequence,arrived,active,rounds,converged,limited,outside,latency_us,compute_us\n");
+  auto truth = solved.begin();
+  std::string text;
+  for (const TickRecord& tick : records.ticks) {
+    while (truth != solved.end() && truth->tick < tick.device.tick)
+      ++truth;
+    const bool known = truth != solved.end() && truth->tick == tick.device.tick;
+    const Vector3& x = tick.device.position;
+    text += fmt::format("{},{:.6g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{:.3g},{},{:d},{},"
+                        "{},{:d},{:d},{:d},{:.1f},{:.1f}\n",
+                        tick.device.tick, tick.device.time, x.x(), x.y(), x.z(), tick.force.x(), tick.force.y(),
+                        tick.force.z(), tick.tissue.norm(), known ? fmt::format("{:.6g}", truth->force.norm()) : "",
+                        tick.energy, tick.depth, tick.sinking, tick.sequence, tick.arrived, tick.active, tick.rounds,
+                        tick.converged, tick.limited, tick.outside, us * tick.latency, us * tick.compute);
+    if (text.size() > 1'000'000) {
+      out.write(text);
+      text.clear();
+    }
+  }
+  out.write(text);
+  out.close();
+}
+
+void write_solves(const std::filesystem::path& file, const std::vector<SolveRecord>& solves) {
+  OutputFile out(file);
+  std::string text = "sequence,pose_tick,arrival_tick,degradation,failed,resprinkled,cut_triangles,nodes,candidates,"
+                     "active,asymmetry,force_N,seconds\n";
+  for (const SolveRecord& solve : solves)
+    text += fmt::format(
+        "{},{},{},{},{:d},{:d},{},{},{},{},{:.3g},{:.6g},{:.6g}\n", solve.event.sequence, solve.event.pose_tick,
+        solve.event.arrival_tick == SolveEvent::never ? "" : fmt::format("{}", solve.event.arrival_tick),
+        solve.event.degradation, solve.failed, solve.resprinkled, solve.cut_triangles, solve.nodes, solve.candidates,
+        solve.active, solve.asymmetry, solve.force.norm(), solve.seconds);
+  out.write(text);
+  out.close();
+}
+
+// Bins that double from 1 us on.
+void write_deadlines(const std::filesystem::path& file, const std::vector<TickRecord>& ticks) {
+  constexpr int bins = 24;
+  std::array<long, bins> latency{};
+  std::array<long, bins> compute{};
+  const auto bin = [](double seconds) {
+    return seconds < 1e-6 ? 0 : std::min(bins - 1, 1 + static_cast<int>(std::floor(std::log2(us * seconds))));
+  };
+  for (const TickRecord& tick : ticks) {
+    ++latency[static_cast<std::size_t>(bin(tick.latency))];
+    ++compute[static_cast<std::size_t>(bin(tick.compute))];
+  }
+  Table table({"below_us", "latency_ticks", "compute_ticks"});
+  for (int b = 0; b < bins; ++b)
+    table.add({std::exp2(b), static_cast<double>(latency[static_cast<std::size_t>(b)]),
+               static_cast<double>(compute[static_cast<std::size_t>(b)])});
+  table.write(file);
+}
+
+} // namespace
+
+Percentiles percentiles(std::vector<double> samples) {
+  if (samples.empty())
+    return {};
+  std::sort(samples.begin(), samples.end());
+  const auto at = [&](double share) {
+    const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(samples.size())));
+    return samples[std::clamp<std::size_t>(rank, 1, samples.size()) - 1];
+  };
+  return {at(0.5), at(0.99), at(0.999), samples.back()};
+}
+
+ForceSteps force_steps(const LoopRecords& records) {
+  ForceSteps steps;
+  std::vector<char> cut(records.ticks.size(), 0);
+  for (const SolveRecord& solve : records.solves)
+    if (solve.cut_triangles > 0 && solve.event.arrival_tick < records.ticks.size())
+      cut[solve.event.arrival_tick] = 1;
+  for (std::size_t i = 1; i < records.ticks.size(); ++i) {
+    const TickRecord& now = records.ticks[i];
+    const TickRecord& before = records.ticks[i - 1];
+    const double step = (now.force - before.force).norm();
+    steps.any = std::max(steps.any, step);
+    if (now.arrived)
+      steps.hand_over = std::max(steps.hand_over, step);
+    if ((now.active > 0) != (before.active > 0))
+      steps.onset = std::max(steps.onset, step);
+    if (cut[i] != 0)
+      steps.cut = std::max(steps.cut, step);
+  }
+  return steps;
+}
+
+ModelError model_error(const std::vector<TickRecord>& ticks, const std::vector<SolvedForce>& solved) {
+  ModelError error;
+  double sum = 0;
+  for (const SolvedForce& truth : solved) {
+    if (truth.tick >= ticks.size())
+      break;
+    error.peak = std::max(error.peak, truth.force.norm());
+    const Vector3& felt = ticks[truth.tick].tissue;
+    if (truth.force.norm() == 0 && felt.norm() == 0)
+      continue;
+    const double off = (felt - truth.force).norm();
+    error.largest = std::max(error.largest, off);
+    sum += off * off;
+    ++error.ticks;
+  }
+  error.rms = error.ticks > 0 ? std::sqrt(sum / static_cast<double>(error.ticks)) : 0;
+  return error;
+}
+
+HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report) {
+  HapticFindings findings;
+  findings.loop = report;
+  std::vector<double> latency;
+  std::vector<double> compute;
+  std::vector<double> solve;
+  for (const TickRecord& tick : records.ticks) {
+    latency.push_back(tick.latency);
+    compute.push_back(tick.compute);
+    findings.peak = std::max(findings.peak, tick.force.norm());
+    findings.lowest_energy = std::min(findings.lowest_energy, tick.energy);
+    findings.outside += tick.outside ? 1 : 0;
+    findings.unconverged += tick.converged ? 0 : 1;
+    findings.limited += tick.limited ? 1 : 0;
+  }
+  for (const SolveRecord& record : records.solves) {
+    findings.failed += record.failed ? 1 : 0;
+    findings.resprinkled += record.resprinkled ? 1 : 0;
+    findings.increments += record.cut_triangles > 0 ? 1 : 0;
+    findings.highest_degradation = std::max(findings.highest_degradation, record.event.degradation);
+    if (!record.failed)
+      solve.push_back(record.seconds);
+  }
+  const double seconds = static_cast<double>(records.ticks.size()) / settings.rate;
+  const double wall = report.seconds > 0 ? report.seconds : seconds;
+  findings.rate = static_cast<double>(records.ticks.size()) / wall;
+  findings.solve_rate = static_cast<double>(records.solves.size()) / wall;
+  findings.latency = percentiles(std::move(latency));
+  findings.compute = percentiles(std::move(compute));
+  findings.solve = percentiles(std::move(solve));
+  findings.steps = force_steps(records);
+  findings.energy = records.ticks.empty() ? 0 : records.ticks.back().energy;
+  return findings;
+}
+
+std::string text_of(const HapticFindings& f) {
+  std::string text = fmt::format("haptic loop: {:.1f} ticks/s, {} overruns, {}\n", f.rate, f.loop.overruns,
+                                 f.loop.fifo ? "SCHED_FIFO, spinning" : "plain scheduling");
+  text += fmt::format("  wake latency {}\n  compute time {}\n", line_of(f.latency), line_of(f.compute));
+  text += fmt::format("simulation: {:.1f} solves/s, p50 {:.2f}, p99 {:.2f}, max {:.1f} ms; {} cut increments, {} "
+                      "re-sprinkles, {} failed, coarsened to level {}\n",
+                      f.solve_rate, 1e3 * f.solve.p50, 1e3 * f.solve.p99, 1e3 * f.solve.largest, f.increments,
+                      f.resprinkled, f.failed, f.highest_degradation);
+  text += fmt::format("force: peak {:.4g} N; largest step in a tick {:.3g} N (at hand-overs {:.3g}, onset {:.3g}, cut "
+                      "increments {:.3g} N)\n",
+                      f.peak, f.steps.any, f.steps.hand_over, f.steps.onset, f.steps.cut);
+  text += fmt::format("  {} ticks limited, {} with the contact beyond the patch, {} not converged\n", f.limited,
+                      f.outside, f.unconverged);
+  if (f.error.ticks > 0)
+    text += fmt::format("  against the solved force at {} ticks: RMS {:.3g} N = {:.2f} % of the peak {:.4g} N, largest "
+                        "{:.3g} N\n",
+                        f.error.ticks, f.error.rms, f.error.peak > 0 ? 100 * f.error.rms / f.error.peak : 0.0,
+                        f.error.peak, f.error.largest);
+  text += fmt::format("energy at the port: {:.3g} J put in by the hand, lowest {:.3g} J\n", f.energy, f.lowest_energy);
+  text += fmt::format("time: ticks {:.3g} s, solves {:.3g} s, {} frames {:.3g} s, of {:.3g} s; {:.3g} s to prepare",
+                      f.loop.haptic_cpu_seconds, f.loop.solve_seconds, f.loop.frames, f.loop.viewer_seconds,
+                      f.loop.seconds, f.loop.prepare_seconds);
+  return text;
+}
+
+void write_haptics(const std::filesystem::path& folder, const LoopRecords& records, const HapticFindings& findings,
+                   const std::vector<SolvedForce>& solved) {
+  write_ticks(folder / "haptic_ticks.csv", records, solved);
+  write_solves(folder / "haptic_solves.csv", records.solves);
+  write_deadlines(folder / "haptic_deadlines.csv", records.ticks);
+  const HapticFindings& f = findings;
+  nlohmann::json json{
+      {"ticks_per_second", f.rate},
+      {"overruns", f.loop.overruns},
+      {"sched_fifo", f.loop.fifo},
+      {"latency_s", json_of(f.latency)},
+      {"compute_s", json_of(f.compute)},
+      {"solves_per_second", f.solve_rate},
+      {"solve_s", json_of(f.solve)},
+      {"failed_solves", f.failed},
+      {"cut_increments", f.increments},
+      {"resprinkles", f.resprinkled},
+      {"highest_degradation", f.highest_degradation},
+      {"peak_force_N", f.peak},
+      {"largest_step_N",
+       {{"any", f.steps.any}, {"hand_over", f.steps.hand_over}, {"onset", f.steps.onset}, {"cut", f.steps.cut}}},
+      {"model_error_N",
+       {{"rms", f.error.rms}, {"largest", f.error.largest}, {"solved_peak", f.error.peak}, {"ticks", f.error.ticks}}},
+      {"port_energy_J", {{"end", f.energy}, {"lowest", f.lowest_energy}}},
+      {"ticks_limited", f.limited},
+      {"ticks_outside", f.outside},
+      {"ticks_unconverged", f.unconverged},
+      {"seconds",
+       {{"prepare", f.loop.prepare_seconds},
+        {"session", f.loop.seconds},
+        {"ticks", f.loop.haptic_cpu_seconds},
+        {"solves", f.loop.solve_seconds},
+        {"frames", f.loop.viewer_seconds}}}};
+  replace_file(folder / "haptic.json", json.dump(2) + "\n");
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,55 @@
+// Numbers of a haptic session, and the files that keep them.
+#pragma once
+
+#include "src/haptics/realtime_loop.hpp"
+#include "src/haptics/virtual_loop.hpp"
+
+#include <filesystem>
+
+namespace spherecut::app {
+
+/// Values that a share of the samples stay at or below.
+struct Percentiles {
+  double p50 = 0, p99 = 0, p999 = 0, largest = 0;
+};
+Percentiles percentiles(std::vector<double> samples);
+
+/// Largest step of the force on the hand between two ticks, N: anywhere, and by what happens at the tick.
+struct ForceSteps {
+  double any = 0, hand_over = 0, onset = 0, cut = 0;
+};
+ForceSteps force_steps(const LoopRecords& records);
+
+/// Of the tissue force against the solved one.
+struct ModelError {
+  double rms = 0, largest = 0; // N, over the ticks in contact
+  double peak = 0;             // N, of the solved force
+  std::size_t ticks = 0;       // compared
+};
+ModelError model_error(const std::vector<TickRecord>& ticks, const std::vector<SolvedForce>& solved);
+
+struct HapticFindings {
+  RealtimeReport loop;
+  double rate = 0;       // ticks per second, over the session
+  double solve_rate = 0; // solves per second
+  Percentiles latency;   // s, from due to begun
+  Percentiles compute;   // s, processor time of a tick
+  Percentiles solve;     // s
+  ForceSteps steps;
+  ModelError error;
+  double peak = 0;                      // N, on the hand
+  double energy = 0, lowest_energy = 0; // J, at the port
+  std::uint64_t failed = 0, resprinkled = 0, increments = 0, outside = 0, unconverged = 0, limited = 0;
+  int highest_degradation = 0;
+};
+HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report);
+
+/// As lines for a screen.
+std::string text_of(const HapticFindings& findings);
+
+/// haptic_ticks.csv, haptic_solves.csv, haptic_deadlines.csv (histograms of latency and compute time), haptic.json.
+/// Throws InputError when a file cannot be written.
+void write_haptics(const std::filesystem::path& folder, const LoopRecords& records, const HapticFindings& findings,
+                   const std::vector<SolvedForce>& solved);
+
+} // namespace spherecut::app

@@ -1,0 +1,44 @@
+#include "src/haptics/viewer_feed.hpp"
+
+namespace spherecut::app {
+namespace {
+
+constexpr double share = 0.2; // of the simulation thread's time that frames may take
+
+double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+} // namespace
+
+void ViewerFeed::offer(const HapticSimulation& simulation, const ContactSnapshot& snapshot) {
+  const Clock::time_point now = Clock::now();
+  if (rate_ <= 0 || buffer_.waiting() || (number_ > 0 && seconds_between(last_, now) < 1 / rate_) ||
+      seconds_ > share * seconds_between(start_, now))
+    return;
+  const Session& session = simulation.session();
+  const topology::Wound* wound = session.wound();
+  const topology::SurfaceMesh& surface = wound != nullptr ? wound->surface : session.organ().domain->surface();
+  ViewerFrame& frame = buffer_.back();
+  frame.number = ++number_;
+  frame.time = snapshot.time;
+  frame.vertices.clear();
+  for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
+    const Vector3& at = wound != nullptr ? wound->evaluation[v] : surface.vertices[v];
+    frame.vertices.emplace_back((surface.vertices[v] + session.at(at).displacement).cast<float>());
+  }
+  frame.triangles = surface.triangles;
+  frame.surface = surface.triangles.size();
+  frame.tool = snapshot.pose;
+  frame.force = snapshot.force;
+  frame.nodes = snapshot.nodes;
+  frame.active = simulation.result().active_nodes;
+  frame.degradation = snapshot.degradation;
+  frame.cut_area = simulation.result().cut ? simulation.result().cut->area : 0;
+  frame.solve_seconds = snapshot.solve_seconds;
+  buffer_.publish();
+  last_ = now;
+  seconds_ += seconds_between(now, Clock::now());
+}
+
+} // namespace spherecut::app
