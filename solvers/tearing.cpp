@@ -1,0 +1,114 @@
+#include "solvers/tearing.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <numbers>
+
+namespace spherecut::solvers {
+
+using topology::FrontFrame;
+
+double kink_angle(const Intensities& k) {
+  const double one = std::max(0.0, k[0]), two = k[1];
+  const double size = one * one + 9 * two * two;
+  if (two == 0 || !(size > 0))
+    return 0;
+  const double cosine = (3 * two * two + one * std::sqrt(one * one + 8 * two * two)) / size;
+  return -std::copysign(std::acos(std::clamp(cosine, -1.0, 1.0)), two);
+}
+
+double driving_release_rate(const Material& material, const Intensities& k) {
+  return energy_release_rate(material, {std::max(0.0, k[0]), k[1], k[2]});
+}
+
+std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
+                                     const std::function<double(const Vector3&)>& toughness, double spacing) {
+  const Problem& problem = body.problem();
+  if (problem.incision == nullptr)
+    throw InputError("tearing: the body has no cut");
+  std::vector<FrontState> states, without; // without: places where neither way fits
+  for (const FrontFrame& frame : front_samples(*problem.incision, spacing)) {
+    FrontState state;
+    state.frame = frame;
+    state.toughness = toughness(frame.point);
+    if (!(state.toughness > 0))
+      throw InputError(fmt::format("tearing: the toughness at ({:.6g}, {:.6g}, {:.6g}) m is {} J/m2; it must be "
+                                   "positive",
+                                   frame.point.x(), frame.point.y(), frame.point.z(), state.toughness));
+    bool found = false;
+    for (const bool by_integral : {true, false}) {
+      try {
+        state.intensities =
+            by_integral ? interaction_integral(body, field, frame) : displacement_correlation(body, field, frame);
+        state.by_integral = by_integral;
+        found = true;
+        break;
+      } catch (const InputError&) { // the tube or the way back does not fit here
+      }
+    }
+    (found ? states : without).push_back(state);
+  }
+  if (states.empty() && !without.empty())
+    throw NumericalError(fmt::format("tearing: the intensities cannot be had anywhere along a front of {:.3g} m: it is "
+                                     "too near to the surface for the node spacing",
+                                     problem.incision->front_length()));
+  const std::size_t known = states.size();
+  for (FrontState& state : without) {
+    const auto nearest = std::min_element(states.begin(), states.begin() + static_cast<std::ptrdiff_t>(known),
+                                          [&](const FrontState& a, const FrontState& b) {
+                                            return (a.frame.point - state.frame.point).squaredNorm() <
+                                                   (b.frame.point - state.frame.point).squaredNorm();
+                                          });
+    state.intensities = nearest->intensities;
+    state.by_integral = nearest->by_integral;
+    states.push_back(state);
+  }
+  for (FrontState& state : states) {
+    state.release = driving_release_rate(problem.material, state.intensities);
+    state.angle = kink_angle(state.intensities);
+  }
+  return states;
+}
+
+std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest,
+                                                      double smoothing) {
+  if (states.empty() || !(longest > 0) || !(smoothing > 0))
+    throw InputError(fmt::format("tearing: {} places of the front, steps of {} m, smoothing over {} m; all must be "
+                                 "positive",
+                                 states.size(), longest, smoothing));
+  double most = 0; // G / G_c - 1
+  for (const FrontState& state : states)
+    most = std::max(most, state.release / state.toughness - 1);
+  std::vector<double> lengths;
+  lengths.reserve(states.size());
+  for (const FrontState& state : states) {
+    const double excess = state.release / state.toughness - 1;
+    lengths.push_back(excess < 0 ? 0 : longest * (most > 0 ? std::max(0.1, excess / most) : 1));
+  }
+  return [states = std::move(states), lengths = std::move(lengths), smoothing](const FrontFrame& frame) -> Vector3 {
+    double weights = 0, length = 0, angle = 0, nearest = std::numeric_limits<double>::infinity();
+    for (const FrontState& state : states)
+      nearest = std::min(nearest, (state.frame.point - frame.point).squaredNorm());
+    for (std::size_t k = 0; k < states.size(); ++k) {
+      // Places of another front that happens to run close by do not count: theirs is another plane.
+      if (states[k].frame.normal.dot(frame.normal) < 0.5)
+        continue;
+      const double squared = (states[k].frame.point - frame.point).squaredNorm() - nearest;
+      const double weight = std::exp(-0.5 * squared / (smoothing * smoothing));
+      weights += weight;
+      length += weight * lengths[k];
+      angle += weight * states[k].angle;
+    }
+    if (!(weights > 0))
+      return Vector3::Zero();
+    length /= weights;
+    angle /= weights;
+    return length * (std::cos(angle) * frame.ahead + std::sin(angle) * frame.normal);
+  };
+}
+
+} // namespace spherecut::solvers
