@@ -104,6 +104,18 @@ TEST_CASE("Quick edge-notched strip: intensity") {
   require_quick_run_passes("precut_edge");
 }
 
+TEST_CASE("Quick stress intensities: straight and round fronts") {
+  require_quick_run_passes("sif");
+}
+
+TEST_CASE("Quick kink: the first new piece of sheet") {
+  require_quick_run_passes("kink");
+}
+
+TEST_CASE("Quick penny growth: onset, pressure, roundness and energy") {
+  require_quick_run_passes("penny_growth");
+}
+
 TEST_CASE("Quick double cantilever: compliance") {
   require_quick_run_passes("precut_beam");
 }

@@ -1,0 +1,160 @@
+// Problem:   stress intensities that decide on tearing: a straight crack in mixed mode, exact displacements on the
+//            boundary; a penny crack under tension whose direction is tilted from its normal.
+// Reference: the fields themselves [Williams 1957; Kassir and Sih 1966]. Errors are over the largest intensity. The
+//            integral must not depend on the tube it is taken over.
+// Command:   spherecut experiment run sif --out DIR
+#include "experiments/analytic/cracks.hpp"
+#include "experiments/registered.hpp"
+#include "experiments/support/cut_body.hpp"
+#include "experiments/support/statistics.hpp"
+
+#include "solvers/tearing.hpp"
+#include "src/figure.hpp"
+#include "topology/cut_sheets.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+namespace spherecut::experiments {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+struct Series {
+  std::vector<double> correlation, interaction, release, tube; // errors, one per seed
+};
+
+/// Tubes over which the integral is compared, outer radius in spacings.
+constexpr std::array<double, 3> tubes{2, 3, 4};
+
+void add_errors(const solvers::Discretisation& body, const solvers::Field& field, const solvers::FrontState& state,
+                const solvers::Intensities& exact, double largest_k, std::array<double, 4>& worst) {
+  const solvers::Material& material = body.problem().material;
+  const solvers::Intensities jump = solvers::displacement_correlation(body, field, state.frame);
+  const double release = solvers::driving_release_rate(material, exact);
+  solvers::Intensities least = state.intensities, most = state.intensities;
+  for (const double outer : tubes) {
+    const solvers::Intensities k = solvers::interaction_integral(body, field, state.frame, {.outer = outer});
+    least = least.cwiseMin(k);
+    most = most.cwiseMax(k);
+  }
+  worst[0] = std::max(worst[0], (jump - exact).cwiseAbs().maxCoeff() / largest_k);
+  worst[1] = std::max(worst[1], (state.intensities - exact).cwiseAbs().maxCoeff() / largest_k);
+  worst[2] = std::max(worst[2], std::abs(state.release / release - 1));
+  worst[3] = std::max(worst[3], (most - least).maxCoeff() / largest_k);
+}
+
+/// Largest errors along the middle of the front of a straight crack.
+std::array<double, 4> straight(std::uint64_t seed, solvers::Method method) {
+  const solvers::Material material{1, 0.3, 0};
+  const CutFrame crack = tilted_frame({0.03, 0.01, 0.04}, {0.12, -0.17, 0.1});
+  const solvers::Intensities exact(1, 0.6, 0.4);
+  CutBodyCase cut;
+  cut.domain = topology::make_box_domain({-1, -0.5, -1}, {1, 0.5, 1}, 0.25);
+  cut.sheets = {topology::make_rectangle_sheet(crack.origin - 1.5 * crack.ahead, crack.normal, crack.ahead, 4, 3, 0.3)};
+  cut.nodes = 350;
+  cut.seed = seed;
+  CutBody body = cut_body(cut);
+  body.problem.material = material;
+  hold_whole_surface(body.problem,
+                     [&](const Vector3& x) { return straight_crack_displacement(material, crack, exact, x); });
+  solvers::DiscretisationOptions options;
+  options.method = method;
+  const auto discretisation = solvers::discretise(body.problem, options);
+  const solvers::Field field = discretisation->solve();
+  std::array<double, 4> worst{};
+  for (const solvers::FrontState& state : solvers::front_states(
+           *discretisation, field, [](const Vector3&) { return 1.0; }, 0.2))
+    if (std::abs(crack.local(state.frame.point)[2]) < 0.2)
+      add_errors(*discretisation, field, state, exact, 1, worst);
+  return worst;
+}
+
+std::array<double, 4> tilted_penny(std::uint64_t seed, solvers::Method method, int nodes) {
+  const solvers::Material material{1, 0.3, 0};
+  constexpr double radius = 1, tilt = 35 * pi / 180;
+  const CutFrame crack = tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
+  CutBodyCase cut;
+  cut.domain = topology::make_box_domain({-2, -2, -2}, {2, 2, 2}, 0.5);
+  cut.sheets = {topology::make_disc_sheet(crack.origin, crack.normal, radius, 0.1)};
+  cut.slope = 0.25;
+  cut.nodes = nodes;
+  cut.seed = seed;
+  CutBody body = cut_body(cut);
+  body.problem.material = material;
+  const Vector3 pull = std::cos(tilt) * crack.normal + std::sin(tilt) * crack.ahead;
+  const Matrix3 stress = pull * pull.transpose();
+  hold_whole_surface(body.problem,
+                     [&](const Vector3& x) { return loaded_penny_displacement(material, crack, radius, stress, x); });
+  body.problem.loads.lip_traction = [stress](const Vector3&, const Vector3& n) -> Vector3 { return -stress * n; };
+  solvers::DiscretisationOptions options;
+  options.method = method;
+  const auto discretisation = solvers::discretise(body.problem, options);
+  const solvers::Field field = discretisation->solve();
+  std::array<double, 4> worst{};
+  const double largest_k = tilted_penny_intensities(material, radius, 1, tilt, 0).cwiseAbs().maxCoeff();
+  for (const solvers::FrontState& state : solvers::front_states(
+           *discretisation, field, [](const Vector3&) { return 1.0; }, 2 * pi * radius / 8.01)) {
+    const Vector3 out = state.frame.point - crack.origin;
+    const double w = std::atan2(out.dot(crack.tangent), out.dot(crack.ahead));
+    solvers::Intensities exact = tilted_penny_intensities(material, radius, 1, tilt, w);
+    // The exact tangent may run the other way round: K_III goes with it.
+    const Vector3 counted = -std::sin(w) * crack.ahead + std::cos(w) * crack.tangent;
+    if (state.frame.tangent.dot(counted) < 0)
+      exact[2] = -exact[2];
+    add_errors(*discretisation, field, state, exact, largest_k, worst);
+  }
+  return worst;
+}
+
+} // namespace
+
+std::vector<Check> run_sif(const ExperimentContext& context) {
+  const int seeds = context.quick ? 1 : 10;
+  const int nodes = context.quick ? 1400 : 2400;
+  std::vector<Check> checks;
+  app::Table table({"case", "method", "seed", "k_correlation", "k_interaction", "release", "tube_spread"});
+  app::Figure figure{
+      "Error of the intensities, by interaction integral", "seed", "error / largest K", false, false, {}};
+  for (const solvers::Method method : {solvers::Method::galerkin, solvers::Method::collocation})
+    for (const bool penny : {false, true}) {
+      const std::string name = fmt::format("{}_{}", penny ? "penny" : "straight", solvers::to_string(method));
+      Series series;
+      app::Series points{name, {}, {}, app::SeriesStyle::points};
+      for (int seed = 1; seed <= seeds; ++seed) {
+        const auto errors = penny ? tilted_penny(static_cast<std::uint64_t>(seed), method, nodes)
+                                  : straight(static_cast<std::uint64_t>(seed), method);
+        series.correlation.push_back(errors[0]);
+        series.interaction.push_back(errors[1]);
+        series.release.push_back(errors[2]);
+        series.tube.push_back(errors[3]);
+        points.x.push_back(seed);
+        points.y.push_back(errors[1]);
+        table.add({penny ? "penny" : "straight", std::string(solvers::to_string(method)), fmt::format("{}", seed),
+                   fmt::format("{:.5f}", errors[0]), fmt::format("{:.5f}", errors[1]), fmt::format("{:.5f}", errors[2]),
+                   fmt::format("{:.5f}", errors[3])});
+      }
+      figure.series.push_back(points);
+      context.say(fmt::format("{}: medians (worst): correlation {:.2f} ({:.2f}), integral {:.2f} ({:.2f}), release "
+                              "rate {:.2f} ({:.2f}), between tubes {:.2f} ({:.2f}) %",
+                              name, 100 * median(series.correlation), 100 * largest(series.correlation),
+                              100 * median(series.interaction), 100 * largest(series.interaction),
+                              100 * median(series.release), 100 * largest(series.release), 100 * median(series.tube),
+                              100 * largest(series.tube)));
+      const double bound = (penny ? 0.05 : 0.03) * (method == solvers::DiscretisationOptions{}.method ? 1 : 2);
+      checks.push_back({"sif_" + name, median(series.interaction), "<=", bound});
+      checks.push_back({"sif_" + name + "_worst", largest(series.interaction), "<=", 2 * bound});
+      checks.push_back({"sif_" + name + "_between_tubes", median(series.tube), "<=", bound});
+      checks.push_back({"sif_" + name + "_correlation_reported", median(series.correlation), ">=", 0});
+      checks.push_back({"sif_" + name + "_release_reported", median(series.release), ">=", 0});
+    }
+  table.write(context.out / "runs.csv");
+  app::write_png(figure, context.out / "sif.png");
+  return checks;
+}
+
+} // namespace spherecut::experiments
