@@ -225,14 +225,25 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
             visit(s, half_length / cells_along, outer * t * t, outer * t / cells_radial);
           }
   };
+  // Where the sheet bends off the plane of the front (a tear kinks), a point belongs to the side of the sheet it is on.
+  const auto side_of = [&](const Vector3& x, double r, double above) {
+    const auto face = incision.closest(x, 0.5 * r);
+    if (!face || face->on_border)
+      return above >= 0 ? 1.0 : -1.0;
+    return (x - face->point).dot(face->normal) >= 0 ? 1.0 : -1.0;
+  };
   each_section([&](double s, double ds, double r, double dr) {
     const auto [q_r, dq_r] = fade(r);
     const auto [q_s, dq_s] = bump(s);
     for (int c = 0; c < 2 * cells_around; ++c) {
       const int cell = c / 2;
       const double theta = pi * ((2 * cell + 1 + gauss.place[c % 2]) / cells_around - 1);
-      const double ahead = r * std::cos(theta), above = r * std::sin(theta);
+      const double ahead = r * std::cos(theta);
+      double above = r * std::sin(theta);
       const Tube::Place place = tube.at(ahead, above, s);
+      if (ahead < 0 && std::abs(above) < -ahead)
+        if (const double side = side_of(place.position, r, above); side * above < 0)
+          above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
       const PointState state = body.at(place.position, field);
       const Matrix3 stress = place.axes.transpose() * state.stress * place.axes;
       const Matrix3 gradient = place.axes.transpose() * state.gradient * place.axes;
@@ -261,7 +272,10 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
     }
     // Both faces.
     for (const double side : {1.0, -1.0}) {
-      const Tube::Place place = tube.at(-r, side * std::min(lip_offset * h, 1e-3 * r), s);
+      const double off = std::min(lip_offset * h, 1e-3 * r);
+      Tube::Place place = tube.at(-r, side * off, s);
+      if (const auto face = incision.closest(tube.at(-r, 0, s).position, 0.5 * r); face && !face->on_border)
+        place.position = face->point + side * off * face->normal;
       const Vector3 outward = -side * front.normal;
       Vector3 traction = Vector3::Zero();
       if (problem.loads.lip_traction)

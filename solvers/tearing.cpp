@@ -74,6 +74,25 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
   return states;
 }
 
+std::vector<FrontState> averaged(const Material& material, const std::vector<FrontState>& states, double length) {
+  std::vector<FrontState> result = states;
+  for (FrontState& state : result) {
+    Intensities sum = Intensities::Zero();
+    double weights = 0;
+    for (const FrontState& other : states) {
+      if (other.frame.normal.dot(state.frame.normal) < 0.5)
+        continue; // of another front
+      const double weight = std::exp(-0.5 * (other.frame.point - state.frame.point).squaredNorm() / (length * length));
+      sum += weight * other.intensities;
+      weights += weight;
+    }
+    state.intensities = sum / weights;
+    state.release = driving_release_rate(material, state.intensities);
+    state.angle = kink_angle(state.intensities);
+  }
+  return result;
+}
+
 std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest,
                                                       double smoothing) {
   if (states.empty() || !(longest > 0) || !(smoothing > 0))

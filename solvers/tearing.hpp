@@ -34,9 +34,14 @@ struct FrontState {
 std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
                                      const std::function<double(const Vector3&)>& toughness, double spacing);
 
+/// The states with intensities averaged along the front over about `length` m (standard deviation of the weight), and
+/// what follows from them. Intensities scatter from place to place with the nodes; a front that followed that would
+/// grow ragged.
+std::vector<FrontState> averaged(const Material& material, const std::vector<FrontState>& states, double length);
+
 /// How the front moves in one step of quasi-static growth: where G >= G_c by up to `longest` m, in proportion to
 /// (G / G_c - 1) over its largest, never less than a tenth of it where G >= G_c; elsewhere not. Directions and lengths
-/// are averaged along the front over about `smoothing` m. The states must not be empty.
+/// between the places are averages over about `smoothing` m. The states must not be empty.
 std::function<Vector3(const topology::FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest,
                                                                 double smoothing);
 

@@ -115,7 +115,7 @@ std::array<double, 4> tilted_penny(std::uint64_t seed, solvers::Method method, i
 
 std::vector<Check> run_sif(const ExperimentContext& context) {
   const int seeds = context.quick ? 1 : 10;
-  const int nodes = context.quick ? 1400 : 2400;
+  const int nodes = context.quick ? 1800 : 2400;
   std::vector<Check> checks;
   app::Table table({"case", "method", "seed", "k_correlation", "k_interaction", "release", "tube_spread"});
   app::Figure figure{
