@@ -42,6 +42,7 @@ app::Scenario liver(solvers::Method method, double duration, bool cut) {
   if (cut) {
     app::BladeSettings& blade = scenario.blade.emplace();
     blade.edge = {{0, 0, 0}, {0.010, 0, 0.007}, {0.022, 0, 0.024}};
+    blade.edge_radius = 1e-4;
     blade.path = {{0.2 * duration, {-0.050, 0.006, 0.072}, Vector3::Zero()},
                   {0.4 * duration, {-0.044, 0.005, 0.049}, Vector3::Zero()},
                   {0.9 * duration, {-0.008, 0.000, 0.045}, Vector3(0, 0, -8)}};

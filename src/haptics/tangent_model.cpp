@@ -113,7 +113,7 @@ ModelForce TangentModel::at(const topology::ToolPose& pose, double /*time*/) noe
 // Pressures of the active candidates that close their gaps: N^T C N p = -q by Cholesky, column by column. False: the
 // block is not positive definite, and the candidate that made it so has been let go.
 bool TangentModel::solve_active() noexcept {
-  const auto rows = static_cast<std::size_t>(3 * snapshot_->count);
+  const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
   chosen_count_ = 0;
   for (int k = 0; k < near_count_; ++k) {
     const int c = near_[k];
@@ -126,7 +126,7 @@ bool TangentModel::solve_active() noexcept {
     const int c = chosen_[a];
     double* response = &response_[static_cast<std::size_t>(c) * ld];
     if (fresh_[c] == 0) {
-      combine(response, &snapshot_->compliance[static_cast<std::size_t>(3 * c) * rows], normal_[c].data(), rows);
+      combine(response, &snapshot_->compliance[3 * static_cast<std::size_t>(c) * rows], normal_[c].data(), rows);
       fresh_[c] = 1;
     }
     double* column = &factor_[a * most_candidates];
@@ -164,7 +164,7 @@ bool TangentModel::solve_active() noexcept {
 
 // Displacements under the forces: `moved_` = b + C f.
 void TangentModel::displace() noexcept {
-  const auto rows = static_cast<std::size_t>(3 * snapshot_->count);
+  const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
   const bool bonded = snapshot_->condition == solvers::ContactCondition::bonded;
   double* u = moved_[0].data(); // Vector3 is three doubles without padding
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
@@ -300,12 +300,12 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
 // Adds a candidate to those that move with the tool: three more rows of the factor. False: it depends on the others.
 bool TangentModel::catch_node(int candidate) noexcept {
   const std::vector<double>& compliance = snapshot_->compliance;
-  const auto rows = static_cast<std::size_t>(3 * snapshot_->count);
+  const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
   chosen_[chosen_count_] = candidate;
   for (int i = 0; i < 3; ++i) {
     const int r = 3 * chosen_count_ + i;
     double* row = &factor_[static_cast<std::size_t>(r) * ld];
-    const double* column = &compliance[static_cast<std::size_t>(3 * candidate + i) * rows];
+    const double* column = &compliance[(3 * static_cast<std::size_t>(candidate) + static_cast<std::size_t>(i)) * rows];
     for (int s = 0; s <= r; ++s) {
       const double* other = &factor_[static_cast<std::size_t>(s) * ld];
       double value = column[3 * chosen_[s / 3] + s % 3];
