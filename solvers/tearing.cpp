@@ -25,6 +25,32 @@ double driving_release_rate(const Material& material, const Intensities& k) {
   return energy_release_rate(material, {std::max(0.0, k[0]), k[1], k[2]});
 }
 
+namespace {
+
+double spacing_near(const Problem& problem, const Vector3& x) {
+  double spacing = 0, nearest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < problem.nodes.size(); ++i)
+    if (const double d = (problem.nodes.positions[i] - x).squaredNorm(); d < nearest) {
+      nearest = d;
+      spacing = problem.nodes.spacings[i];
+    }
+  return spacing;
+}
+
+/// By the integral over the usual tube, or a smaller one; false when neither fits.
+bool intensities_at(const Discretisation& body, const Field& field, FrontState& state) {
+  for (const InteractionOptions& tube : {InteractionOptions{}, InteractionOptions{.outer = 2, .half_length = 0.5}}) {
+    try {
+      state.intensities = interaction_integral(body, field, state.frame, tube);
+      return true;
+    } catch (const InputError&) { // the tube leaves the body, or the front turns within it
+    }
+  }
+  return false;
+}
+
+} // namespace
+
 std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
                                      const std::function<double(const Vector3&)>& toughness, double spacing) {
   const Problem& problem = body.problem();
@@ -39,32 +65,29 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
       throw InputError(fmt::format("tearing: the toughness at ({:.6g}, {:.6g}, {:.6g}) m is {} J/m2; it must be "
                                    "positive",
                                    frame.point.x(), frame.point.y(), frame.point.z(), state.toughness));
-    bool found = false;
-    for (const bool by_integral : {true, false}) {
-      try {
-        state.intensities =
-            by_integral ? interaction_integral(body, field, frame) : displacement_correlation(body, field, frame);
-        state.by_integral = by_integral;
-        found = true;
-        break;
-      } catch (const InputError&) { // the tube or the way back does not fit here
-      }
-    }
-    (found ? states : without).push_back(state);
+    (intensities_at(body, field, state) ? states : without).push_back(state);
   }
-  if (states.empty() && !without.empty())
-    throw NumericalError(fmt::format("tearing: the intensities cannot be had anywhere along a front of {:.3g} m: it is "
-                                     "too near to the surface for the node spacing",
-                                     problem.incision->front_length()));
   const std::size_t known = states.size();
   for (FrontState& state : without) {
-    const auto nearest = std::min_element(states.begin(), states.begin() + static_cast<std::ptrdiff_t>(known),
-                                          [&](const FrontState& a, const FrontState& b) {
-                                            return (a.frame.point - state.frame.point).squaredNorm() <
-                                                   (b.frame.point - state.frame.point).squaredNorm();
-                                          });
-    state.intensities = nearest->intensities;
-    state.by_integral = nearest->by_integral;
+    // Bending and other loads from beyond a few spacings spoil the correlation more than a short way along the front.
+    double distance = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < known; ++k)
+      if (const double d = (states[k].frame.point - state.frame.point).norm(); d < distance) {
+        distance = d;
+        state.intensities = states[k].intensities;
+      }
+    state.by_integral = distance <= 3 * spacing_near(problem, state.frame.point);
+    if (!state.by_integral) {
+      try {
+        state.intensities = displacement_correlation(body, field, state.frame);
+      } catch (const InputError&) { // too near to the surface even for this: the nearest place it is
+        if (known == 0)
+          throw NumericalError(fmt::format("tearing: the intensities cannot be had at ({:.6g}, {:.6g}, {:.6g}) m: the "
+                                           "front, {:.3g} m long, is too near to the surface for the node spacing",
+                                           state.frame.point.x(), state.frame.point.y(), state.frame.point.z(),
+                                           problem.incision->front_length()));
+      }
+    }
     states.push_back(state);
   }
   for (FrontState& state : states) {

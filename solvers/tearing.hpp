@@ -24,13 +24,13 @@ struct FrontState {
   double release = 0;                            // G, J/m2
   double toughness = 0;                          // G_c there, J/m2
   double angle = 0;                              // kink_angle, rad
-  bool by_integral = true; // false: by the jump behind the front, where the tube of the integral does not fit
+  bool by_integral = true;                       // there or near by; false: by the jump behind the front
 };
 
-/// Intensities along the whole front at places about `spacing` m apart: by interaction integral, by displacement
-/// correlation where the tube leaves the body or the front turns within it. `toughness` at a point of the body at rest,
-/// J/m2. Places where neither can be had (nearer to the surface than the correlation reaches) take those of the nearest
-/// place. Throws InputError when `spacing` or a toughness is not positive.
+/// Intensities along the whole front at places about `spacing` m apart, by interaction integral. Where its tube does
+/// not fit (near the surface), those of the nearest place that has it within 3 node spacings, else by displacement
+/// correlation. `toughness` at a point of the body at rest, J/m2. Throws InputError when `spacing` or a toughness is
+/// not positive, NumericalError when the intensities cannot be had.
 std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
                                      const std::function<double(const Vector3&)>& toughness, double spacing);
 
