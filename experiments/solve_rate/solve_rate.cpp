@@ -70,7 +70,7 @@ Rate published_rate(int steps) {
 
 /// Steps of a session at 100 a second, the ball swinging, from the tenth on.
 Rate session_rate(Method method, int nodes, bool cut, int steps) {
-  HapticMotion motion = haptic_motions().back();
+  HapticMotion motion = haptic_motions().front(); // with a cut
   motion.cut = cut;
   app::Scenario scenario = haptic_block(motion, method);
   scenario.nodes.count = nodes;

@@ -35,6 +35,10 @@ double entered(double t, double depth) {
 
 std::vector<HapticMotion> haptic_motions() {
   std::vector<HapticMotion> motions;
+  motions.push_back(motion_of("cut", 0.6, [](double t) {
+    return Vector3(0, 0, entered(t, 0.0025) + 0.0015 * std::sin(2 * pi * 4 * std::max(0.0, t - 0.1)));
+  }));
+  motions.back().cut = true;
   motions.push_back(motion_of(
       "press", 1.0, [](double t) { return Vector3(0, 0, 0.001 - 0.005 * (ease(t / 0.4) - ease((t - 0.6) / 0.4))); }));
   motions.push_back(motion_of("tap", 0.75, [](double t) { // speed 2 pi 4 / s 4 mm = 0.1 m/s
@@ -48,10 +52,6 @@ std::vector<HapticMotion> haptic_motions() {
     const double phase = 2 * pi * (s + 0.5 * 4 * s * s / 1.5);
     return Vector3(0, 0, entered(t, 0.0035) + 0.003 * std::sin(phase) * ease(s / 0.1));
   }));
-  motions.push_back(motion_of("cut", 0.6, [](double t) {
-    return Vector3(0, 0, entered(t, 0.0025) + 0.0015 * std::sin(2 * pi * 4 * std::max(0.0, t - 0.1)));
-  }));
-  motions.back().cut = true;
   return motions;
 }
 
@@ -73,12 +73,12 @@ app::Scenario haptic_block(const HapticMotion& motion, solvers::Method method) {
   for (const app::PathPose& pose : motion.path)
     path.push_back({pose.time, pose.position});
   tool.motion = path;
-  if (motion.cut) { // a vertical edge, 10 mm deep, passes 14 mm beside the ball
+  if (motion.cut) { // an upright edge, 10 mm deep, comes in from the side of the block at 10 mm/s
     app::BladeSettings& blade = scenario.blade.emplace();
     blade.edge = {{0, 0, 0}, {0, 0, 0.014}};
     blade.edge_radius = 1e-4;
-    blade.path = {{0.1, {0.014, -0.034, top - 0.010}, Vector3::Zero()},
-                  {0.6, {0.014, -0.029, top - 0.010}, Vector3::Zero()}};
+    blade.path = {{0.05, {0.014, -0.0305, top - 0.010}, Vector3::Zero()},
+                  {0.6, {0.014, -0.025, top - 0.010}, Vector3::Zero()}};
     scenario.nodes.fine_spacing = scenario.cut.front_spacing = 0.004;
   }
   return scenario;

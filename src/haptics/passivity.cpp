@@ -11,7 +11,7 @@ namespace {
 
 constexpr double reserve = 2e-5;   // J, surplus that is kept
 constexpr double make_up = 0.003;  // s, in which a deficit is made up
-constexpr double smoothing = 0.25; // of the way to the wanted damping in a tick
+constexpr double smoothing = 0.08; // of the way to the wanted damping in a tick
 
 } // namespace
 

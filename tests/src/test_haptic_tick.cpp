@@ -283,7 +283,7 @@ TEST_CASE("A light hand on a stiff spring swings up without the controller and c
     const topology::ToolShape shape = punch;
     HapticTick core(settings, shape, nullptr);
     ContactSnapshot wall;
-    spring(1500, Vector3::Zero(), wall);
+    spring(1200, Vector3::Zero(), wall);
     HandSettings light;
     light.mass = 0.08;
     light.stiffness = 60;
