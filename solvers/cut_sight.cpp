@@ -196,6 +196,13 @@ void CutSight::update_radii(const std::vector<Vector3>& centres, const std::vect
   }
 }
 
+bool CutSight::enriches(const Vector3& x) const {
+  if (sight_.rule != SightRule::enriched || front_spacing_.empty())
+    return false;
+  const auto front = sight_.incision->front_frame(x, longest_reach_);
+  return front && front->distance < sight_.reach * front_spacing_[front->segment];
+}
+
 Vector3 CutSight::off_the_sheet(const Vector3& x) const {
   const double clearance = sheet_clearance * smallest_radius_;
   if (sight_.incision->near(x, 0.1 * clearance))

@@ -35,6 +35,9 @@ class CutSight {
     return any != 0;
   }
 
+  /// Whether x lies in the reach of the enrichment.
+  [[nodiscard]] bool enriches(const Vector3& x) const;
+
   /// x, or a point 1e-6 radii off the sheet on its + side where x lies on it.
   [[nodiscard]] Vector3 off_the_sheet(const Vector3& x) const;
 

@@ -1,10 +1,13 @@
 // Box, half ball and cylinder with closed formulas. All three are convex, so inside the closest surface point lies on
 // the nearest face, and outside it is the projection onto the solid; both are exact everywhere.
 #include "topology/domain.hpp"
+#include "topology/errors.hpp"
 #include "topology/organs.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <limits>
 #include <utility>
 
@@ -91,6 +94,53 @@ class BoxDomain final : public AnalyticDomain {
   Vector3 lower_, upper_;
 };
 
+/// A box about the origin, seen from a frame in which it is turned and moved.
+class TurnedBoxDomain final : public AnalyticDomain {
+ public:
+  TurnedBoxDomain(const Vector3& centre, const Matrix3& axes, const Vector3& half_size, double edge)
+      : AnalyticDomain(turned_block(centre, axes, half_size, edge), faces(centre, axes, half_size)), centre_(centre),
+        axes_(axes), half_size_(half_size) {}
+
+  [[nodiscard]] double curved_distance(const Vector3&) const override {
+    return -std::numeric_limits<double>::infinity();
+  }
+  [[nodiscard]] Vector3 curved_gradient(const Vector3&) const override { return Vector3::Zero(); }
+
+ protected:
+  [[nodiscard]] Nearest nearest(const Vector3& x) const override {
+    // In the box's own axes, so that a point that rounding puts just outside still gets the normal of a face.
+    const Vector3 local = axes_.transpose() * (x - centre_);
+    int axis = 0;
+    const double distance = (local.cwiseAbs() - half_size_).maxCoeff(&axis);
+    const Vector3 face = (local[axis] < 0 ? -1.0 : 1.0) * Vector3::Unit(axis);
+    const Vector3 projection = local.cwiseMax(-half_size_).cwiseMin(half_size_);
+    const Nearest found =
+        projection != local ? from_outside(local, projection, face) : Nearest{local - distance * face, face, distance};
+    return {centre_ + axes_ * found.point, axes_ * found.normal, found.distance};
+  }
+
+ private:
+  static SurfaceMesh turned_block(const Vector3& centre, const Matrix3& axes, const Vector3& half_size, double edge) {
+    SurfaceMesh mesh = make_block(-half_size, half_size, edge);
+    for (Vector3& x : mesh.vertices)
+      x = centre + axes * x;
+    return mesh;
+  }
+  static std::vector<Plane> faces(const Vector3& centre, const Matrix3& axes, const Vector3& half_size) {
+    std::vector<Plane> result;
+    for (int d = 0; d < 3; ++d)
+      for (const double side : {-1.0, 1.0}) {
+        const Vector3 normal = side * axes.col(d);
+        result.push_back({normal, normal.dot(centre) + half_size[d]});
+      }
+    return result;
+  }
+
+  Vector3 centre_;
+  Matrix3 axes_;
+  Vector3 half_size_;
+};
+
 class HemisphereDomain final : public AnalyticDomain {
  public:
   HemisphereDomain(double radius, double edge)
@@ -149,6 +199,16 @@ class CylinderDomain final : public AnalyticDomain {
 
 std::shared_ptr<const Domain> make_box_domain(const Vector3& lower, const Vector3& upper, double edge) {
   return std::make_shared<BoxDomain>(lower, upper, edge);
+}
+
+std::shared_ptr<const Domain> make_turned_box_domain(const Vector3& centre, const Matrix3& axes,
+                                                     const Vector3& half_size, double edge) {
+  const double error = (axes.transpose() * axes - Matrix3::Identity()).norm();
+  if (!(error < 1e-9) || axes.determinant() < 0)
+    throw InputError(fmt::format("turned box: its axes are off a rotation by {:.3g}, determinant {:.3g}; the limit is "
+                                 "1e-9",
+                                 error, axes.determinant()));
+  return std::make_shared<TurnedBoxDomain>(centre, axes, half_size, edge);
 }
 
 std::shared_ptr<const Domain> make_hemisphere_domain(double radius, double edge) {

@@ -41,6 +41,11 @@ class Domain {
 /// Box lower..upper, m. Tessellated with edges of about `edge` m.
 std::shared_ptr<const Domain> make_box_domain(const Vector3& lower, const Vector3& upper, double edge);
 
+/// Box of edges 2 half_size about `centre` along the columns of `axes`. Tessellated with edges of about `edge` m.
+/// Throws InputError when `axes` is not a rotation to 1e-9.
+std::shared_ptr<const Domain> make_turned_box_domain(const Vector3& centre, const Matrix3& axes,
+                                                     const Vector3& half_size, double edge);
+
 /// Half ball of the given radius, base on z = 0, pole at +z.
 std::shared_ptr<const Domain> make_hemisphere_domain(double radius, double edge);
 

@@ -22,6 +22,7 @@ constexpr double cell_reach = 6;    // half size of the initial box of a cell, i
 constexpr double cap_height = 0.75; // how far outside the curved surface a cell is cut off, in h
 constexpr double lip_reach = 0.01;  // a node this near to a sheet lies on one of its faces, in h
 constexpr double lip_lift = 0.1;    // by which it is lifted to look for its neighbours, in h
+constexpr double sliver = 1e-3;     // a smaller part of a face is not split off it
 constexpr int first_plane_id = -100;
 constexpr int cap_id = -50;
 
@@ -183,6 +184,10 @@ struct CellBuilder {
   void build(int i, CellComplex& cells, std::vector<Vector3>& closure);
 
  private:
+  /// A face between nodes that do not see each other, a polygon relative to node i in units of its spacing: what lies
+  /// ahead of the front is an ordinary face.
+  void add_lip(int i, int j, const std::vector<Vector3>& polygon, const Vector3& outward, CellComplex& cells,
+               std::vector<Vector3>& closure) const;
   bool cut(int i, voro::voronoicell_neighbor& cell);
   [[nodiscard]] bool hidden(int i, int j) const {
     if (incision == nullptr)
@@ -240,6 +245,80 @@ bool CellBuilder::cut(int i, voro::voronoicell_neighbor& cell) {
     covered = reach;
     reach = std::min(needed * 1.01, reach * 1.6);
   }
+}
+
+/// The parts of a convex polygon before and behind the plane through `origin` with the given normal.
+std::pair<std::vector<Vector3>, std::vector<Vector3>> split(const std::vector<Vector3>& polygon, const Vector3& origin,
+                                                            const Vector3& normal) {
+  std::pair<std::vector<Vector3>, std::vector<Vector3>> parts;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Vector3 &a = polygon[k], &b = polygon[(k + 1) % polygon.size()];
+    const double at_a = (a - origin).dot(normal), at_b = (b - origin).dot(normal);
+    (at_a >= 0 ? parts.first : parts.second).push_back(a);
+    if ((at_a >= 0) != (at_b >= 0)) {
+      const Vector3 crossing = a + at_a / (at_a - at_b) * (b - a);
+      parts.first.push_back(crossing);
+      parts.second.push_back(crossing);
+    }
+  }
+  return parts;
+}
+
+void CellBuilder::add_lip(int i, int j, const std::vector<Vector3>& polygon, const Vector3& outward, CellComplex& cells,
+                          std::vector<Vector3>& closure) const {
+  const Vector3& x = nodes[i];
+  const double h = spacings[i];
+  const auto measured = [&](const std::vector<Vector3>& part) {
+    Measure face = part.size() < 3 ? Measure{} : measure(part);
+    if (face.area.dot(outward) < 0)
+      face.area = -face.area;
+    return face;
+  };
+  // Straight pieces of the front near the corners take their parts off one by one.
+  std::vector<Vector3> behind = polygon;
+  std::vector<Vector3> cuts; // directions of growth
+  std::vector<Vector3> places;
+  const Vector3 middle = measure(polygon).centroid;
+  double reach = 0;
+  for (const Vector3& corner : polygon)
+    reach = std::max(reach, (corner - middle).norm());
+  const auto add_front = [&](const Vector3& corner) {
+    const auto front = incision->front_frame(x + h * corner, h * reach);
+    if (front &&
+        std::none_of(cuts.begin(), cuts.end(), [&](const Vector3& cut) { return cut.dot(front->ahead) > 0.95; })) {
+      cuts.push_back(front->ahead);
+      places.push_back((front->point - x) / h);
+    }
+  };
+  add_front(middle);
+  for (const Vector3& corner : polygon)
+    add_front(corner);
+  const double smallest = sliver * measure(polygon).area.norm();
+  for (std::size_t c = 0; c < cuts.size(); ++c) {
+    auto [ahead, rest] = split(behind, places[c], cuts[c]);
+    const Measure face = measured(ahead);
+    if (face.area.norm() < smallest)
+      continue;
+    const Vector3 centroid = x + h * face.centroid;
+    if (incision->blocks(x, centroid) || incision->blocks(nodes[j], centroid))
+      continue;
+    const bool all = measured(rest).area.norm() < smallest;
+    const Measure& joined = all ? measured(behind) : face;
+    cells.faces.push_back({i, j, joined.area * h * h, x + h * joined.centroid});
+    append_corners(all ? behind : ahead, x, h, cells.face_corners, cells.face_start);
+    closure[i] += joined.area * h * h;
+    closure[j] -= joined.area * h * h;
+    if (all)
+      return;
+    behind = std::move(rest);
+  }
+  const Measure lip = measured(behind);
+  const Vector3 area = lip.area * h * h, centroid = x + h * lip.centroid;
+  cells.lips.push_back({i, j, area, centroid});
+  cells.lips.push_back({j, i, -area, centroid});
+  append_corners(behind, x, h, cells.lip_corners, cells.lip_start);
+  closure[i] += area;
+  closure[j] -= area;
 }
 
 void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure) {
@@ -304,11 +383,7 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
       append_corners(polygon.vertices, x, h, cells.boundary_corners, cells.boundary_start);
       closure[i] += area;
     } else if (neighbour > i && hidden(i, neighbour)) {
-      cells.lips.push_back({i, neighbour, area, centroid});
-      cells.lips.push_back({neighbour, i, -area, centroid});
-      append_corners(polygon.vertices, x, h, cells.lip_corners, cells.lip_start);
-      closure[i] += area;
-      closure[neighbour] -= area;
+      add_lip(i, neighbour, polygon.vertices, outward, cells, closure);
     } else if (neighbour > i) {
       cells.faces.push_back({i, neighbour, area, centroid});
       append_corners(polygon.vertices, x, h, cells.face_corners, cells.face_start);

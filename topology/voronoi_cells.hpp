@@ -47,10 +47,10 @@ struct CellComplex {
 /// (voro++ half-spaces); the curved part clips each face polygon by the zero set of Domain::curved_distance, with one
 /// extra vertex on each arc. The boundary of a cell on the curved part is what closes it: the area vectors of every
 /// cell sum to zero to rounding, lips included. `spacings` (m) set the search radius. With an incision, faces between
-/// nodes that do not see each other (those on its sheets lifted off them, see lip_lift.hpp) become lips, whole. The
-/// face between the partners of a lip pair lies in the tangent plane of the sheet: the two count as if they were
-/// mirrored about it, which moves them by no more than they are off it. It ends at the front when a ring of nodes lies
-/// as far ahead of the front as the pairs lie behind. Throws InputError when a node coincides with another, or when a
+/// nodes that do not see each other (those on its sheets lifted off them, see lip_lift.hpp) become lips, but for what
+/// of them lies ahead of the front, which is an ordinary face between the same two nodes. The face between the partners
+/// of a lip pair lies in the tangent plane of the sheet: the two count as if they were mirrored about it, which moves
+/// them by no more than they are off it. Throws InputError when a node coincides with another, or when a
 /// cell reaches farther than six times its node's spacing inside the body.
 CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain,
                           const Incision* incision = nullptr);

@@ -1,5 +1,6 @@
 // Problem:   a strip 1 m wide and 3 m long, 0.4 m thick between sliding sides (plane strain), cut in from one side over
-//            0.4 of its width, and pulled at its ends by the stress s. It stands askew between the axes.
+//            0.4 of its width, and pulled at its ends by the stress s. It stands askew between the axes. The same with
+//            free sides and nu = 0, which is plane strain too, turned about all three axes.
 // Reference: K_I of the single-edge-notched strip, to 0.5 % [Tada, Paris and Irwin].
 // Command:   spherecut experiment run precut_edge --out DIR
 #include "experiments/registered.hpp"
@@ -20,22 +21,35 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
   const std::vector<int> sizes = context.quick ? std::vector<int>{700} : std::vector<int>{700, 1400};
   constexpr double width = 1, depth = 0.4, tension = 1;
   // The strip lies along `ahead`: its length is the way of the cut, its height the direction of the pull.
-  const TiltedStrip strip = tilted_strip(width, 3, 0.4, 0.2);
-  const CutFrame& frame = strip.frame;
   const double wanted = edge_notched_strip_intensity(tension, depth, width);
   std::vector<Check> checks;
-  app::Table table({"method", "sight", "nodes", "seed", "spacing", "k_correlation", "k_interaction", "k_exact"});
+  app::Table table(
+      {"method", "sight", "sides", "nodes", "seed", "spacing", "k_correlation", "k_interaction", "k_exact"});
   app::Figure figure{"Edge-notched strip: intensity over Tada's", "nodes", "K_I / exact", false, false, {}};
+  struct Run {
+    PrecutMethod method;
+    StripSides sides;
+    [[nodiscard]] std::string name() const { return method.name() + (sides == StripSides::free ? "_free_sides" : ""); }
+  };
+  std::vector<Run> runs;
   for (const PrecutMethod& method : precut_methods(context.quick)) {
-    app::Series points{method.name(), {}, {}, app::SeriesStyle::points};
+    runs.push_back({method, StripSides::sliding});
+    if (method.judged)
+      runs.push_back({method, StripSides::free});
+  }
+  for (const Run& run : runs) {
+    const PrecutMethod& method = run.method;
+    const TiltedStrip strip = tilted_strip(width, 3, 0.4, 0.2, run.sides);
+    const CutFrame& frame = strip.frame;
+    app::Series points{run.name(), {}, {}, app::SeriesStyle::points};
     for (int size : sizes) {
       ErrorSeries errors;
       for (int seed = 1; seed <= (method.judged ? seeds : std::min(seeds, 3)); ++seed) {
         CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0.07, 0.1)}, 4, 0.35,
                         size,         static_cast<std::uint64_t>(seed)};
         CutBody body = cut_body(cut);
-        body.problem.material = {1, 0.3, 0};
-        hold_sides(body.problem, strip);
+        body.problem.material = {1, run.sides == StripSides::free ? 0.0 : 0.3, 0};
+        hold_strip(body.problem, strip);
         body.problem.loads.traction = [frame](const Vector3&, const Vector3& n) -> Vector3 {
           const double pull = n.dot(frame.normal);
           return std::abs(pull) > 0.9 ? Vector3((pull > 0 ? tension : -tension) * frame.normal) : Vector3::Zero();
@@ -49,16 +63,16 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
         errors.add("k_correlation", std::abs(by_jump / wanted - 1));
         errors.add("k_interaction", std::abs(by_integral / wanted - 1));
         table.add({std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
-                   fmt::format("{}", body.problem.nodes.size()), fmt::format("{}", seed),
-                   fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", by_jump), fmt::format("{:.5f}", by_integral),
-                   fmt::format("{:.5f}", wanted)});
+                   run.sides == StripSides::free ? "free" : "sliding", fmt::format("{}", body.problem.nodes.size()),
+                   fmt::format("{}", seed), fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", by_jump),
+                   fmt::format("{:.5f}", by_integral), fmt::format("{:.5f}", wanted)});
         points.x.push_back(body.problem.nodes.size());
         points.y.push_back(by_integral / wanted);
       }
-      context.say(fmt::format("{}, {} nodes, medians (worst): {}", method.name(), size, errors.text()));
+      context.say(fmt::format("{}, {} nodes, medians (worst): {}", run.name(), size, errors.text()));
       if (size != sizes.back())
         continue;
-      const std::string name = "precut_edge_" + method.name();
+      const std::string name = "precut_edge_" + run.name();
       if (method.judged) {
         errors.check(name, "k_correlation", method.bound(0.04, 0.08), checks);
         errors.check(name, "k_interaction", method.bound(0.04, 0.08), checks);

@@ -122,12 +122,8 @@ std::vector<Check> run_precut_straight(const ExperimentContext& context) {
       const std::string name = fmt::format("precut_straight_{}_mode_{}", method.name(), mode_names[mode]);
       if (method.judged) {
         errors[mode].check(name, "opening", method.bound(0.015, 0.06), checks);
-        // Of the loose bounds, 5 % on K is out of the cell balance's reach in modes II and III: told, not demanded.
-        for (const char* k : {"k_correlation", "k_interaction"})
-          if (method.method == solvers::DiscretisationOptions{}.method)
-            errors[mode].check(name, k, 0.02, checks);
-          else
-            checks.push_back({fmt::format("{}_{}_reported", name, k), median(errors[mode][k]), ">=", 0});
+        errors[mode].check(name, "k_correlation", method.bound(0.02, 0.05), checks);
+        errors[mode].check(name, "k_interaction", method.bound(0.02, 0.05), checks);
       } else {
         checks.push_back({name + "_opening_reported", median(errors[mode]["opening"]), ">=", 0});
       }

@@ -2,17 +2,20 @@
 
 #include "topology/cut_sheets.hpp"
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace spherecut::experiments {
 
-TiltedStrip tilted_strip(double length, double height, double thickness, double edge) {
-  TiltedStrip strip{nullptr, tilted_frame({0.031, 0, -0.017}, {0, 0.23, 0}), length, height, thickness};
+TiltedStrip tilted_strip(double length, double height, double thickness, double edge, StripSides sides) {
+  const CutFrame frame = sides == StripSides::sliding ? tilted_frame({0.031, 0, -0.017}, {0, 0.23, 0})
+                                                      : tilted_frame({0.031, 0.023, -0.017}, {0.19, 0.23, -0.14});
+  TiltedStrip strip{nullptr, frame, sides, length, height, thickness};
   const Vector3 half = 0.5 * Vector3(length, thickness, height);
-  topology::SurfaceMesh surface = topology::make_box_domain(-half, half, edge)->surface();
-  for (Vector3& x : surface.vertices)
-    x = strip.frame.origin + x.x() * strip.frame.ahead + x.z() * strip.frame.normal + Vector3(0, x.y(), 0);
-  strip.domain = topology::make_organ_domain(std::move(surface));
+  Matrix3 axes;
+  axes << frame.ahead, frame.normal.cross(frame.ahead), frame.normal;
+  strip.domain = topology::make_turned_box_domain(strip.frame.origin, axes, half, edge);
   return strip;
 }
 
@@ -24,7 +27,47 @@ topology::SurfaceMesh cut_from_end(const TiltedStrip& strip, double depth, doubl
                                         strip.thickness + 2 * beyond, depth + beyond, edge);
 }
 
-void hold_sides(solvers::Problem& problem, const TiltedStrip& strip) {
+namespace {
+
+/// Holds the rigid motions at three nodes of the far end: all of the first, of the second what is across the way from
+/// the first to it, of the third what is across their plane.
+void hold_far_end(solvers::Problem& problem, const TiltedStrip& strip) {
+  const CutFrame& frame = strip.frame;
+  hold_surface(
+      problem, [frame](const Vector3&, const Vector3& n) { return n.dot(frame.ahead) > 0.9; },
+      [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
+  const std::vector<solvers::Prescribed> end = std::move(problem.prescribed);
+  const auto nearest = [&](double above, double aside) {
+    const Vector3 wanted =
+        frame.origin + frame.global({0.5 * strip.length, above * strip.height, aside * strip.thickness});
+    const auto distance = [&](const solvers::Prescribed& entry) {
+      return (problem.nodes.positions[entry.node] - wanted).norm();
+    };
+    return std::min_element(end.begin(), end.end(),
+                            [&](const auto& a, const auto& b) { return distance(a) < distance(b); })
+        ->node;
+  };
+  const std::array<int, 3> held{nearest(-0.4, -0.3), nearest(0.4, -0.3), nearest(0, 0.3)};
+  const std::vector<Vector3>& x = problem.nodes.positions;
+  const Vector3 way = x[held[1]] - x[held[0]], across = way.cross(x[held[2]] - x[held[0]]);
+  int along = 0, out = 0;
+  way.cwiseAbs().maxCoeff(&along);
+  across.cwiseAbs().maxCoeff(&out);
+  std::array<bool, 3> second{true, true, true}, third{false, false, false};
+  second[along] = false;
+  third[out] = true;
+  problem.prescribed = {{held[0], {true, true, true}, Vector3::Zero()},
+                        {held[1], second, Vector3::Zero()},
+                        {held[2], third, Vector3::Zero()}};
+}
+
+} // namespace
+
+void hold_strip(solvers::Problem& problem, const TiltedStrip& strip) {
+  if (strip.sides == StripSides::free) {
+    hold_far_end(problem, strip);
+    return;
+  }
   const solvers::NodeCloud& nodes = problem.nodes;
   const auto nearest_held = [&](double along, double above) {
     const Vector3 wanted = strip.frame.origin + along * strip.frame.ahead + above * strip.frame.normal;

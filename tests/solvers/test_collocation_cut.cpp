@@ -2,6 +2,7 @@
 #include "solvers/discretisation.hpp"
 #include "tests/support/cut_sheets.hpp"
 #include "topology/errors.hpp"
+#include "topology/voronoi_cells.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -239,4 +240,33 @@ TEST_CASE("Collocation with a cut: pre-tension opens it as the traction that it 
   const VectorX opened = loaded->nodal_displacements(loaded->solve());
   CHECK(opened.norm() > 1e-3);
   CHECK((gape - opened).norm() < 1e-9 * opened.norm());
+}
+
+TEST_CASE("Cells beside a cut: their lips end at the front whatever the nodes ahead of it", "[collocation][cut]") {
+  CutBody body = cut_body(0.04, 0.3);
+  const Problem& problem = body.problem;
+  const double left_out = GENERATE(0, 0.8); // in spacings: nodes so near ahead of the front are taken away
+  NodeCloud nodes;
+  for (int i = 0; i < problem.nodes.size(); ++i) {
+    const Vector3& x = problem.nodes.positions[i];
+    const auto front = problem.incision->front_frame(x, left_out * problem.nodes.spacings[i] + 1e-9);
+    if (!front || (x - front->point).dot(front->ahead) < 0)
+      nodes.add(x, problem.nodes.spacings[i], problem.nodes.kinds[i], problem.nodes.normals[i]);
+  }
+  const topology::CellComplex cells =
+      topology::voronoi_cells(nodes.positions, nodes.spacings, *problem.domain, problem.incision.get());
+  double ahead = 0, joined = 0;
+  for (std::size_t k = 0; k < cells.lip_corners.size(); ++k)
+    if (const auto front = problem.incision->front_frame(cells.lip_corners[k], 1))
+      ahead = std::max(ahead, (cells.lip_corners[k] - front->point).dot(front->ahead));
+  for (const topology::CellFace& face : cells.faces)
+    if ((nodes.positions[face.first] - nodes.positions[face.second]).norm() < 0.01 * nodes.spacings[face.first])
+      joined += face.area.norm();
+  CHECK(ahead < 0.01 * nodes.spacings[0]);
+  if (left_out > 0)
+    CHECK(joined > 0.05 * problem.incision->front_length() * nodes.spacings[0]);
+  double volume = 0;
+  for (const double v : cells.volumes)
+    volume += v;
+  CHECK(volume == Approx(0.72).epsilon(1e-9));
 }

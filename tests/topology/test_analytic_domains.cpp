@@ -23,9 +23,12 @@ struct Case {
 };
 
 std::vector<Case> cases() {
+  Matrix3 axes;
+  axes << 2.0 / 3, -2.0 / 3, 1.0 / 3, 2.0 / 3, 1.0 / 3, -2.0 / 3, 1.0 / 3, 2.0 / 3, 2.0 / 3;
   return {{"box", make_box_domain(Vector3(-0.03, 0.01, -0.02), Vector3(0.05, 0.06, 0.04), 0.004)},
           {"hemisphere", make_hemisphere_domain(0.05, 0.003)},
-          {"cylinder", make_cylinder_domain(0.04, 0.06, 0.003)}};
+          {"cylinder", make_cylinder_domain(0.04, 0.06, 0.003)},
+          {"turned box", make_turned_box_domain({0.01, -0.02, 0.03}, axes, {0.05, 0.03, 0.04}, 0.004)}};
 }
 
 } // namespace
