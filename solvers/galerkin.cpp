@@ -28,7 +28,7 @@ constexpr double penalty = 1e4;
 
 class Galerkin final : public ElasticBody {
  public:
-  Galerkin(Problem problem, const DiscretisationOptions& options)
+  Galerkin(Problem problem, const DiscretisationOptions& options, bool is_factored = true)
       : ElasticBody(std::move(problem), galerkin_support_radius(problem, options), options.sight) {
     const Stopwatch assembly;
     BackgroundOptions background;
@@ -43,6 +43,8 @@ class Galerkin final : public ElasticBody {
     report_.unknowns = 3 * problem_.nodes.size();
     report_.matrix_nonzeros = stiffness_.nonZeros();
     report_.assembly_seconds = assembly.seconds();
+    if (!is_factored)
+      return;
     const Stopwatch factor;
     factorisation_ = factor_ordered(stiffness_);
     report_.factor_nonzeros = factorisation_->nonzeros();
@@ -56,7 +58,8 @@ class Galerkin final : public ElasticBody {
 
   Method method() const override { return Method::galerkin; }
   OrderedStiffness stiffness() const {
-    return {stiffness_, order_, anchors_, held_, cells_, spheres_, elastic_stiffness(), !dropped_.empty()};
+    return {stiffness_, order_, anchors_,         held_, cells_, spheres_, elastic_stiffness(),
+            shapes_,    loads_, !dropped_.empty()};
   }
 
   Field solve() const override {
@@ -489,6 +492,11 @@ double galerkin_support_radius(const Problem& problem, const DiscretisationOptio
 
 double constraint_stiffness(const Problem& problem, int node) {
   return penalty * problem.material.young_modulus * problem.nodes.spacings[node];
+}
+
+std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const DiscretisationOptions& options) {
+  require_domain(problem);
+  return std::make_unique<Galerkin>(std::move(problem), options, false);
 }
 
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {

@@ -1,6 +1,7 @@
 // The matrix behind a `galerkin` discretisation, for those who update it or look into it.
 #pragma once
 
+#include "solvers/cell_shapes.hpp"
 #include "solvers/factorisation.hpp"
 #include "solvers/pieces.hpp"
 #include "solvers/surface_patches.hpp"
@@ -15,8 +16,13 @@ struct OrderedStiffness {
   const BackgroundCells& cells;
   const Spheres& spheres;
   Eigen::Map<const SparseMatrix> elastic; // `lower` without the penalties of the held means
+  const std::vector<CellShapes>& shapes;  // of every cell, by ranks
+  const VectorX& loads;                   // N, 3 a node, prescribed displacements left out
   bool dropped = false;                   // whether unknowns of severed pieces are taken out
 };
+
+/// A body of method galerkin that is assembled and not factored: only its stiffness and its report can be asked for.
+std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const DiscretisationOptions& options);
 
 /// Support radius over spacing that the options ask for, or the default for this material.
 double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options);

@@ -226,6 +226,12 @@ std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& 
   return means;
 }
 
+/// Whether two means differ by no more than the order of summation.
+bool equal_to_rounding(const DisplacementMean& a, const DisplacementMean& b) {
+  return a.nodes == b.nodes && std::equal(a.weights.begin(), a.weights.end(), b.weights.begin(),
+                                          [](double v, double w) { return std::abs(v - w) <= 1e-14; });
+}
+
 /// A held mean that the two do not have in common: from one it has to go, to the other it has to come.
 struct HeldChange {
   int before = -1, now = -1; // entries, -1: none
@@ -245,7 +251,7 @@ std::vector<HeldChange> held_changes(const std::vector<Prescribed>& before, cons
     }
     const int b = known->second;
     entry.erase(known);
-    if (held[k].nodes != old[b].nodes || held[k].weights != old[b].weights || now[k].components != before[b].components)
+    if (!equal_to_rounding(held[k], old[b]) || now[k].components != before[b].components)
       changes.push_back({b, k});
   }
   for (int k = 0; k < std::ssize(before); ++k)
@@ -496,7 +502,10 @@ void GrowingCut::State::condense_all() {
   present.nodes = present_nodes(problem.nodes, removed);
   for (Prescribed& entry : present.prescribed)
     entry.node = compact[entry.node];
-  const std::unique_ptr<Discretisation> body = discretise(std::move(present), options.method);
+  // The ordinary factor is good for the condition estimate alone.
+  const std::unique_ptr<Discretisation> body = options.method.estimate_condition
+                                                   ? discretise(std::move(present), options.method)
+                                                   : assemble_galerkin(std::move(present), options.method);
   const OrderedStiffness stiffness = stiffness_of(*body);
   if (stiffness.dropped)
     throw InputError("a severed piece that leaves the computation cannot be followed by an update");
@@ -517,25 +526,25 @@ void GrowingCut::State::condense_all() {
       node = id[node]; // ascending still
   boxes.clear();
   CellEvaluator evaluator(*spheres);
-  const topology::Domain& domain = *problem.domain;
-  BackgroundCells filled;
   std::vector<char> in_window(problem.nodes.size(), 0);
   const auto in_reach = reach_of(options.way);
-  cell_loads = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
   for (const BackgroundBox& leaf : stiffness.cells.boxes) {
     Box box{leaf, {}, {}};
-    const bool reached = in_reach(leaf.centre, leaf.half.norm());
-    if (reached || has_cell_loads()) {
-      refill_box(domain, leaf, background(), problem.incision.get(), filled);
-      evaluate(box, filled, evaluator);
-      add_cell_loads(box, 1, *spheres, cell_loads);
-      if (reached)
-        for (const CellShapes& cell : box.cells)
-          for (int node : cell.nodes)
-            in_window[node] = 1;
-    }
+    if (in_reach(leaf.centre, leaf.half.norm()))
+      for (int c = leaf.first_cell; c < leaf.last_cell; ++c) {
+        box.cells.push_back(stiffness.shapes[static_cast<std::size_t>(c)]);
+        evaluator.renumber(elastic_order, box.cells.back());
+        if (has_cell_loads())
+          box.points.emplace_back(stiffness.cells.of(c).begin(), stiffness.cells.of(c).end());
+        for (int node : box.cells.back().nodes)
+          in_window[node] = 1;
+      }
     boxes.push_back(std::move(box));
   }
+  cell_loads = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
+  for (Eigen::Index i = 0; i < std::ssize(id); ++i)
+    cell_loads.segment<3>(3 * static_cast<Eigen::Index>(id[i])) = stiffness.loads.segment<3>(3 * i);
+  cell_loads -= tractions();
   find_contact();
   std::vector<char> in_contact(problem.nodes.size(), 0);
   for (const DisplacementMean& mean : contact)
@@ -763,7 +772,6 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   const double finest = *std::min_element(next.nodes.spacings.begin(), next.nodes.spacings.end());
   const double slack = 0.25 * finest;
   const Changes changes = changes_between(before.get(), *incision, 2 * slack);
-  const Nearness to_faces(changes.faces), to_front(changes.front);
   std::vector<int> new_slot = s.slot;
   for (int k = 0; k < change.added.size(); ++k)
     new_slot.push_back(s.next_room + k);
@@ -819,9 +827,9 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   // The same for means over the surface: those whose points see the change have new weights, and where the faces or
   // surface nodes come near the shares themselves are new.
   const auto is_near = [&](const DisplacementMean& mean) {
-    const double radius = s.radius_at(mean.centroid), share = 0.5 * radius;
-    return to_faces(mean.centroid) < radius + share ||
-           to_front(mean.centroid) < radius * std::max(1.0, s.enrichment_reach()) + share ||
+    const double share = 0.5 * s.radius_at(mean.centroid);
+    return reach.sees(mean.centroid, share) ||
+           reach.near_front(mean.centroid, share, std::max(1.0, s.enrichment_reach())) ||
            std::any_of(balls.begin(), balls.end(),
                        [&](const auto& ball) { return (ball.first - mean.centroid).norm() < ball.second + share; });
   };
@@ -849,7 +857,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   } else {
     for (DisplacementMean& mean : held)
       if (is_near(mean))
-        mean = reweighed(mean, *fresh_spheres);
+        if (DisplacementMean weighed = reweighed(mean, *fresh_spheres); !equal_to_rounding(mean, weighed))
+          mean = std::move(weighed);
   }
   const std::vector<HeldChange> exchanged_means = held_changes(s.problem.prescribed, s.held, next.prescribed, held);
   for (const HeldChange& one : exchanged_means)

@@ -11,6 +11,9 @@ void dtrsm_(const char* side, const char* uplo, const char* trans, const char* d
             const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a,
             const int* lda, const double* beta, double* c, const int* ldc);
+void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha,
+            const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c,
+            const int* ldc);
 void dtrmm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
             const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 }
@@ -59,6 +62,20 @@ void triangular_product(bool transposed, const MatrixX& lower, MatrixX& right) {
   dtrmm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower.data(), &rows, right.data(), &rows);
 }
 
+/// Lower triangle of L L^T, by blocks of columns that leave out the zeros of L.
+MatrixX lower_square(const MatrixX& lower) {
+  constexpr int block = 128;
+  const int n = static_cast<int>(lower.rows());
+  MatrixX product = MatrixX::Zero(n, n);
+  const double one = 1, none = 0;
+  for (int first = 0; first < n; first += block) {
+    const int width = std::min(block, n - first), rows = n - first, inner = first + width;
+    dgemm_("N", "T", &rows, &width, &inner, &one, lower.data() + first, &n, lower.data() + first, &n, &none,
+           product.data() + static_cast<std::ptrdiff_t>(first) * n + first, &n);
+  }
+  return product;
+}
+
 } // namespace
 
 SchurWindow::SchurWindow(const SparseMatrix& lower, int changing, int room, int contact)
@@ -70,8 +87,7 @@ SchurWindow::SchurWindow(const SparseMatrix& lower, int changing, int room, int 
   cholesky_ = factor_ordered(lower);
   const int window = changing + contact;
   trailing_ = cholesky_->trailing(window);
-  MatrixX product = trailing_.transpose();
-  triangular_product(false, trailing_, product);
+  const MatrixX product = lower_square(trailing_);
   const int slots = window + room;
   schur_ = MatrixX::Zero(slots, slots);
   active_.assign(slots, 0);
