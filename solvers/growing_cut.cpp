@@ -24,10 +24,17 @@ namespace {
 /// the sphere radius. What their spheres covered or will cover changes too.
 constexpr double node_margin = 0.35;
 
+/// Nodes are exchanged so far from new faces, in spacings (extend_sprinkling), and are nearest to places a little
+/// farther away.
+constexpr double exchange_reach = 3;
+
 /// Shares of the surface about some nodes are found from the surface this far around them, in spacings.
 constexpr double shares_reach = 4;
 /// A share itself changes when faces or surface nodes come this near to it, in spacings.
 constexpr double share_size = 2;
+
+/// Of a sphere radius: eyes at a bulging face are lifted off it before they look (cut_sight.cpp), by 0.05 at both ends.
+constexpr double looking_around = 1.1;
 
 /// Points of a sheet no farther than `spacing` apart, m: corners and midpoints of its triangles, divided as needed.
 std::vector<Vector3> sample_points(const topology::SurfaceMesh& sheet, std::size_t first_triangle, double spacing) {
@@ -72,12 +79,35 @@ bool continues(const topology::Incision* before, const topology::Incision& now) 
   return true;
 }
 
+NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed) {
+  NodeCloud present;
+  for (int i = 0; i < nodes.size(); ++i)
+    if (removed[i] == 0)
+      present.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+  return present;
+}
+
+/// Spacing of the present node nearest to a place.
+class SpacingAt {
+ public:
+  SpacingAt(const NodeCloud& nodes, const std::vector<char>& removed) : SpacingAt(present_nodes(nodes, removed)) {}
+  [[nodiscard]] double operator()(const Vector3& x) const {
+    return spacings_[static_cast<std::size_t>(tree_.nearest(x).index)];
+  }
+
+ private:
+  explicit SpacingAt(const NodeCloud& present) : spacings_(present.spacings), tree_(present.positions) {}
+  std::vector<double> spacings_;
+  topology::PointTree tree_;
+};
+
 /// Where the cut differs: the new faces, and the front that was or has come.
 struct Changes {
   std::vector<Vector3> faces, front;
 };
 
-Changes changes_between(const topology::Incision* before, const topology::Incision& now, double spacing) {
+Changes changes_between(const topology::Incision* before, const SpacingAt& spacing_before,
+                        const topology::Incision& now, const SpacingAt& spacing_now, double spacing) {
   Changes changes;
   for (std::size_t s = 0; s < now.sheets().size(); ++s) {
     const std::size_t known =
@@ -85,16 +115,17 @@ Changes changes_between(const topology::Incision* before, const topology::Incisi
     const std::vector<Vector3> points = sample_points(now.sheets()[s], known, spacing);
     changes.faces.insert(changes.faces.end(), points.begin(), points.end());
   }
-  using Ends = std::array<double, 6>;
-  const auto ends = [](const topology::FrontSegment& f) {
-    return Ends{f.from.x(), f.from.y(), f.from.z(), f.to.x(), f.to.y(), f.to.z()};
+  // The reach of the enrichment goes with the spacing of the node nearest to a segment, so that counts too.
+  using Ends = std::array<double, 7>;
+  const auto ends = [](const topology::FrontSegment& f, const SpacingAt& spacing_at) {
+    return Ends{f.from.x(), f.from.y(), f.from.z(), f.to.x(), f.to.y(), f.to.z(), spacing_at(0.5 * (f.from + f.to))};
   };
   std::vector<Ends> old_front, new_front;
   if (before != nullptr)
     for (const topology::FrontSegment& segment : before->front())
-      old_front.push_back(ends(segment));
+      old_front.push_back(ends(segment, spacing_before));
   for (const topology::FrontSegment& segment : now.front())
-    new_front.push_back(ends(segment));
+    new_front.push_back(ends(segment, spacing_now));
   std::sort(old_front.begin(), old_front.end());
   std::sort(new_front.begin(), new_front.end());
   std::vector<Ends> different;
@@ -143,9 +174,9 @@ class Reach {
         continue;
       present.push_back(nodes[j]);
       present_radii_.push_back(radii[j]);
-      if (const double spare = radii[j] - to_faces_(nodes[j]) + slack; spare > 0)
+      if (const double spare = looking_around * radii[j] - to_faces_(nodes[j]) + slack; spare > 0)
         by_faces_.push_back({nodes[j], radii[j], spare});
-      if (const double spare = radii[j] - to_front_(nodes[j]) + slack; spare > 0)
+      if (const double spare = looking_around * radii[j] - to_front_(nodes[j]) + slack; spare > 0)
         by_front_.push_back({nodes[j], radii[j], spare});
     }
     present_.emplace(present);
@@ -186,14 +217,6 @@ class Reach {
   std::vector<Eye> by_faces_, by_front_;
   double slack_;
 };
-
-NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed) {
-  NodeCloud present;
-  for (int i = 0; i < nodes.size(); ++i)
-    if (removed[i] == 0)
-      present.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
-  return present;
-}
 
 /// The surface shared out among the present nodes, as the ordinary discretisation does it.
 struct Shares {
@@ -471,13 +494,25 @@ struct GrowingCut::State {
       contact.push_back(regional.patches.mean(regional.compact[node], *spheres, problem.prescribed_region));
   }
 
-  /// Whether an increment along `way` may change what lies within `half` of x, m.
-  [[nodiscard]] auto reach_of(const topology::SurfaceMesh& way) const {
+  /// Whether an increment along `way` may change what lies within `half` of x, m; also where the nodes that it
+  /// exchanges are of another spacing.
+  [[nodiscard]] auto reach_of(const topology::SurfaceMesh& way, bool nodes_may_coarsen) const {
     const double slack = 0.5 * *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
     const std::vector<Vector3> places = sample_points(way, 0, slack);
-    return [reach = std::make_shared<Reach>(places, places, problem.nodes.positions, spheres->radii(), slack),
-            radii = std::max(1 + node_margin, enrichment_reach())](const Vector3& x, double half) {
-      return reach->sees(x, half) || reach->near_faces(x, half, radii);
+    // The front of today near it: nodes that are exchanged there change the reach of its enrichment.
+    std::vector<Vector3> front = places;
+    if (problem.incision != nullptr && nodes_may_coarsen) {
+      const Nearness to_way(places);
+      const SpacingAt spacing_at(problem.nodes, removed);
+      for (const topology::FrontSegment& segment : problem.incision->front())
+        if (const Vector3 middle = 0.5 * (segment.from + segment.to);
+            to_way(middle) < exchange_reach * spacing_at(middle))
+          for (const Vector3& x : {segment.from, middle, segment.to})
+            front.push_back(x);
+    }
+    return [reach = std::make_shared<Reach>(places, front, problem.nodes.positions, spheres->radii(), slack),
+            margin = 1 + node_margin, enriched = std::max(1.0, enrichment_reach())](const Vector3& x, double half) {
+      return reach->sees(x, half) || reach->near_faces(x, half, margin) || reach->near_front(x, half, enriched);
     };
   }
 
@@ -527,7 +562,7 @@ void GrowingCut::State::condense_all() {
   boxes.clear();
   CellEvaluator evaluator(*spheres);
   std::vector<char> in_window(problem.nodes.size(), 0);
-  const auto in_reach = reach_of(options.way);
+  const auto in_reach = reach_of(options.way, true);
   for (const BackgroundBox& leaf : stiffness.cells.boxes) {
     Box box{leaf, {}, {}};
     if (in_reach(leaf.centre, leaf.half.norm()))
@@ -771,7 +806,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   const Stopwatch cell_watch;
   const double finest = *std::min_element(next.nodes.spacings.begin(), next.nodes.spacings.end());
   const double slack = 0.25 * finest;
-  const Changes changes = changes_between(before.get(), *incision, 2 * slack);
+  const Changes changes = changes_between(before.get(), SpacingAt(s.problem.nodes, s.removed), *incision,
+                                          SpacingAt(next.nodes, removed), 2 * slack);
   std::vector<int> new_slot = s.slot;
   for (int k = 0; k < change.added.size(); ++k)
     new_slot.push_back(s.next_room + k);
@@ -976,7 +1012,7 @@ double GrowingCut::prepare(const topology::SurfaceMesh& next) {
     if (const int block = s.slot[node]; block >= 0)
       std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
   };
-  const auto in_reach = s.reach_of(next);
+  const auto in_reach = s.reach_of(next, false);
   for (const State::Box& box : s.boxes)
     if (!box.cells.empty() && in_reach(box.box.centre, box.box.half.norm()))
       for (const CellShapes& cell : box.cells)

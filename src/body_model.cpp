@@ -11,8 +11,8 @@ namespace {
 
 constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
 constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
-constexpr double largest_share = 0.5;  // of the nodes in a window that is worth its while
-constexpr int room = 600;              // nodes that increments may add before the window is condensed anew
+constexpr double largest_share = 0.8;  // of the nodes in a window that is worth its while
+constexpr int room = 150;              // nodes that increments may add before the window is condensed anew
 constexpr double rim = 1e-2; // of its spacing: a lip node so near to the surface stands on the rim of its wound
 
 bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& nodes, int node) {
@@ -123,7 +123,11 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
     options.sight = *scenario.cut.sight;
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
   solvers::Problem problem = problem_of(scenario, domain, model);
-  if (way_ahead.triangles.empty() || solvers::window_share(problem, options, way_ahead) > largest_share)
+  model.not_following = way_ahead.triangles.empty() ? "the body was built without a cut ahead"
+                        : solvers::window_share(problem, options, way_ahead) > largest_share
+                            ? "the cut concerns most of the body"
+                            : "";
+  if (model.not_following[0] != '\0')
     model.body = solvers::discretise(std::move(problem), options);
   else
     model.body = std::make_unique<solvers::GrowingBody>(
@@ -175,7 +179,7 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
                                BodyModel& after) {
   auto* body = dynamic_cast<solvers::GrowingBody*>(before.body.get());
   if (body == nullptr)
-    return {"the first cut after a full build", {}};
+    return {before.body == nullptr ? "the first cut" : before.not_following, {}};
   solvers::BodyGrowth growth = body->grow(change, problem_of(scenario, domain, after), way_ahead);
   if (growth.uncovered[0] != '\0')
     return growth;

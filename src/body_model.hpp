@@ -19,6 +19,7 @@ struct BodyModel {
   double coarseness = 1; // of its spacings, in those of the scenario
   std::vector<solvers::LipPair> pairs;
   std::unique_ptr<solvers::Discretisation> body; // null before the first load, touch or cut
+  const char* not_following = "";                // why the body cannot follow a cut; empty: it can
   solvers::Field base;                           // without tool and contact
   solvers::ContactPatch patch;                   // no nodes: the tool is far
   std::optional<solvers::LipPatch> lips;         // empty: no pair has had to be held yet

@@ -69,6 +69,10 @@ class Session {
   /// rotation of the tissue is then not watched.
   void set_force_only(bool on) { force_only_ = on; }
 
+  /// Off: every cut builds its system from scratch, on the nodes that an update would have; what updates are measured
+  /// by.
+  void set_updating(bool on) { updating_ = on; }
+
   /// Spacings `factor` times the scenario's from the next sprinkling on. Throws InputError unless it is positive.
   void coarsen(double factor);
 
@@ -130,6 +134,7 @@ class Session {
   std::vector<solvers::PointState> node_states_;
   VectorX node_displacements_; // m, 3 a node, in the last step
   bool force_only_ = false;
+  bool updating_ = true;
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;
 };

@@ -98,7 +98,7 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
   const double seen = solvers::sight_seconds();
   {
     const StageTimer timer(report.seconds.assembly);
-    if (change) {
+    if (change && updating_) {
       const StageTimer growth_timer(profile_.discretise);
       const solvers::BodyGrowth growth = follow_cut(scenario_, organ_.domain, *change, way_ahead, model_, next);
       report.update_reason = growth.uncovered;
@@ -108,7 +108,7 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
       }
     }
     if (next.body == nullptr)
-      assemble(next, hindrance.empty() ? way_ahead() : topology::SurfaceMesh{}, near);
+      assemble(next, change && updating_ ? way_ahead() : topology::SurfaceMesh{}, near);
   }
   report.seconds.visibility = solvers::sight_seconds() - seen;
   report.seconds.solve = next.body->report().factor_seconds;

@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <limits>
 #include <numeric>
+#include <thread>
 
 using namespace spherecut;
 using namespace spherecut::app;
@@ -46,6 +48,20 @@ const std::string topping = blade({"[-0.036, 0, 0.0151]", "[0.036, 0, 0.0153]"},
 std::string stretched(const std::string& text) {
   return replaced(text, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]");
 }
+
+// A bar of which the cut at one end concerns a part alone.
+const std::string long_block = stretched(replaced(
+    replaced(replaced(cut_block, "0.06, 0.06, 0.03]", "0.24, 0.03, 0.03]"), "0.005", "0.004"), "0.012", "0.01"));
+const std::string incision_at_end = R"([blade]
+edge = [[0, -0.006, 0], [0, 0.006, 0.001]]
+step = 0.2
+[[blade.path]]
+time = 0
+position = [-0.042, 0.001, 0.033]
+[[blade.path]]
+time = 1
+position = [-0.043, 0.001, 0.015]
+)";
 
 double total(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
@@ -218,6 +234,70 @@ TEST_CASE("More increments than memory allows are refused before the run") {
   CHECK_THROWS_WITH(
       session_of(cut_block + replaced(blade({"[0, 0, 9000]", "[0, 0, -9000]"}, 0.04, "0.5"), "step = 0.5\n", "")),
       Contains("case.toml:15") && Contains("triangles of cut") && Contains("500000"));
+}
+
+TEST_CASE("A body that follows the blade gives what building it anew at every cut gives") {
+  const std::string lips = GENERATE("open", "frictionless", "sticking");
+  const std::string text = long_block + "[cut]\nlips = \"" + lips + "\"\n" + incision_at_end;
+  Session updated = session_of(text);
+  Session rebuilt = session_of(text);
+  rebuilt.set_updating(false);
+  int updates = 0;
+  for (std::size_t i = 0; i < updated.steps().size(); ++i) {
+    const StepResult a = updated.step(updated.steps()[i]);
+    const StepResult b = rebuilt.step(rebuilt.steps()[i]);
+    REQUIRE(a.cut);
+    CHECK_FALSE(a.cut->refused);
+    updates += a.cut->update == SystemUpdate::updated ? 1 : 0;
+    CHECK(b.cut->update == (b.cut->triangles > 0 ? SystemUpdate::rebuilt : SystemUpdate::none));
+    CHECK(a.residual < 1e-9);
+    // The maps to rest differ by the finer cells that a rebuild has at the front, so the nodes beside the cut do too.
+    CHECK(a.nodes == b.nodes);
+    CHECK(a.cut->area == Approx(b.cut->area).epsilon(1e-3));
+    CHECK(a.cut->lip_pairs == b.cut->lip_pairs);
+    CHECK(a.cut->opening == Approx(b.cut->opening).epsilon(0.03).margin(2e-6));
+    CHECK(a.cut->opening_volume == Approx(b.cut->opening_volume).epsilon(0.03).margin(1e-10));
+    for (const Vector3& x : {Vector3(-0.03, 0.004, 0.02), Vector3(-0.05, -0.01, 0.025), Vector3(0.03, 0, 0.015)})
+      CHECK((updated.at(x).displacement - rebuilt.at(x).displacement).norm() <
+            0.01 * rebuilt.at(x).displacement.norm() + 1e-9);
+    CHECK(updated.body()->problem().nodes.positions == updated.sprinkling().nodes.positions);
+  }
+  CHECK(updates >= 2);
+}
+
+TEST_CASE("A refused cut leaves a body that has followed the blade as it was, and the next motion makes up for it") {
+  Session session = session_of(long_block + incision_at_end);
+  std::size_t i = 0;
+  for (; i < 4; ++i)
+    session.step(session.steps()[i]);
+  const VectorX coefficients = session.field().coefficients;
+  const auto nodes = session.sprinkling().nodes.positions;
+  const double area = session.incision()->area();
+  // A pose that no sweep can take.
+  StepSample bad = session.steps()[i];
+  bad.blade->position.x() = std::numeric_limits<double>::quiet_NaN();
+  const StepResult refused = session.step(bad);
+  REQUIRE(refused.cut->refused);
+  CHECK(refused.cut->update == SystemUpdate::none);
+  CHECK(session.field().coefficients == coefficients);
+  CHECK(session.sprinkling().nodes.positions == nodes);
+  CHECK(session.incision()->area() == area);
+}
+
+TEST_CASE("Sessions in two threads at once give the bits of one alone") {
+  const std::string text = long_block + incision_at_end;
+  const auto coefficients_of = [&](VectorX& result) {
+    Session session = session_of(text);
+    run(session);
+    result = session.field().coefficients;
+  };
+  VectorX alone, first, second;
+  coefficients_of(alone);
+  std::thread other([&] { coefficients_of(first); });
+  coefficients_of(second);
+  other.join();
+  CHECK(first == alone);
+  CHECK(second == alone);
 }
 
 TEST_CASE("The same cuts give the same bits") {

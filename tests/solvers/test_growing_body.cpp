@@ -1,0 +1,202 @@
+#include "solvers/growing_body.hpp"
+#include "topology/blade.hpp"
+#include "topology/cut_sheets.hpp"
+#include "topology/errors.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace spherecut;
+using namespace spherecut::solvers;
+
+namespace {
+
+constexpr double step = 0.004, depth = 0.0123;
+const Vector3 heading = Vector3(1, 0.083, 0).normalized();
+
+/// A block of 60 x 40 x 30 mm on its base, and an upright blade that runs into it from the side along a slanted line.
+struct Scene {
+  std::shared_ptr<const topology::Domain> domain =
+      topology::make_box_domain({-0.03, -0.02, -0.03}, {0.03, 0.02, 0}, 0.005);
+  topology::BladeSweep sweep;
+  SprinkleOptions sprinkling;
+  NodeCloud nodes;
+  double time = 0;
+  double lower_end;
+
+  explicit Scene(double lower = -depth)
+      : sweep({{{0, 0, lower}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.003}), lower_end(lower) {
+    for (int k = 0; k < 8; ++k)
+      advance();
+    sprinkling.spacing.fine = sprinkling.spacing.coarse = 0.006;
+    sprinkling.incision = sweep.incision();
+    nodes = sprinkle(*domain, sprinkling).nodes;
+  }
+
+  void advance() {
+    sweep.move_to({time, Vector3(-0.0341, 0.0013, 0) + time * step * heading});
+    time += 1;
+  }
+
+  [[nodiscard]] Problem problem() const {
+    Problem p;
+    p.domain = domain;
+    p.incision = sweep.incision();
+    p.nodes = nodes;
+    p.material = {5000, 0.4, 1000};
+    for (int i = 0; i < nodes.size(); ++i)
+      if ((nodes.kinds[i] == NodeKind::surface || nodes.kinds[i] == NodeKind::edge) &&
+          nodes.positions[i].z() < -0.03 + 1e-9)
+        p.prescribed.push_back({i, {true, true, true}, Vector3(1e-4, 0, 0)});
+    p.prescribed_region = [](const Vector3& x, const Vector3& normal) { return normal.z() < -0.5 && x.z() < -0.029; };
+    p.loads.initial_strain.diagonal() << 0, -0.05, 0;
+    p.loads.body_force = [](const Vector3& x) { return Vector3(200 * x.y(), 0, -3000); };
+    return p;
+  }
+
+  [[nodiscard]] GrowthOptions options() const {
+    GrowthOptions o;
+    o.method.support_radius = 1.8;
+    o.method.estimate_condition = false;
+    const Vector3 tip = Vector3(-0.0341, 0.0013, 0) + (time - 1) * step * heading;
+    o.way =
+        topology::make_rectangle_sheet(tip + 2 * step * heading + 0.5 * lower_end * Vector3::UnitZ(),
+                                       heading.cross(Vector3::UnitZ()), Vector3::UnitZ(), 6 * step, -lower_end, 0.002);
+    return o;
+  }
+
+  /// The blade goes on by one step; nodes are exchanged beside it.
+  SprinkleIncrement grow() {
+    const auto before = sweep.incision();
+    advance();
+    sprinkling.incision = sweep.incision();
+    SprinkleIncrement change = extend_sprinkling(*domain, sprinkling, nodes, before.get());
+    NodeCloud next;
+    std::size_t gone = 0;
+    for (int i = 0; i < nodes.size(); ++i)
+      if (gone < change.removed.size() && change.removed[gone] == i)
+        ++gone;
+      else
+        next.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+    for (int k = 0; k < change.added.size(); ++k)
+      next.add(change.added.positions[k], change.added.spacings[k], change.added.kinds[k], change.added.normals[k]);
+    nodes = std::move(next);
+    return change;
+  }
+
+  [[nodiscard]] int first(NodeKind kind) const {
+    for (int i = nodes.size(); i-- > 0;)
+      if (nodes.kinds[i] == kind && nodes.positions[i].z() > -0.029)
+        return i;
+    throw std::logic_error("no such node");
+  }
+};
+
+Vector3 sum(const std::vector<Vector3>& forces) {
+  Vector3 total = Vector3::Zero();
+  for (const Vector3& force : forces)
+    total += force;
+  return total;
+}
+
+} // namespace
+
+TEST_CASE("A body that has followed its cut is in balance and equals the body built anew") {
+  Scene scene;
+  GrowingBody body(scene.problem(), scene.options());
+  for (int increment = 0; increment < 3; ++increment) {
+    const SprinkleIncrement change = scene.grow();
+    const BodyGrowth growth = body.grow(change, scene.problem());
+    INFO(growth.uncovered << growth.update.reason);
+    REQUIRE(std::string(growth.uncovered).empty());
+    CHECK_FALSE(growth.update.condensed_anew);
+    REQUIRE(body.problem().nodes.positions == scene.nodes.positions);
+    const Field field = body.solve();
+    CHECK(body.residual(field, {}, {}) < 1e-10);
+    CHECK(body.report().unknowns == 3 * scene.nodes.size());
+
+    // The dense system from scratch on the same cells, and the ordinary body, whose cells are finer at the new front.
+    const GrowingCut::Scratch scratch = body.system().from_scratch({});
+    CHECK((body.system().coefficients({}) - scratch.coefficients).norm() < 1e-9 * scratch.coefficients.norm());
+    DiscretisationOptions method = scene.options().method;
+    const auto ordinary = discretise(scene.problem(), method);
+    const Field expected = ordinary->solve();
+    CHECK((field.coefficients - expected.coefficients).norm() < 0.01 * expected.coefficients.norm());
+    const Vector3 inside(0.013, -0.011, -0.012);
+    CHECK((body.at(inside, field).displacement - ordinary->at(inside, expected).displacement).norm() <
+          0.005 * ordinary->at(inside, expected).displacement.norm());
+    CHECK((body.nodal_displacements(field) - ordinary->nodal_displacements(field)).norm() <
+          1e-12 * body.nodal_displacements(field).norm());
+
+    // Forces on a lip, a surface node of the window or far from it.
+    for (const int node :
+         {scene.first(NodeKind::lip), scene.first(NodeKind::surface), scene.first(NodeKind::edge), 0}) {
+      if (scene.nodes.kinds[node] == NodeKind::interior || scene.nodes.positions[node].z() < -0.029)
+        continue;
+      const std::vector<Field> responses = body.force_responses({node});
+      for (int axis = 0; axis < 3; ++axis) {
+        CHECK(body.residual(responses[axis], {node}, {Vector3::Unit(axis)}) < 1e-9);
+        CHECK(body.residual(responses[axis], {}, {}) > 1e-3);
+        CHECK((sum(body.constraint_forces(responses[axis])) + Vector3::Unit(axis)).norm() < 1e-8);
+      }
+      CHECK((body.contact_point(node) - ordinary->contact_point(node)).norm() < 1e-15);
+    }
+    std::vector<Vector3> moved(scene.problem().prescribed.size(), Vector3(1, 2, 3));
+    const Field rigid = body.prescribed_response(moved);
+    CHECK((body.at(inside, rigid).displacement - Vector3(1, 2, 3)).norm() < 1e-8);
+  }
+}
+
+TEST_CASE("A spread force on a followed body does as much work as the point force it is near to") {
+  Scene scene;
+  GrowingBody body(scene.problem(), scene.options());
+  const SprinkleIncrement change = scene.grow();
+  static_cast<void>(body.grow(change, scene.problem()));
+  const ForcePattern a{{{0.01, 0.002, -0.01}, {0.012, 0.001, -0.011}}, {{0.5, 0, 0.2}, {0.5, 0.1, 0}}};
+  const ForcePattern b{{{-0.01, -0.01, -0.005}}, {{0, 0, -1}}};
+  const std::vector<Field> responses = body.pattern_responses({a, b});
+  const MatrixX conjugate = body.pattern_displacements({a, b}, responses);
+  CHECK(conjugate(0, 1) == Approx(conjugate(1, 0)).epsilon(1e-9)); // Betti
+  const Vector3 u = body.at(b.points[0], responses[1]).displacement;
+  CHECK(conjugate(1, 1) == Approx(-u.z()).epsilon(1e-12));
+}
+
+TEST_CASE("A piece that comes free is not covered, and the body stays what it was") {
+  Scene scene(-0.034); // through the whole height
+  Problem problem = scene.problem();
+  // Held at one end alone, the other half of the block comes free when the blade has passed.
+  const auto at_end = [](const Vector3& x) { return x.y() > 0.02 - 1e-9; };
+  const auto held_end = [&] {
+    Problem p = scene.problem();
+    p.prescribed.clear();
+    for (int i = 0; i < p.nodes.size(); ++i)
+      if ((p.nodes.kinds[i] == NodeKind::surface || p.nodes.kinds[i] == NodeKind::edge) && at_end(p.nodes.positions[i]))
+        p.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+    p.prescribed_region = [](const Vector3& x, const Vector3& normal) { return normal.y() > 0.5 && x.y() > 0.019; };
+    return p;
+  };
+  GrowingBody body(held_end(), scene.options());
+  VectorX before = body.solve().coefficients;
+  bool freed = false;
+  for (int k = 0; k < 12 && !freed; ++k) {
+    const SprinkleIncrement change = scene.grow();
+    const BodyGrowth growth = body.grow(change, held_end(), [&] { return scene.options().way; });
+    freed = std::string(growth.uncovered) == "a piece came free";
+    if (!freed) {
+      CHECK(body.residual(body.solve(), {}, {}) < 1e-8);
+      before = body.solve().coefficients;
+    }
+  }
+  CHECK(freed);
+  CHECK(body.solve().coefficients == before);
+}
+
+TEST_CASE("A followed body refuses a change that does not fit its nodes") {
+  Scene scene;
+  GrowingBody body(scene.problem(), scene.options());
+  Problem same = scene.problem();
+  SprinkleIncrement change;
+  change.removed = {scene.nodes.size()};
+  CHECK_THROWS_AS(body.grow(change, same), InputError);
+  change.removed = {1};
+  CHECK_THROWS_WITH(body.grow(change, same), Catch::Contains("stay"));
+}
