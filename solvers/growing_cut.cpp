@@ -140,6 +140,17 @@ Changes changes_between(const topology::Incision* before, const SpacingAt& spaci
   return changes;
 }
 
+/// Places on the front of an incision (null: none) no farther than `spacing` apart.
+void add_front(const topology::Incision* incision, double spacing, std::vector<Vector3>& places) {
+  if (incision == nullptr)
+    return;
+  for (const topology::FrontSegment& segment : incision->front()) {
+    const int parts = std::max(1, static_cast<int>(std::ceil((segment.to - segment.from).norm() / spacing)));
+    for (int k = 0; k <= parts; ++k)
+      places.push_back(segment.from + (segment.to - segment.from) * k / parts);
+  }
+}
+
 /// Distance to the nearest of some points, infinite when there are none.
 class Nearness {
  public:
@@ -165,9 +176,10 @@ class Nearness {
 class Reach {
  public:
   /// `radii` of the spheres about `nodes`, 0: absent. `slack` m: how far places between the given ones may be off.
-  Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front, const std::vector<Vector3>& nodes,
-        const std::vector<double>& radii, double slack)
-      : to_faces_(faces), to_front_(front), slack_(slack) {
+  /// `all_front`: all there is of the front, changed or not; `enriched`: reach of its enrichment in sphere radii.
+  Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front, const std::vector<Vector3>& all_front,
+        double enriched, const std::vector<Vector3>& nodes, const std::vector<double>& radii, double slack)
+      : to_faces_(faces), to_front_(front), to_all_(all_front), enriched_(enriched), slack_(slack) {
     std::vector<Vector3> present;
     for (std::size_t j = 0; j < nodes.size(); ++j) {
       if (!(radii[j] > 0))
@@ -178,19 +190,26 @@ class Reach {
         by_faces_.push_back({nodes[j], radii[j], spare});
       if (const double spare = looking_around * radii[j] - to_front_(nodes[j]) + slack; spare > 0)
         by_front_.push_back({nodes[j], radii[j], spare});
+      // The branch functions at a node are those of the front nearest to it.
+      if (const double distance = to_front_(nodes[j]);
+          enriched > 0 && distance < (2 * enriched + 1) * radii[j] && distance < to_all_(nodes[j]) + 2 * slack)
+        by_branch_.push_back({nodes[j], radii[j], 0});
     }
     present_.emplace(present);
   }
 
-  /// Whether something within `half` m of x sees or is hidden differently.
+  /// Whether something within `half` m of x sees or is hidden differently, or is enriched by other functions.
   [[nodiscard]] bool sees(const Vector3& x, double half) const {
     const double faces = to_faces_(x) - half - slack_, front = to_front_(x) - half - slack_;
-    const auto concerns = [&](const std::vector<Eye>& eyes, double distance) {
-      return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) {
-        return distance < eye.spare && (eye.position - x).squaredNorm() < (eye.radius + half) * (eye.radius + half);
-      });
+    const auto holds = [&](const Eye& eye) {
+      return (eye.position - x).squaredNorm() < (eye.radius + half) * (eye.radius + half);
     };
-    return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front);
+    const auto concerns = [&](const std::vector<Eye>& eyes, double distance) {
+      return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) { return distance < eye.spare && holds(eye); });
+    };
+    return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front) ||
+           (!by_branch_.empty() && to_all_(x) - half - slack_ < enriched_ * radius_beside(to_all_, x) &&
+            std::any_of(by_branch_.begin(), by_branch_.end(), holds));
   }
   /// Whether a place within `half` m of x is nearer to the front, or to the faces, than `radii` sphere radii there.
   [[nodiscard]] bool near_front(const Vector3& x, double half, double radii) const {
@@ -211,10 +230,11 @@ class Reach {
     return place ? present_radii_[static_cast<std::size_t>(present_->nearest(*place).index)] : 0;
   }
 
-  Nearness to_faces_, to_front_;
+  Nearness to_faces_, to_front_, to_all_;
+  double enriched_;
   std::optional<topology::PointTree> present_;
   std::vector<double> present_radii_;
-  std::vector<Eye> by_faces_, by_front_;
+  std::vector<Eye> by_faces_, by_front_, by_branch_;
   double slack_;
 };
 
@@ -510,7 +530,10 @@ struct GrowingCut::State {
           for (const Vector3& x : {segment.from, middle, segment.to})
             front.push_back(x);
     }
-    return [reach = std::make_shared<Reach>(places, front, problem.nodes.positions, spheres->radii(), slack),
+    std::vector<Vector3> all_front = front;
+    add_front(problem.incision.get(), slack, all_front);
+    return [reach = std::make_shared<Reach>(places, front, all_front, enrichment_reach(), problem.nodes.positions,
+                                            spheres->radii(), slack),
             margin = 1 + node_margin, enriched = std::max(1.0, enrichment_reach())](const Vector3& x, double half) {
       return reach->sees(x, half) || reach->near_faces(x, half, margin) || reach->near_front(x, half, enriched);
     };
@@ -828,7 +851,10 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   std::vector<double> radii = fresh_spheres->radii();
   for (std::size_t i = 0; i < old_radii.size(); ++i)
     radii[i] = std::max(radii[i], old_radii[i]);
-  const Reach reach(changes.faces, changes.front, next.nodes.positions, radii, slack);
+  std::vector<Vector3> all_front = changes.front;
+  add_front(before.get(), 2 * slack, all_front);
+  add_front(incision.get(), 2 * slack, all_front);
+  const Reach reach(changes.faces, changes.front, all_front, s.enrichment_reach(), next.nodes.positions, radii, slack);
   std::vector<std::pair<Vector3, double>> balls;
   for (int i : changed_nodes) {
     const double radius = std::max(i < std::ssize(old_radii) ? old_radii[i] : 0.0, fresh_spheres->radii()[i]);

@@ -142,7 +142,8 @@ TEST_CASE("A cut that grows in its window gives the system built from scratch", 
     CHECK(report.boxes > 0);
     CHECK(report.factored > 0);
     CHECK(report.factored <= cut.window_unknowns());
-    if (increment != 1)
+    // The enrichment reaches through so small a block: even a wrong guess leaves enough of it.
+    if (increment == 0 || (increment == 2 && rule != SightRule::enriched))
       CHECK_FALSE(report.prepared);
     check_against_scratch(cut, options.contact.size());
   }

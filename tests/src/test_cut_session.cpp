@@ -236,33 +236,47 @@ TEST_CASE("More increments than memory allows are refused before the run") {
       Contains("case.toml:15") && Contains("triangles of cut") && Contains("500000"));
 }
 
-TEST_CASE("A body that follows the blade gives what building it anew at every cut gives") {
+TEST_CASE("A body that follows the blade gives what building it anew on the same nodes gives") {
   const std::string lips = GENERATE("open", "frictionless", "sticking");
-  const std::string text = long_block + "[cut]\nlips = \"" + lips + "\"\n" + incision_at_end;
-  Session updated = session_of(text);
-  Session rebuilt = session_of(text);
-  rebuilt.set_updating(false);
+  Session session = session_of(long_block + "[cut]\nlips = \"" + lips + "\"\n" + incision_at_end);
   int updates = 0;
-  for (std::size_t i = 0; i < updated.steps().size(); ++i) {
-    const StepResult a = updated.step(updated.steps()[i]);
-    const StepResult b = rebuilt.step(rebuilt.steps()[i]);
-    REQUIRE(a.cut);
-    CHECK_FALSE(a.cut->refused);
-    updates += a.cut->update == SystemUpdate::updated ? 1 : 0;
-    CHECK(b.cut->update == (b.cut->triangles > 0 ? SystemUpdate::rebuilt : SystemUpdate::none));
-    CHECK(a.residual < 1e-9);
-    // The maps to rest differ by the finer cells that a rebuild has at the front, so the nodes beside the cut do too.
-    CHECK(a.nodes == b.nodes);
-    CHECK(a.cut->area == Approx(b.cut->area).epsilon(1e-3));
-    CHECK(a.cut->lip_pairs == b.cut->lip_pairs);
-    CHECK(a.cut->opening == Approx(b.cut->opening).epsilon(0.03).margin(2e-6));
-    CHECK(a.cut->opening_volume == Approx(b.cut->opening_volume).epsilon(0.03).margin(1e-10));
+  for (const StepSample& sample : session.steps()) {
+    const StepResult result = session.step(sample);
+    REQUIRE(result.cut);
+    CHECK_FALSE(result.cut->refused);
+    CHECK(result.residual < 1e-9);
+    if (result.cut->triangles == 0)
+      continue;
+    updates += result.cut->update == SystemUpdate::updated ? 1 : 0;
+    CHECK(session.body()->problem().nodes.positions == session.sprinkling().nodes.positions);
+    solvers::DiscretisationOptions method = session.scenario().method;
+    method.unheld = session.scenario().cut.unheld;
+    const auto anew = solvers::discretise(session.body()->problem(), method);
+    const solvers::Field expected = anew->solve();
+    const solvers::Field followed = session.body()->solve();
+    // A new body has finer cells at the front as it is now.
+    CHECK((followed.coefficients - expected.coefficients).norm() < 2e-3 * expected.coefficients.norm());
     for (const Vector3& x : {Vector3(-0.03, 0.004, 0.02), Vector3(-0.05, -0.01, 0.025), Vector3(0.03, 0, 0.015)})
-      CHECK((updated.at(x).displacement - rebuilt.at(x).displacement).norm() <
-            0.01 * rebuilt.at(x).displacement.norm() + 1e-9);
-    CHECK(updated.body()->problem().nodes.positions == updated.sprinkling().nodes.positions);
+      CHECK((session.body()->at(x, followed).displacement - anew->at(x, expected).displacement).norm() <
+            1e-3 * expected.coefficients.lpNorm<Eigen::Infinity>());
   }
   CHECK(updates >= 2);
+  CHECK(session.field().coefficients.norm() > 0);
+}
+
+TEST_CASE("A run whose systems are updated tells of about the same wound as one that rebuilds them") {
+  Session updated = session_of(long_block + incision_at_end);
+  Session rebuilt = session_of(long_block + incision_at_end);
+  rebuilt.set_updating(false);
+  const std::vector<StepResult> a = run(updated);
+  const std::vector<StepResult> b = run(rebuilt);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    CHECK(b[i].cut->update == (b[i].cut->triangles > 0 ? SystemUpdate::rebuilt : SystemUpdate::none));
+    // The maps to rest differ by the finer cells that a rebuild has at the front, so nodes beside the cut may too.
+    CHECK(a[i].cut->area == Approx(b[i].cut->area).epsilon(2e-3));
+    CHECK(a[i].cut->pieces == b[i].cut->pieces);
+    CHECK(a[i].cut->opening == Approx(b[i].cut->opening).epsilon(0.1).margin(2e-6));
+  }
 }
 
 TEST_CASE("A refused cut leaves a body that has followed the blade as it was, and the next motion makes up for it") {
