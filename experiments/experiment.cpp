@@ -37,6 +37,7 @@ const std::vector<Experiment>& all_experiments() {
       {"precut_penny", "a disc-shaped crack under pressure and under tilted tension", run_precut_penny},
       {"precut_edge", "stress intensity of an edge-notched strip", run_precut_edge},
       {"precut_beam", "compliance of a double cantilever", run_precut_beam},
+      {"cutting_force", "force of a blade: steady cutting, first rupture, balance of work", run_cutting_force},
       {"sever", "a body cut in two: no coupling, rigid motions", run_sever},
       {"sif", "stress intensities and release rate along straight and round fronts", run_sif},
       {"kink", "the direction in which a front in mixed mode tears on", run_kink},

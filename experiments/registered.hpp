@@ -22,6 +22,7 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context);
 std::vector<Check> run_sif(const ExperimentContext& context);
 std::vector<Check> run_kink(const ExperimentContext& context);
 std::vector<Check> run_penny_growth(const ExperimentContext& context);
+std::vector<Check> run_cutting_force(const ExperimentContext& context);
 std::vector<Check> run_sever(const ExperimentContext& context);
 std::vector<Check> run_extrapolation(const ExperimentContext& context);
 std::vector<Check> run_force_continuity(const ExperimentContext& context);

@@ -120,6 +120,10 @@ TEST_CASE("Quick double cantilever: compliance") {
   require_quick_run_passes("precut_beam");
 }
 
+TEST_CASE("Quick cutting force: steady force, first rupture, balance of work") {
+  require_quick_run_passes("cutting_force");
+}
+
 TEST_CASE("Quick severed cube: no coupling, rigid motions") {
   require_quick_run_passes("sever");
 }

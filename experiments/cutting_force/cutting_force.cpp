@@ -1,0 +1,227 @@
+// Problem:   a block 4 x 0.4 x 2 m (E = 1 Pa, nu = 0.3) between two held faces; a straight blade is pushed into its
+// free
+//            end and cuts it along its middle, in a plane that is tilted and shifted. The contact of the edge is 2, 2.8
+//            and 4 spacings wide (half width), the same in metres. Lips in frictionless contact.
+// Reference: the force of steady cutting, G_c times the width of the front; the force and depth of the first rupture on
+//            other spacings; work = G_c area + stored energy + friction.
+// Command:   spherecut experiment run cutting_force --out DIR
+#include "experiments/cutting_force/block.hpp"
+#include "experiments/registered.hpp"
+
+#include "src/figure.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace spherecut::experiments {
+
+namespace {
+
+using solvers::BladeState;
+
+constexpr double toughness = 0.33; // J/m2: 0.3 m of plane modulus
+constexpr double first_reach = 2;  // m, no first cut comes later
+constexpr double blunt_sharpness = 0.75;
+constexpr double stroke = 0.05; // m, of the blade between two looks
+
+struct Rupture {
+  double length = 0, blade = std::numeric_limits<double>::infinity(), force = 0; // m, m, N
+};
+
+/// The first cut: of all lengths, the one whose energy is there first.
+Rupture first_rupture(const CuttingBody& uncut, const std::vector<CuttingBody>& cuts, double needed_per_depth) {
+  Rupture first;
+  for (const CuttingBody& cut : cuts)
+    for (double blade = 0; blade < std::min(first_reach, first.blade); blade += stroke)
+      if (const auto share = solvers::cutting_share(uncut.patch, uncut.stroke(blade, blade + stroke), cut.patch,
+                                                    cut.stroke(blade, blade + stroke), needed_per_depth * cut.depth)) {
+        if (const double at = blade + *share * stroke; at < first.blade)
+          first = {cut.depth, at, push_blade(uncut.patch, uncut.advance(at)).edge_force.norm()};
+        break;
+      }
+  if (first.length == 0)
+    throw NumericalError(fmt::format("the blade does not cut within {} m", first_reach));
+  return first;
+}
+
+std::vector<CuttingBody> cut_to(const CuttingCase& block, const CuttingBody& uncut, const std::vector<double>& depths) {
+  std::vector<CuttingBody> cuts;
+  for (const double depth : depths)
+    cuts.push_back(cutting_body(block, depth, &uncut.nodes));
+  return cuts;
+}
+
+/// A whole cut: from the first touch to a depth, increment by increment.
+struct Run {
+  std::vector<double> blade, force; // m, N: of the blade
+  double steady = 0;                // N, mean over the way of the blade while the front is far from both ends
+  double rupture_force = 0, rupture_blade = 0, after_rupture = 0;
+  solvers::BladeLedger ledger;
+};
+
+class Cutting {
+ public:
+  Cutting(CuttingCase block, double first, double increment, double sharpness)
+      : block_(std::move(block)), increment_(increment), sharpness_(sharpness), now_(cutting_body(block_, 0, nullptr)),
+        next_(cutting_body(block_, first, &now_.nodes)), state_(push_blade(now_.patch, now_.advance(0))) {}
+
+  Run to(double depth, double steady_from) {
+    double steady_work = 0, steady_way = 0, pending_work = 0, pending_way = 0;
+    while (now_.depth < depth) {
+      if (blade_ > depth + first_reach)
+        throw NumericalError(fmt::format("the blade has gone {:.2f} m and cut {:.2f} m", blade_, now_.depth));
+      const double drag = block_.shear > 0 && now_.depth > 0 ? 1 : 0;
+      const double needed = toughness / sharpness_ * (next_.depth - now_.depth) * block_.front();
+      const auto way = now_.stroke(blade_, blade_ + stroke);
+      const auto share =
+          solvers::cutting_share(now_.patch, way, next_.patch, next_.stroke(blade_, blade_ + stroke), needed, drag);
+      const double reached = blade_ + stroke * share.value_or(1);
+      advance(reached, drag);
+      pending_work += 0.5 * (force_before_ + run_.force.back()) * (reached - blade_);
+      pending_way += reached - blade_;
+      blade_ = reached;
+      if (!share)
+        continue;
+      cut();
+      if (now_.depth - increment_ >= steady_from) { // whole increments, from one cut to the next
+        steady_work += pending_work;
+        steady_way += pending_way;
+      }
+      pending_work = pending_way = 0;
+    }
+    run_.steady = steady_work / steady_way;
+    return run_;
+  }
+
+ private:
+  /// Moves the blade in short parts, so that the forces change evenly over each.
+  void advance(double reached, double drag) {
+    constexpr int parts = 20;
+    force_before_ = -state_.blade_force.x();
+    for (int k = 1; k <= parts; ++k) {
+      const double at = blade_ + (reached - blade_) * k / parts;
+      const BladeState next = push_blade(now_.patch, now_.advance(at), drag);
+      run_.ledger.move(now_.patch, state_, next, (reached - blade_) / parts);
+      state_ = next;
+    }
+    note(reached);
+  }
+
+  void cut() {
+    if (now_.depth == 0) {
+      run_.rupture_force = -state_.blade_force.x();
+      run_.rupture_blade = blade_;
+    }
+    const double area = (next_.depth - now_.depth) * block_.front();
+    const BladeState after = push_blade(next_.patch, next_.advance(blade_), block_.shear > 0 ? 1 : 0);
+    run_.ledger.cut(state_, after, toughness, sharpness_, area);
+    state_ = after;
+    if (now_.depth == 0)
+      run_.after_rupture = -state_.blade_force.x();
+    now_ = std::move(next_);
+    next_ = cutting_body(block_, now_.depth + increment_, &now_.nodes);
+    note(blade_);
+  }
+
+  void note(double blade) {
+    run_.blade.push_back(blade);
+    run_.force.push_back(-state_.blade_force.x());
+  }
+
+  CuttingCase block_;
+  double increment_, sharpness_;
+  CuttingBody now_, next_;
+  BladeState state_;
+  double blade_ = 0, force_before_ = 0;
+  Run run_;
+};
+
+} // namespace
+
+std::vector<Check> run_cutting_force(const ExperimentContext& context) {
+  const std::vector<double> spacings =
+      context.quick ? std::vector<double>{0.1, 0.1 / 1.4} : std::vector<double>{0.1, 0.1 / 1.4, 0.05};
+  const std::vector<double> lengths =
+      context.quick ? std::vector<double>{0.2, 0.4} : std::vector<double>{0.1, 0.2, 0.3, 0.4, 0.5};
+  const double steady_from = context.quick ? 1.2 : 1.4, depth = context.quick ? 1.6 : 2.2, increment = 0.1;
+  std::vector<Check> checks;
+  app::Table ruptures({"method", "spacing", "nodes", "length_m", "force_N", "blade_m"});
+  app::Table runs({"method", "sharpness", "shear_Pa", "steady_N", "wanted_N", "rupture_N", "after_rupture_N", "work_J",
+                   "surface_J", "crushing_J", "friction_J", "excess_J", "stored_J"});
+  app::Figure figure{
+      "Force of a blade that cuts a block", "blade [m]", "force / (toughness x width)", false, false, {}};
+  for (const solvers::Method method : {solvers::Method::galerkin, solvers::Method::collocation}) {
+    const std::string name(solvers::to_string(method));
+    double least_force = std::numeric_limits<double>::infinity(), most_force = 0, least_blade = least_force,
+           most_blade = 0;
+    std::array<double, 2> first_length{}; // of the ideal and the blunt edge on the coarsest nodes
+    for (const double spacing : spacings) {
+      CuttingCase block;
+      block.method = method;
+      block.spacing = spacing;
+      block.path = lengths.back();
+      const CuttingBody uncut = cutting_body(block, 0, nullptr);
+      const std::vector<CuttingBody> cuts = cut_to(block, uncut, lengths);
+      const Rupture rupture = first_rupture(uncut, cuts, toughness * block.front());
+      if (spacing == spacings.front())
+        first_length = {rupture.length, first_rupture(uncut, cuts, toughness / blunt_sharpness * block.front()).length};
+      least_force = std::min(least_force, rupture.force);
+      most_force = std::max(most_force, rupture.force);
+      least_blade = std::min(least_blade, rupture.blade);
+      most_blade = std::max(most_blade, rupture.blade);
+      ruptures.add({name, fmt::format("{:.4f}", spacing), fmt::format("{}", uncut.nodes.size()),
+                    fmt::format("{:.2f}", rupture.length), fmt::format("{:.5f}", rupture.force),
+                    fmt::format("{:.5f}", rupture.blade)});
+      context.say(fmt::format("{}, spacing {:.3f} m: {} nodes, first cut of {:.2f} m at {:.4f} N, {:.4f} m", name,
+                              spacing, uncut.nodes.size(), rupture.length, rupture.force, rupture.blade));
+    }
+    checks.push_back({"cutting_force_" + name + "_rupture_force_spread", most_force / least_force - 1, "<=", 0.05});
+    checks.push_back({"cutting_force_" + name + "_rupture_depth_spread", most_blade / least_blade - 1, "<=", 0.05});
+    for (const bool ideal : {true, false}) {
+      CuttingCase block;
+      block.method = method;
+      block.path = depth + increment;
+      const double sharpness = ideal ? 1 : blunt_sharpness;
+      if (!ideal) {
+        block.flank = 0.3;
+        block.shear = 0.05;
+      }
+      const Run run = Cutting(block, first_length[ideal ? 0 : 1], increment, sharpness).to(depth, steady_from);
+      const double cutting = toughness / sharpness * block.front();
+      const double wanted = cutting + 2 * block.shear * block.flank * block.front();
+      const solvers::BladeLedger& ledger = run.ledger;
+      const double spent = ledger.surface + ledger.crushing + ledger.friction + ledger.stored;
+      runs.add({name, fmt::format("{:g}", sharpness), fmt::format("{:g}", block.shear),
+                fmt::format("{:.5f}", run.steady), fmt::format("{:.5f}", wanted),
+                fmt::format("{:.5f}", run.rupture_force), fmt::format("{:.5f}", run.after_rupture),
+                fmt::format("{:.5f}", ledger.work), fmt::format("{:.5f}", ledger.surface),
+                fmt::format("{:.5f}", ledger.crushing), fmt::format("{:.5f}", ledger.friction),
+                fmt::format("{:.5f}", ledger.excess), fmt::format("{:.5f}", ledger.stored)});
+      context.say(
+          fmt::format("{}{}: steady force {:.4f} of {:.4f} N, rupture at {:.4f} N, then {:.4f} N; work {:.4f} J, "
+                      "spent and stored {:.4f} J",
+                      name, ideal ? "" : ", blunt and dragging", run.steady, wanted, run.rupture_force,
+                      run.after_rupture, ledger.work, spent));
+      const std::string prefix = "cutting_force_" + name + (ideal ? "" : "_blunt");
+      checks.push_back({prefix + "_steady", std::abs(run.steady / wanted - 1), "<=", 0.05});
+      checks.push_back({prefix + "_work_balance", std::abs(ledger.work - spent) / ledger.work, "<=", 0.05});
+      if (ideal)
+        checks.push_back({prefix + "_drop_at_rupture", run.rupture_force / run.after_rupture, ">=", 1.1});
+      app::Series series{name + (ideal ? "" : ", sharpness 0.75, friction"), run.blade, run.force,
+                         app::SeriesStyle::lines};
+      for (double& force : series.y)
+        force /= toughness * block.front();
+      figure.series.push_back(series);
+    }
+  }
+  ruptures.write(context.out / "ruptures.csv");
+  runs.write(context.out / "runs.csv");
+  app::write_png(figure, context.out / "force.png");
+  return checks;
+}
+
+} // namespace spherecut::experiments
