@@ -11,7 +11,7 @@ struct CuttingCase {
   double above = 0.03, tilt = 0.15;           // m, rad: of the plane of the cut against the middle of the block
   double path = 1.2;                          // m, nodes are fine as far as this
   double spacing = 0.1;                       // m, along the way
-  double half_width = 0.3;                    // m, of the edge's contact
+  double half_width = 0.35;                   // m, of the edge's contact
   double flank = 0, shear = 0;                // m behind the edge and Pa: friction
   solvers::Material material{1, 0.3, 0};
   solvers::Method method = solvers::Method::galerkin;
