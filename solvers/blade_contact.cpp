@@ -102,6 +102,7 @@ BladePatch condense_blade(const Discretisation& body, const Field& base, const s
   patch.pairs = pairs;
   patch.dragged = !drag.points.empty();
   std::vector<ForcePattern> patterns;
+  patterns.reserve(contacts.size() + pairs.size() + 1);
   for (const EdgeContact& contact : contacts)
     patterns.push_back(edge_pattern(contact, half_width, *body.problem().domain));
   for (const LipPair& pair : pairs)

@@ -39,7 +39,7 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
   snapshot.pose = state.pose;
   snapshot.force = state.tool_force;
   snapshot.reach = 0;
-  const auto size = static_cast<std::size_t>(3 * snapshot.count);
+  const auto size = 3 * static_cast<std::size_t>(snapshot.count);
   double skew = 0;
   snapshot.rest_sum = 0;
   snapshot.compliance_sum = 0;
