@@ -30,7 +30,9 @@ std::string_view cut_columns() {
   return "time_s,triangles,refused,sheets,area_m2,front_m,pieces,unheld,volumes_m3,opening_m,opening_volume_m3,lip_"
          "pairs,"
          "closed_pairs,lips_converged,nodes,kept_nodes,surface_hash,topology_s,level_sets_s,visibility_s,sprinkling_s,"
-         "assembly_s,solve_s,update,update_reason,reason\n";
+         "assembly_s,solve_s,update,update_reason,blade_force_x_N,blade_force_y_N,"
+         "blade_force_z_N,edge_force_N,advance_m,release_J_m2,work_J,surface_J,crushing_J,friction_J,excess_J,stored_J,"
+         "reason\n";
 }
 
 std::string hash_text(std::uint64_t hash) {
@@ -43,11 +45,14 @@ std::string cut_row(double time, const CutReport& r) {
     volumes += fmt::format("{}{:.12g}", volumes.empty() ? "" : ";", volume);
   return fmt::format(
       "{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
-      "{:.4g},{},{},{}\n",
+      "{:.4g},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{}\n",
       time, r.triangles, r.refused ? 1 : 0, r.sheets, r.area, r.front_length, r.pieces, r.unheld, volumes, r.opening,
       r.opening_volume, r.lip_pairs, r.closed_pairs, r.lips_converged ? 1 : 0, r.nodes, r.kept_nodes,
       hash_text(r.surface_hash), r.seconds.topology, r.seconds.level_sets, r.seconds.visibility, r.seconds.sprinkling,
-      r.seconds.assembly, r.seconds.solve, to_string(r.update), quoted(r.update_reason), quoted(r.reason));
+      r.seconds.assembly, r.seconds.solve, to_string(r.update), quoted(r.update_reason), r.blade.force.x(),
+      r.blade.force.y(), r.blade.force.z(), r.blade.edge_force, r.blade.advance, r.blade.release, r.blade.ledger.work,
+      r.blade.ledger.surface, r.blade.ledger.crushing, r.blade.ledger.friction, r.blade.ledger.excess,
+      r.blade.ledger.stored, quoted(r.reason));
 }
 
 void write_wound(const std::filesystem::path& file, const Session& session) {
@@ -110,7 +115,17 @@ std::vector<std::pair<std::string, Figure>> cut_figures(const std::vector<double
   area.y_label = "area [cm2], length [cm]";
   area.series = {over_time("area of the cut [cm2]", [&](std::size_t i) { return 1e4 * reports[i].area; }),
                  over_time("length of its front [cm]", [&](std::size_t i) { return 1e2 * reports[i].front_length; })};
-  return {{"opening.png", opening}, {"cut.png", area}};
+  std::vector<std::pair<std::string, Figure>> figures{{"opening.png", opening}, {"cut.png", area}};
+  if (std::any_of(reports.begin(), reports.end(),
+                  [](const CutReport& report) { return report.blade.edge_force > 0; })) {
+    Figure force;
+    force.title = "Force on the blade";
+    force.x_label = "time [s]";
+    force.y_label = "force [N]";
+    force.series = {over_time("force on the blade [N]", [&](std::size_t i) { return reports[i].blade.force.norm(); })};
+    figures.emplace_back("blade_force.png", force);
+  }
+  return figures;
 }
 
 double von_mises(const Matrix3& stress) {

@@ -93,6 +93,9 @@ BladeSettings blade(const Section& section, Offences& offences) {
                                "least {:g} m",
                                i, i + 1, (blade.edge[i] - blade.edge[i - 1]).norm(), shortest_edge));
   blade.edge_radius = section.number("edge_radius");
+  blade.sharpness = section.number("sharpness");
+  blade.friction = section.number("friction");
+  blade.flank = section.number("flank");
   blade.step = section.optional_number("step").value_or(0);
   blade.path = blade_path(section, offences);
   const double duration = blade.path.empty() ? 0 : blade.path.back().time - blade.path.front().time;

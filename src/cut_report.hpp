@@ -1,6 +1,7 @@
 // What a cut has come to: the numbers of cuts.csv.
 #pragma once
 
+#include "src/blade_force.hpp"
 #include "src/body_model.hpp"
 #include "topology/wound.hpp"
 
@@ -34,6 +35,7 @@ struct CutReport {
   std::string update_reason;      // why not merely updated
   RebuildSeconds seconds;         // of this step
   std::uint64_t surface_hash = 0; // of the wound at rest
+  BladeReport blade;              // where the tissue has a toughness
 };
 
 /// Volume between the faces of the cut, m3: the integral of the opening over the sheets, each face displaced as the

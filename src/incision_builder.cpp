@@ -111,6 +111,20 @@ void IncisionBuilder::update_fields() {
     fields_->update(incision_);
 }
 
+void IncisionBuilder::place(const topology::BladePose& pose, const topology::RestMap& to_rest) {
+  missed_.clear();
+  sweep_->lift();
+  sweep_->move_to(pose, to_rest);
+}
+
+void IncisionBuilder::go_back(const Mark& mark) {
+  sheets_before_ = mark.sheets;
+  incision_before_ = mark.incision;
+  sweep_before_ = mark.sweep;
+  missed_before_ = mark.missed;
+  take_back();
+}
+
 void IncisionBuilder::take_back() {
   const bool grew = incision_ != incision_before_;
   incision_ = incision_before_;

@@ -24,6 +24,19 @@ class IncisionBuilder {
   /// in between it starts there.
   topology::SweepResult move_to(const topology::BladePose& pose, const topology::RestMap& to_rest);
 
+  /// Places the blade; its next motion starts there.
+  void place(const topology::BladePose& pose, const topology::RestMap& to_rest);
+
+  /// The cut as it is, to go back to from further motions.
+  struct Mark {
+    std::vector<topology::SurfaceMesh> sheets;
+    std::shared_ptr<const topology::Incision> incision;
+    std::optional<topology::BladeSweep> sweep;
+    std::vector<topology::BladePose> missed;
+  };
+  [[nodiscard]] Mark mark() const { return {sheets(), incision_, sweep_, missed_}; }
+  void go_back(const Mark& mark);
+
   /// Brings the level sets to the incision. Throws InputError when they need too much memory.
   void update_fields();
   [[nodiscard]] const topology::CutFields& fields() const { return *fields_; }

@@ -44,6 +44,9 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     for (const double volume : cut.volumes)
       text += fmt::format(" {:.4g} ml", 1e6 * volume);
     text += fmt::format("; {} pairs of lip nodes, {} closed; {} nodes\n", cut.lip_pairs, cut.closed_pairs, cut.nodes);
+    if (session.blade() != nullptr)
+      text += fmt::format("  blade: work {:.3g} mJ, {:.3g} mJ of it on new surface of {:.4g} J/m2\n",
+                          1e3 * cut.blade.ledger.work, 1e3 * cut.blade.ledger.surface, session.scenario().toughness);
     if (found.refused_cuts > 0)
       text += fmt::format("  {} increments refused, see cuts.csv\n", found.refused_cuts);
   }
@@ -61,6 +64,8 @@ std::string step_text(const StepResult& step) {
     text += fmt::format(", force {:.4g} N", step.force.norm());
   if (step.cut)
     text += fmt::format(", cut {:.3g} cm2, open {:.2g} mm", 1e4 * step.cut->area, 1e3 * step.cut->opening);
+  if (step.cut && step.cut->blade.edge_force > 0)
+    text += fmt::format(", blade {:.2g} N", step.cut->blade.force.norm());
   return text;
 }
 

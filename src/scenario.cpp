@@ -187,6 +187,32 @@ bool FixedRegion::holds(const Vector3& x) const {
   return std::get<Plane>(shape).signed_distance(x) <= on_the_plane;
 }
 
+namespace {
+
+/// What a blade's force needs, and what needs a blade's force.
+void check_blade_force(const Scenario& scenario, const Section& root, Offences& offences) {
+  const Section section = root.table("blade");
+  const BladeSettings& blade = *scenario.blade;
+  const bool resists = scenario.toughness > 0;
+  for (const char* key : {"sharpness", "friction"})
+    if (!resists && section.has(key))
+      offences.add(section.line(key),
+                   fmt::format("blade.{} is given, but nothing resists the blade: material.toughness "
+                               "is left out; allowed: both or neither",
+                               key));
+  if (blade.friction > 0 && blade.flank == 0)
+    offences.add(section.line("friction"), fmt::format("blade.friction = {:g} Pa on flanks of no extent; allowed: with "
+                                                       "blade.flank above 0 m",
+                                                       blade.friction));
+  if (resists && scenario.method.method == solvers::Method::published)
+    offences.add(root.table("material").line("toughness"),
+                 fmt::format("material.toughness = {:g} J/m2: the force of a blade is in newtons, which method.name = "
+                             "\"published\" does not have; allowed: with galerkin or collocation",
+                             scenario.toughness));
+}
+
+} // namespace
+
 Scenario read_scenario(const std::filesystem::path& file) {
   const ScenarioDocument document(file);
   const Section& root = document.root();
@@ -198,6 +224,7 @@ Scenario read_scenario(const std::filesystem::path& file) {
   scenario.organ = organ(root.table("organ"), file, offences);
   const Section material = root.table("material");
   scenario.material = {material.number("young_modulus"), material.number("poisson_ratio"), material.number("density")};
+  scenario.toughness = material.optional_number("toughness").value_or(0);
   for (const Section& section : root.tables("fixed"))
     scenario.fixed.push_back(fixed_region(section, scenario.fixed.size() + 1, offences));
   if (scenario.fixed.empty())
@@ -223,6 +250,8 @@ Scenario read_scenario(const std::filesystem::path& file) {
   scenario.cut = cut(root.table("cut"));
   if (root.has("blade"))
     scenario.blade = blade(root.table("blade"), offences);
+  if (scenario.blade)
+    check_blade_force(scenario, root, offences);
   if (!scenario.tool && !scenario.blade && scenario.precuts.empty())
     offences.add(1, "there is no tool, no blade and no precut: nothing to compute; allowed: one of them or more");
   scenario.haptics = haptics(root.table("haptics"));

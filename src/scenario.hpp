@@ -101,6 +101,7 @@ struct Scenario {
   std::string title;
   OrganSettings organ;
   solvers::Material material;
+  double toughness = 0; // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
   std::vector<FixedRegion> fixed;
   NodeSettings nodes;
   solvers::DiscretisationOptions method;

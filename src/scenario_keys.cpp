@@ -56,6 +56,10 @@ constexpr std::array keys = {
                 "Poisson's ratio nu. Soft tissue: 0.45 to 0.49; 0.5 (incompressible) cannot be computed.",
                 from(0, 0.499)},
     ScenarioKey{"material.density", number, "kg/m3", "1060.0", "Mass density, used by gravity alone.", above(0, 1e5)},
+    ScenarioKey{"material.toughness", number, "J/m2", "",
+                "Energy that new cut takes, G_c: the blade deforms the tissue until that energy is there, and feels a "
+                "force. Liver: 76 to 225. Left out: the blade cuts whatever its edge sweeps, without resistance.",
+                above(0, 1e6)},
     ScenarioKey{
         "material.pretension", strain, "", "[0, 0, 0]",
         "Strain by which the tissue is stretched in its given shape, so that a cut gapes: xx, yy, zz, and, when "
@@ -264,6 +268,16 @@ constexpr std::array keys = {
     ScenarioKey{"blade.edge", points, "m", "required",
                 "Cutting edge in the blade's own frame, from end to end; two points or more.", from(-10, 10)},
     ScenarioKey{"blade.edge_radius", number, "m", "0.0001", "Radius of the cutting edge.", above(0, 0.01)},
+    ScenarioKey{"blade.sharpness", number, "", "1.0",
+                "Share of the edge's work that makes new surface; the rest is lost beside the cut. 1: ideally sharp. "
+                "Needs material.toughness.",
+                above(0, 1)},
+    ScenarioKey{"blade.friction", number, "Pa", "0.0",
+                "Shear by which the flanks of the blade drag the faces of the cut. Needs material.toughness and "
+                "blade.flank.",
+                from(0, 1e7)},
+    ScenarioKey{"blade.flank", number, "m", "0.0", "How far behind the edge the flanks touch the faces of the cut.",
+                from(0, 1)},
     ScenarioKey{"blade.step", number, "s", "",
                 "Time step; left out: such that the edge moves by about one spacing of the front in a step.", above(0)},
     ScenarioKey{"blade.path", array_of_tables, "", "required",

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
@@ -50,6 +51,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     incisions_->update_fields();
     check_pieces(steps_.front().time);
   }
+  make_blade_force();
   if (!touch_ && !cuts())
     return;
   if (touch_)
@@ -106,13 +108,18 @@ StepResult Session::step(const StepSample& sample) {
   }
   if (cuts())
     result.cut.emplace();
-  const bool solved = sample.blade && cut(sample, *result.cut);
+  if (without_blade_) {
+    model_.field = std::move(*without_blade_);
+    without_blade_.reset();
+  }
+  const bool solved = sample.blade && blade_force_ == nullptr && cut(sample, *result.cut);
   if (sample.blade)
     last_blade_ = sample.blade;
   // Without any load the organ keeps its rest shape until the tool is on it.
   const bool touched = touch_ && result.contact.depth > 0;
-  const bool loaded = (touch_ || cuts()) && (touched || model_.body != nullptr || scenario_.gravity ||
-                                             !scenario_.pretension.isZero() || model_.incision != nullptr);
+  const bool loaded =
+      (touch_ || cuts()) && (touched || model_.body != nullptr || scenario_.gravity || !scenario_.pretension.isZero() ||
+                             model_.incision != nullptr || blade_enters(sample));
   if (loaded) {
     if (model_.body == nullptr)
       build(model_);
@@ -123,6 +130,8 @@ StepResult Session::step(const StepSample& sample) {
       if (must_follow(centre))
         follow(sample, centre, result);
     }
+    if (blade_force_ != nullptr && sample.blade)
+      press_blade(sample, *result.cut);
     evaluate(result);
   }
   if (result.cut)
@@ -306,6 +315,10 @@ void Session::evaluate(StepResult& result) {
   node_displacements_ = model_.body->nodal_displacements(model_.field);
   if (!force_only_)
     result.residual = residual(model_);
+  if (blade_force_ != nullptr) {
+    solvers::Field bladed = blade_force_->field(model_);
+    without_blade_ = std::exchange(model_.field, std::move(bladed));
+  }
   if (!result.force.allFinite())
     throw NumericalError(fmt::format("the tool force at t = {:g} s is not finite; residual {:.1e}, condition estimate "
                                      "{:.1e}",

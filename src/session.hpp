@@ -3,6 +3,7 @@
 // and 3]. A cut goes before it: blade at rest, incision, wound, sprinkle, assemble.
 #pragma once
 
+#include "src/blade_force.hpp"
 #include "src/cut_report.hpp"
 #include "src/incision_builder.hpp"
 #include "src/node_zone.hpp"
@@ -78,10 +79,14 @@ class Session {
 
   /// Body, condensed patch and contact of the last step, for the haptic loop.
   [[nodiscard]] const BodyModel& model() const { return model_; }
+  /// What the blade feels; null: nothing resists it.
+  [[nodiscard]] const BladeForce* blade() const { return blade_force_.get(); }
   /// The cut so far; null: none.
   [[nodiscard]] const topology::Incision* incision() const { return model_.incision.get(); }
   /// The surface with the cut so far; in a scenario without cuts it is not made.
-  [[nodiscard]] const topology::Wound* wound() const { return cuts() ? &incisions_->wound() : nullptr; }
+  [[nodiscard]] const topology::Wound* wound() const {
+    return !cuts() ? nullptr : shown_wound_ ? &*shown_wound_ : &incisions_->wound();
+  }
   /// Displacement and stress at a point of the body in the last step; at rest before the first.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const { return model_.at(x); }
   /// Displacement, gradient and stress at every node in the last step.
@@ -110,7 +115,13 @@ class Session {
   bool cut(const StepSample& sample, CutReport& report);
   void build_cut(const StepSample& sample, const topology::RestMap& to_rest, BodyModel& next, CutReport& report);
   [[nodiscard]] std::vector<topology::BladePose> blade_ahead(const StepSample& sample) const;
-  [[nodiscard]] Vector3 rest_position(const Vector3& x) const;
+  [[nodiscard]] Vector3 rest_position(const Vector3& x) const { return rest_position(x, model_); }
+  [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
+  void make_blade_force();
+  [[nodiscard]] bool blade_enters(const StepSample& sample) const;
+  void press_blade(const StepSample& sample, CutReport& report);
+  [[nodiscard]] std::optional<BodyModel> propose_cut(const std::vector<topology::BladePose>& poses,
+                                                     const StepSample& sample, CutReport& report);
   void check_pieces(double time);
   void report_cut(CutReport& report) const;
   void evaluate(StepResult& result);
@@ -129,6 +140,10 @@ class Session {
   std::optional<topology::SurfaceContact> zone_contact_; // centre of the fine zone; empty: no tool touches
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
   BodyModel model_;
+  std::unique_ptr<BladeForce> blade_force_;     // null: nothing resists the blade
+  std::optional<IncisionBuilder::Mark> mark_;   // the cut without the blade's proposal
+  std::optional<topology::Wound> shown_wound_;  // the same as a surface; empty: there is no proposal
+  std::optional<solvers::Field> without_blade_; // field of model_ without blade; empty: that is model_.field
   std::optional<topology::SurfaceContact> last_contact_;
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
   std::vector<solvers::PointState> node_states_;

@@ -20,10 +20,10 @@ constexpr double same_place = 1e-6;       // of the fine spacing: nearer to its 
 
 // Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
 // its surface. A place in the opening of a cut, where there is no material, belongs to the sheet.
-Vector3 Session::rest_position(const Vector3& x) const {
+Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
   const topology::Domain& domain = *organ_.domain;
   const auto displacement = [&](const Vector3& rest) {
-    return at(domain.signed_distance(rest) <= 0 ? rest : domain.closest_surface_point(rest)).displacement;
+    return model.at(domain.signed_distance(rest) <= 0 ? rest : domain.closest_surface_point(rest)).displacement;
   };
   for (const double tolerance : {rest_tolerance, coarse_tolerance})
     try {
@@ -32,8 +32,8 @@ Vector3 Session::rest_position(const Vector3& x) const {
       if (tolerance == rest_tolerance)
         continue;
       Vector3 guess = x - displacement(x);
-      if (model_.incision != nullptr)
-        if (const auto on = model_.incision->closest(guess, gap_reach * zone_.spacing.fine))
+      if (model.incision != nullptr)
+        if (const auto on = model.incision->closest(guess, gap_reach * zone_.spacing.fine))
           return on->point;
       if (domain.signed_distance(guess) <= 0) // outside no material is cut
         throw;
@@ -198,7 +198,9 @@ void Session::check_pieces(double time) {
 }
 
 void Session::report_cut(CutReport& report) const {
-  const topology::Wound& wound = incisions_->wound();
+  const topology::Wound& wound = *this->wound();
+  if (blade_force_ != nullptr)
+    report.blade = blade_force_->report();
   if (model_.incision != nullptr) {
     report.area = model_.incision->area();
     report.front_length = model_.incision->front_length();

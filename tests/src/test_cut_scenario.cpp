@@ -99,6 +99,22 @@ TEST_CASE("Pretension is read as three normal or six components") {
   CHECK_THAT(complaint(with("[0.1, 0.2, 0.9]")), Contains("material.pretension") && Contains("<= 0.5"));
 }
 
+TEST_CASE("Toughness makes a blade that is resisted; without it there is none") {
+  const std::string edge = "[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\n";
+  const auto tough = [](const std::string& value) {
+    return replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = " + value);
+  };
+  CHECK(read(cut_block + edge + two_poses).toughness == 0);
+  const Scenario scenario = read(tough("50") + edge + "sharpness = 0.8\nfriction = 30\nflank = 0.004\n" + two_poses);
+  CHECK(scenario.toughness == 50);
+  CHECK(scenario.blade->sharpness == 0.8);
+  CHECK(scenario.blade->friction == 30);
+  CHECK(scenario.blade->flank == 0.004);
+  CHECK_THAT(complaint(tough("-1") + edge + two_poses), Contains("material.toughness") && Contains("0 < value"));
+  CHECK_THAT(complaint(tough("50") + "[method]\nname = \"published\"\n" + edge + two_poses),
+             Contains("material.toughness") && Contains("galerkin or collocation"));
+}
+
 TEST_CASE("Every offence of a cut names file, line, key, value and what is allowed") {
   struct Case {
     std::string addition;
@@ -137,6 +153,12 @@ TEST_CASE("Every offence of a cut names file, line, key, value and what is allow
        {":22:", "blade.path[2].position", "inf"}},
       {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nstep = 3\n" + two_poses, {":17:", "blade.step = 3 s", "1 s"}},
       {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nedge_radius = 0\n" + two_poses, {":17:", "edge_radius", "0 < value"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nsharpness = 0\n" + two_poses, {":17:", "sharpness", "0 < value <= 1"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nsharpness = 0.5\n" + two_poses,
+       {":17:", "blade.sharpness", "material.toughness"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nflank = 0.01\nfriction = 50\n" + two_poses,
+       {":18:", "blade.friction", "material.toughness"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nfriction = 50\n" + two_poses, {":17:", "no extent", "blade.flank"}},
   };
   for (const Case& c : cases) {
     const std::string said = complaint_about(c.addition);

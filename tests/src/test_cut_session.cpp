@@ -327,3 +327,48 @@ TEST_CASE("The same cuts give the same bits") {
   }
   CHECK(a.field().coefficients == b.field().coefficients);
 }
+
+TEST_CASE(
+    "A blade against tough tissue deforms it first, then cuts at toughness times width, and its work is accounted "
+    "for") {
+  const double toughness = 10, width = 0.06; // J/m2; m, of the block
+  const std::string text = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
+                           "[cut]\nfront_spacing = 0.004\n" +
+                           blade({"[0.004, 0, 0.031]", "[0.003, 0, 0.012]"}, 0.04, "0.125");
+  Session session = session_of(text);
+  const std::vector<StepResult> results = run(session);
+  double area = 0, before = 0;
+  bool cut = false;
+  for (const StepResult& result : results) {
+    const BladeReport& blade = result.cut->blade;
+    CHECK(result.cut->area >= area); // and it lags behind the blade
+    area = result.cut->area;
+    if (!cut && area == 0)
+      CHECK(blade.force.z() >= before); // upwards: it indents
+    before = blade.force.z();
+    cut = cut || area > 0;
+    CHECK(blade.ledger.surface == Approx(toughness * area).epsilon(1e-9));
+    CHECK(blade.ledger.imbalance() < 0.05);
+    CHECK(result.residual < 1e-8);
+  }
+  REQUIRE(cut);
+  const double swept = width * 0.018;
+  CHECK(area < swept);
+  CHECK(area > 0.5 * swept);
+  const BladeReport& last = results.back().cut->blade;
+  CHECK(last.force.z() == Approx(toughness * width).epsilon(0.25)); // not steady: the base is near
+  CHECK(last.advance > 0);
+  // The tissue is shown as the blade deforms it.
+  CHECK(session.at({0.003, 0, 0.011}).displacement.z() < -0.1 * last.advance);
+}
+
+TEST_CASE("A blade that is pressed too little does not cut, and leaves nothing behind") {
+  const std::string text = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 200") +
+                           blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.028]", "[0.004, 0, 0.035]"}, 0.04, "0.5");
+  Session session = session_of(text);
+  const std::vector<StepResult> results = run(session);
+  CHECK(session.incision() == nullptr);
+  CHECK(results[2].cut->blade.force.z() > 0);
+  CHECK(results.back().cut->blade.force.norm() == 0);
+  CHECK(session.at({0.004, 0, 0.029}).displacement.norm() < 1e-12);
+}

@@ -1,0 +1,370 @@
+#include "src/blade_force.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double least_width = 0.75;    // of the node spacing: half width of the edge's contact
+constexpr double first_trigger = 1.2;   // of the needed release, at which a first cut is proposed
+constexpr double least_increment = 0.2; // of the node spacing: no later cut is shorter
+constexpr double longer_proposal = 1.5; // how much farther the blade is when a longer cut is proposed instead
+constexpr double depth_factor = 2;      // of its depth in the body: how far a piece of the edge may push
+constexpr int entry_steps = 12;         // halvings towards the place where the edge entered
+constexpr int stroke_parts = 4;         // over which the forces are taken to change evenly
+constexpr double lip_tolerance = 1e-6;  // m
+
+Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
+  return pose.orientation * point + pose.position;
+}
+
+topology::BladePose between(const topology::BladePose& from, const topology::BladePose& to, double share) {
+  return {from.time + share * (to.time - from.time), from.position + share * (to.position - from.position),
+          from.orientation.slerp(share, to.orientation)};
+}
+
+/// Negative inside the body; outside where there is no telling.
+double signed_distance(const topology::Domain& domain, const topology::RestMap& to_rest, const Vector3& x) {
+  try {
+    return domain.signed_distance(to_rest(x));
+  } catch (const NumericalError&) {
+    return domain.signed_distance(x);
+  }
+}
+
+/// Of the pairs of lips along their normals, m.
+VectorX openings(const BodyModel& body, const solvers::Field& field) {
+  std::vector<int> plus, minus;
+  for (const solvers::LipPair& pair : body.pairs) {
+    plus.push_back(pair.plus);
+    minus.push_back(pair.minus);
+  }
+  const MatrixX apart =
+      body.body->contact_displacements(plus, {field}) - body.body->contact_displacements(minus, {field});
+  VectorX open(std::ssize(body.pairs));
+  for (Eigen::Index p = 0; p < open.size(); ++p)
+    open[p] = body.pairs[static_cast<std::size_t>(p)].normal.dot(apart.col(0).segment<3>(3 * p));
+  return open;
+}
+
+/// The body under its loads and its tool: lips that the blade brings together are in its own contact.
+solvers::Field without_lips(const BodyModel& body) {
+  const bool tool = body.state && !body.patch.nodes.empty();
+  return tool ? solvers::deform(body.patch, body.state->tool) : body.base;
+}
+
+} // namespace
+
+BladeForce::BladeForce(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double spacing,
+                       MapOf map_of)
+    : settings_(*scenario.blade), toughness_(scenario.toughness), spacing_(spacing),
+      half_width_(solvers::edge_half_width(scenario.material, settings_.edge_radius, toughness_)),
+      lips_(scenario.cut.lips), domain_(std::move(domain)), map_of_(std::move(map_of)) {
+  finer_ = half_width_ < least_width * spacing;
+  half_width_ = std::max(half_width_, least_width * spacing);
+  for (std::size_t i = 1; i < settings_.edge.size(); ++i) {
+    const Vector3 side = settings_.edge[i] - settings_.edge[i - 1];
+    const int parts = std::max(1, static_cast<int>(std::ceil(side.norm() / spacing)));
+    for (int k = 0; k < parts; ++k)
+      edge_.push_back({settings_.edge[i - 1] + (k + 0.5) / parts * side, side.normalized(), side.norm() / parts});
+  }
+}
+
+bool BladeForce::inside(const topology::BladePose& pose, const BodyModel& body) const {
+  const topology::RestMap to_rest = map_of_(body);
+  return std::any_of(edge_.begin(), edge_.end(), [&](const EdgePiece& piece) {
+    return signed_distance(*domain_, to_rest, placed(pose, piece.point)) < 0;
+  });
+}
+
+void BladeForce::go_to(const topology::BladePose& pose, const BodyModel& body) {
+  if (way_.empty())
+    at_ = pose;
+  way_.push_back(pose);
+  meeting_ = meet(body, 0);
+  if (proposal_)
+    proposal_->meeting = meet(proposal_->body, proposal_->poses);
+  press(body);
+}
+
+void BladeForce::leave() {
+  const topology::BladePose last = way_.back();
+  way_ = {last};
+  at_ = last;
+  meeting_ = {};
+  state_.reset();
+  proposal_.reset();
+  ledger_.excess += ledger_.stored; // what snaps back
+  ledger_.stored = 0;
+}
+
+// The state of the edge where it is.
+void BladeForce::press(const BodyModel& now) {
+  state_.reset();
+  if (!meeting_.pieces.empty())
+    state_ = solvers::push_blade(meeting_.patch, advances(meeting_, now, at_), meeting_.patch.dragged ? 1 : 0);
+}
+
+// The edge piece stands against the front, or against the surface where it came in after the front was left behind.
+void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
+                             Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const {
+  const EdgePiece& part = edge_[static_cast<std::size_t>(piece)];
+  const auto outside = [&](const topology::BladePose& pose) {
+    return signed_distance(*domain_, to_rest, placed(pose, part.point)) >= 0;
+  };
+  std::size_t leg = front; // from way_[leg] to the next
+  topology::BladePose met = way_[front];
+  const bool on_surface = outside(met);
+  if (on_surface) {
+    while (leg + 1 < way_.size() && outside(way_[leg + 1]))
+      ++leg;
+    if (leg + 1 >= way_.size())
+      return;
+    double out = 0, in = 1;
+    for (int k = 0; k < entry_steps; ++k) {
+      const double middle = 0.5 * (out + in);
+      (outside(between(way_[leg], way_[leg + 1], middle)) ? out : in) = middle;
+    }
+    met = between(way_[leg], way_[leg + 1], in);
+  }
+  const Vector3 along = met.orientation * part.along;
+  const Vector3 motion = placed(way_[leg + 1], part.point) - placed(way_[leg], part.point);
+  const Vector3 across = motion - motion.dot(along) * along;
+  if (across.norm() < 1e-6 * spacing_)
+    return;
+  solvers::EdgeContact contact;
+  contact.push = across.normalized();
+  contact.normal = along.cross(contact.push);
+  contact.length = part.length;
+  try {
+    contact.point = to_rest(placed(met, part.point));
+  } catch (const NumericalError&) {
+    return;
+  }
+  if (!on_surface && body.incision != nullptr)
+    if (const auto tip = body.incision->front_frame(contact.point, 2 * spacing_))
+      contact.point = tip->point;
+  if (domain_->signed_distance(contact.point + 0.5 * half_width_ * contact.push) > 0)
+    return; // it grazes: there is no material ahead
+  contacts.push_back(contact);
+  meeting.pieces.push_back(piece);
+  meeting.surface.push_back(on_surface ? 1 : 0);
+}
+
+BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front) const {
+  Meeting meeting;
+  meeting.area = body.incision != nullptr ? body.incision->area() : 0;
+  if (front + 1 >= way_.size())
+    return meeting;
+  const topology::RestMap to_rest = map_of_(body);
+  std::vector<solvers::EdgeContact> contacts;
+  for (int piece = 0; piece < std::ssize(edge_); ++piece)
+    add_contact(body, to_rest, front, piece, meeting, contacts);
+  if (contacts.empty())
+    return meeting;
+  const solvers::ForcePattern flanks = drag(body, contacts);
+  const solvers::Field base = without_lips(body);
+  std::vector<solvers::LipPair> pairs;
+  std::vector<char> used(body.pairs.size(), 0);
+  for (int round = 0; round < 3; ++round) { // pairs that the blade would press through one another, and no others
+    meeting.patch = solvers::condense_blade(*body.body, base, contacts, half_width_, pairs, flanks);
+    if (lips_ == solvers::LipCondition::open || body.pairs.empty())
+      break;
+    const solvers::BladeState state = solvers::push_blade(meeting.patch, advances(meeting, body, way_.back()));
+    const VectorX open = openings(body, solvers::deform(meeting.patch, state, base));
+    const std::size_t before = pairs.size();
+    for (std::size_t p = 0; p < body.pairs.size(); ++p)
+      if (open[static_cast<Eigen::Index>(p)] < -lip_tolerance && used[p] == 0) {
+        used[p] = 1;
+        pairs.push_back(body.pairs[p]);
+      }
+    if (pairs.size() == before)
+      break;
+  }
+  return meeting;
+}
+
+// Faces of the cut near the edge, behind it.
+solvers::ForcePattern BladeForce::drag(const BodyModel& body, const std::vector<solvers::EdgeContact>& contacts) const {
+  if (settings_.friction == 0 || settings_.flank == 0 || body.incision == nullptr)
+    return {};
+  Vector3 way = Vector3::Zero();
+  for (const solvers::EdgeContact& contact : contacts)
+    way += contact.length * contact.push;
+  if (way.norm() == 0)
+    return {};
+  std::vector<solvers::FlankPoint> flanks;
+  for (const topology::SurfaceMesh& sheet : body.incision->sheets())
+    for (const Triangle& t : sheet.triangles) {
+      const Vector3 a = sheet.vertices[t[0]], b = sheet.vertices[t[1]], c = sheet.vertices[t[2]];
+      const Vector3 middle = (a + b + c) / 3, area = 0.5 * (b - a).cross(c - a);
+      const bool near = std::any_of(contacts.begin(), contacts.end(), [&](const solvers::EdgeContact& contact) {
+        return (middle - contact.point).norm() < settings_.flank;
+      });
+      if (near && domain_->signed_distance(middle) < 0)
+        flanks.push_back({middle, area.normalized(), area.norm()});
+    }
+  return flanks.empty() ? solvers::ForcePattern{}
+                        : solvers::drag_pattern(flanks, settings_.friction, way.normalized(), spacing_);
+}
+
+// Past a contact's rest position; a piece of the edge that has come out of the body pushes nothing.
+VectorX BladeForce::advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const {
+  const topology::RestMap to_rest = map_of_(body);
+  VectorX result(std::ssize(meeting.pieces));
+  for (Eigen::Index c = 0; c < result.size(); ++c) {
+    const solvers::EdgeContact& contact = meeting.patch.contacts[static_cast<std::size_t>(c)];
+    const Vector3 x = placed(pose, edge_[static_cast<std::size_t>(meeting.pieces[static_cast<std::size_t>(c)])].point);
+    const double depth = std::max(0.0, -signed_distance(*domain_, to_rest, x));
+    result[c] = std::min(contact.push.dot(x - contact.point), meeting.patch.base[c] + depth_factor * depth);
+  }
+  return result;
+}
+
+bool BladeForce::first_cut(const solvers::BladeState& state) const {
+  double surface = 0, all = 0;
+  for (std::size_t c = 0; c < meeting_.pieces.size(); ++c) {
+    const double force = state.forces[static_cast<Eigen::Index>(c)];
+    all += force;
+    surface += meeting_.surface[c] != 0 ? force : 0;
+  }
+  return surface > 0.5 * all;
+}
+
+// Mean way of the edge from one pose of way_ to another, m.
+double BladeForce::travel(std::size_t from, std::size_t to) const {
+  double sum = 0;
+  for (std::size_t k = from; k < to; ++k)
+    for (const EdgePiece& piece : edge_)
+      sum += (placed(way_[k + 1], piece.point) - placed(way_[k], piece.point)).norm();
+  return sum / static_cast<double>(edge_.size());
+}
+
+// Poses after way_[front] up to the place from which the blade has `remaining` m to go; that becomes a pose of way_.
+std::vector<topology::BladePose> BladeForce::poses_up_to(std::size_t front, double remaining) {
+  std::size_t leg = way_.size() - 1;
+  while (leg > front && remaining > 0) {
+    const double length = travel(leg - 1, leg);
+    if (remaining < (1 - 1e-6) * length) {
+      const topology::BladePose stop = between(way_[leg - 1], way_[leg], 1 - remaining / length);
+      way_.insert(way_.begin() + static_cast<std::ptrdiff_t>(leg), stop);
+      break;
+    }
+    remaining -= length;
+    --leg;
+  }
+  return {way_.begin() + static_cast<std::ptrdiff_t>(front) + 1, way_.begin() + static_cast<std::ptrdiff_t>(leg) + 1};
+}
+
+std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
+  if (meeting_.pieces.empty() || way_.size() < 2)
+    return {};
+  const std::size_t last = way_.size() - 1;
+  const double way = travel(0, last);
+  if (proposal_ && way < longer_proposal * proposal_->way)
+    return {};
+  const solvers::BladeState coming =
+      solvers::push_blade(meeting_.patch, advances(meeting_, now, way_.back()), meeting_.patch.dragged ? 1 : 0);
+  const BladeReport pressed = report_of(coming);
+  if (!(pressed.release > needed()))
+    return {};
+  const double share = needed() / pressed.release; // of its advance that the edge can keep
+  double remaining = share * way;
+  bool near = way - remaining >= least_increment * spacing_;
+  if (first_cut(coming)) {
+    near = first_trigger * share <= 1;
+    remaining = (1 - first_trigger * share) * std::min(pressed.advance, way);
+  }
+  const std::size_t front = proposal_ ? proposal_->poses : 0;
+  return near && remaining < travel(front, last) ? poses_up_to(front, remaining) : std::vector<topology::BladePose>{};
+}
+
+void BladeForce::propose(BodyModel body, std::size_t poses) {
+  Proposal next;
+  next.way = travel(0, way_.size() - 1);
+  next.poses = poses + (proposal_ ? proposal_->poses : 0);
+  next.body = std::move(body);
+  proposal_ = std::move(next);
+  proposal_->meeting = meet(proposal_->body, proposal_->poses);
+}
+
+void BladeForce::pass(std::size_t poses, const BodyModel& now) {
+  way_.erase(way_.begin(), way_.begin() + static_cast<std::ptrdiff_t>(poses));
+  meeting_ = meet(now, 0);
+  press(now);
+}
+
+bool BladeForce::advance(const BodyModel& now) {
+  const topology::BladePose target = way_.back();
+  if (!state_) {
+    at_ = target;
+    press(now);
+    if (state_)
+      ledger_.stored = state_->stored;
+    return false;
+  }
+  const double friction = meeting_.patch.dragged ? 1 : 0;
+  std::optional<double> share;
+  if (proposal_ && !proposal_->meeting.pieces.empty())
+    share = solvers::cutting_share(
+        meeting_.patch, {state_->advance, advances(meeting_, now, target)}, proposal_->meeting.patch,
+        {advances(proposal_->meeting, proposal_->body, at_), advances(proposal_->meeting, proposal_->body, target)},
+        needed() * (proposal_->meeting.area - meeting_.area), friction);
+  const topology::BladePose from = at_;
+  const VectorX start = state_->advance, end = advances(meeting_, now, target);
+  const double reached = share.value_or(1), slide = (target.position - from.position).norm();
+  for (int k = 1; k <= stroke_parts; ++k) {
+    const double part = reached * k / stroke_parts;
+    const solvers::BladeState next = solvers::push_blade(meeting_.patch, start + part * (end - start), friction);
+    ledger_.move(meeting_.patch, *state_, next, slide * reached / stroke_parts);
+    state_ = next;
+  }
+  at_ = share ? between(from, target, *share) : target;
+  return share.has_value();
+}
+
+BodyModel BladeForce::take() {
+  const double area = proposal_->meeting.area - meeting_.area;
+  const solvers::BladeState before = *state_;
+  way_.erase(way_.begin(), way_.begin() + static_cast<std::ptrdiff_t>(proposal_->poses));
+  meeting_ = std::move(proposal_->meeting);
+  BodyModel body = std::move(proposal_->body);
+  proposal_.reset();
+  press(body);
+  ledger_.cut(before, *state_, toughness_, settings_.sharpness, area);
+  return body;
+}
+
+solvers::Field BladeForce::field(const BodyModel& body) const {
+  return state_ ? solvers::deform(meeting_.patch, *state_, without_lips(body)) : body.field;
+}
+
+BladeReport BladeForce::report() const {
+  return state_ ? report_of(*state_) : BladeReport{.ledger = ledger_};
+}
+
+BladeReport BladeForce::report_of(const solvers::BladeState& state) const {
+  BladeReport report;
+  report.ledger = ledger_;
+  report.force = state.blade_force;
+  report.edge_force = state.edge_force.norm();
+  report.converged = state.converged;
+  double force = 0, length = 0;
+  for (std::size_t c = 0; c < meeting_.pieces.size(); ++c) {
+    const auto entry = static_cast<Eigen::Index>(c);
+    if (!(state.forces[entry] > 0))
+      continue;
+    ++report.contacts;
+    force += state.forces[entry];
+    length += meeting_.patch.contacts[c].length;
+    report.advance = std::max(report.advance, state.advance[entry] - meeting_.patch.base[entry]);
+  }
+  if (length > 0)
+    report.release = force / length;
+  return report;
+}
+
+} // namespace spherecut::app

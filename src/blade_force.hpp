@@ -1,0 +1,117 @@
+// The blade of a run against its tissue (solvers/blade_contact.hpp): where its edge presses, what force that takes, and
+// when the next piece of its way is cut. The cut lags behind the blade: its front is where the blade once was, and the
+// blade has pushed the material there ahead of itself ever since.
+//
+// The next cut is built before it is due, as a proposal, and taken at the moment at which the difference of the two
+// bodies' energies pays for it. Up to then everything, the force too, is that of the body as it is.
+#pragma once
+
+#include "solvers/blade_contact.hpp"
+#include "src/body_model.hpp"
+#include "topology/blade.hpp"
+
+#include <deque>
+
+namespace spherecut::app {
+
+/// What the blade feels at the end of a step, and where its work has gone since the start.
+struct BladeReport {
+  Vector3 force = Vector3::Zero(); // N, of the tissue on the blade: edge and flanks
+  double edge_force = 0;           // N, of the edge alone
+  double advance = 0;              // m, farthest that the edge has pushed material ahead of itself
+  double release = 0;              // J/m2, of the edge's force on the front that it presses
+  int contacts = 0;                // pieces of the edge that press
+  bool converged = true;
+  solvers::BladeLedger ledger;
+};
+
+class BladeForce {
+ public:
+  /// The rest position of what is at a place of a body without blade.
+  using MapOf = std::function<topology::RestMap(const BodyModel& body)>;
+
+  /// `spacing`, m: of the nodes where the blade cuts, and of the pieces that its edge is taken in. Throws InputError as
+  /// solvers::edge_half_width.
+  BladeForce(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double spacing, MapOf map_of);
+
+  /// m, of the edge's contact; `finer_than_nodes` when they are too coarse for it and stand for it instead.
+  [[nodiscard]] double half_width() const { return half_width_; }
+  [[nodiscard]] bool finer_than_nodes() const { return finer_; }
+
+  /// Whether a part of the edge is inside the body.
+  [[nodiscard]] bool inside(const topology::BladePose& pose, const BodyModel& body) const;
+
+  /// Whether it has been anywhere yet.
+  [[nodiscard]] bool has_place() const { return !way_.empty(); }
+  /// The blade goes on to a pose. `body` is solved, without blade.
+  void go_to(const topology::BladePose& pose, const BodyModel& body);
+  /// The blade has left the body: its way starts anew from where it is.
+  void leave();
+
+  /// Poses through which the next proposal should cut, in order; none: no cut is near. A later cut ends where the edge
+  /// would be left with the force of steady cutting at the end of its motion.
+  [[nodiscard]] std::vector<topology::BladePose> wanted(const BodyModel& now);
+  /// The body with the way cut through these poses.
+  void propose(BodyModel body, std::size_t poses);
+  /// There was nothing to cut through these poses, or it cannot be: the front goes on without a cut.
+  void pass(std::size_t poses, const BodyModel& now);
+  [[nodiscard]] bool proposed() const { return proposal_.has_value(); }
+
+  /// Moves the blade on until the proposal is due (true) or it has reached its pose.
+  bool advance(const BodyModel& now);
+  /// The proposed body, which is the present one from now on.
+  BodyModel take();
+
+  /// Field of the body under the blade; `body.field` where it does not press.
+  [[nodiscard]] solvers::Field field(const BodyModel& body) const;
+  [[nodiscard]] BladeReport report() const;
+
+ private:
+  struct EdgePiece {
+    Vector3 point, along; // m, in the blade's frame; unit
+    double length = 0;    // m
+  };
+  /// A body as the edge meets it.
+  struct Meeting {
+    std::vector<int> pieces; // of the edge, one a contact
+    solvers::BladePatch patch;
+    int on_surface = 0; // contacts where nothing is cut yet
+    std::vector<char> surface;
+    double area = 0; // m2 cut
+  };
+  struct Proposal {
+    BodyModel body;
+    Meeting meeting;
+    std::size_t poses = 0;
+    double way = 0; // m, from the front to the blade when it was proposed
+  };
+
+  [[nodiscard]] Meeting meet(const BodyModel& body, std::size_t front) const;
+  void add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
+                   Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const;
+  [[nodiscard]] VectorX advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const;
+  [[nodiscard]] solvers::ForcePattern drag(const BodyModel& body,
+                                           const std::vector<solvers::EdgeContact>& contacts) const;
+  [[nodiscard]] double needed() const { return toughness_ / settings_.sharpness; } // J/m2
+  [[nodiscard]] bool first_cut(const solvers::BladeState& state) const;
+  [[nodiscard]] double travel(std::size_t from, std::size_t to) const;
+  [[nodiscard]] std::vector<topology::BladePose> poses_up_to(std::size_t front, double remaining);
+  [[nodiscard]] BladeReport report_of(const solvers::BladeState& state) const;
+  void press(const BodyModel& now);
+
+  BladeSettings settings_;
+  double toughness_, spacing_, half_width_;
+  bool finer_ = false;
+  solvers::LipCondition lips_;
+  std::shared_ptr<const topology::Domain> domain_;
+  MapOf map_of_;
+  std::vector<EdgePiece> edge_;
+  std::deque<topology::BladePose> way_; // from the front of the cut to the blade's target
+  topology::BladePose at_;              // of the blade: on its way to the last of way_
+  Meeting meeting_;
+  std::optional<solvers::BladeState> state_; // at at_; empty: the edge meets nothing
+  std::optional<Proposal> proposal_;
+  solvers::BladeLedger ledger_;
+};
+
+} // namespace spherecut::app

@@ -1,0 +1,128 @@
+// A blade that the tissue resists (blade_force.hpp): it goes on against the body as it is and cuts as far as its work
+// allows.
+#include "src/session.hpp"
+#include "src/stage_timer.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+
+void Session::make_blade_force() {
+  if (!scenario_.blade || scenario_.toughness == 0)
+    return;
+  blade_force_ =
+      std::make_unique<BladeForce>(scenario_, organ_.domain, zone_.spacing.fine, [this](const BodyModel& model) {
+        return [this, &model](const Vector3& x) { return rest_position(x, model); };
+      });
+  if (blade_force_->finer_than_nodes())
+    warn("edge",
+         fmt::format("the contact of the blade's edge is narrower than the nodes; it is taken as {:.3g} m wide: "
+                     "before it cuts, the blade sinks in less than it would",
+                     2 * blade_force_->half_width()));
+}
+
+bool Session::blade_enters(const StepSample& sample) const {
+  return blade_force_ != nullptr && sample.blade && blade_force_->inside(*sample.blade, model_);
+}
+
+// A cut is built when it comes near, beside the body, and the body becomes it when it is due.
+void Session::press_blade(const StepSample& sample, CutReport& report) {
+  const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
+  const bool placed = blade_force_->has_place();
+  blade_force_->go_to(*sample.blade, model_);
+  if (!blade_force_->inside(*sample.blade, model_)) {
+    blade_force_->leave();
+    if (mark_) // a proposal that is not taken any more
+      incisions_->go_back(*mark_);
+    mark_.reset();
+    shown_wound_.reset();
+    incisions_->place(*sample.blade, to_rest);
+    return;
+  }
+  if (!placed)
+    incisions_->place(*sample.blade, to_rest);
+  int triangles = 0;
+  for (;;) {
+    if (const std::vector<topology::BladePose> poses = blade_force_->wanted(model_); !poses.empty()) {
+      if (!mark_) {
+        mark_ = incisions_->mark();
+        shown_wound_ = incisions_->wound();
+      }
+      if (std::optional<BodyModel> next = propose_cut(poses, sample, report)) {
+        triangles += report.triangles;
+        blade_force_->propose(std::move(*next), poses.size());
+      } else if (!blade_force_->proposed()) {
+        mark_.reset();
+        shown_wound_.reset();
+        blade_force_->pass(poses.size(), model_);
+        continue;
+      }
+    }
+    if (!blade_force_->advance(model_))
+      break;
+    model_ = blade_force_->take();
+    mark_.reset();
+    shown_wound_.reset();
+  }
+  report.triangles = triangles;
+}
+
+// The body with the cut that the blade makes through these poses, built and solved; none when it cuts nothing or is
+// refused, and then incision and wound are as they were.
+std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladePose>& poses, const StepSample& sample,
+                                              CutReport& report) {
+  const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
+  const IncisionBuilder::Mark before = incisions_->mark();
+  try {
+    topology::SweepResult swept;
+    report.triangles = 0;
+    {
+      const StageTimer timer(report.seconds.topology);
+      for (const topology::BladePose& pose : poses) {
+        swept = incisions_->move_to(pose, to_rest);
+        report.triangles += swept.triangles;
+      }
+    }
+    if (report.triangles == 0) {
+      report.reason = swept.refused;
+      return std::nullopt;
+    }
+    BodyModel next;
+    next.incision = incisions_->incision();
+    next.coarseness = coarseness_;
+    require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
+    check_pieces(sample.time);
+    {
+      const StageTimer timer(report.seconds.level_sets);
+      incisions_->update_fields();
+    }
+    {
+      const StageTimer timer(report.seconds.sprinkling);
+      sprinkle(&model_.sprinkling.nodes, next);
+    }
+    {
+      const StageTimer timer(report.seconds.assembly);
+      build(next);
+    }
+    const StageTimer timer(report.seconds.solve);
+    solve(sample, next);
+    report.update = SystemUpdate::rebuilt;
+    report.update_reason = "the blade is resisted";
+    const std::vector<int>& from = next.sprinkling.kept_from;
+    report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+    return next;
+  } catch (const InputError& error) {
+    report.reason = error.what();
+  } catch (const NumericalError& error) {
+    report.reason = error.what();
+  }
+  report.triangles = 0;
+  report.refused = true;
+  warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, report.reason));
+  incisions_->go_back(before);
+  return std::nullopt;
+}
+
+} // namespace spherecut::app
