@@ -78,6 +78,7 @@ CuttingBody cutting_body(const CuttingCase& block, double depth, const solvers::
   const std::vector<solvers::LipPair> pairs = solvers::lip_pairs(problem.nodes);
   const auto body = solvers::discretise(std::move(problem), method);
   std::vector<solvers::EdgeContact> edge;
+  edge.reserve(contacts);
   for (int k = 0; k < contacts; ++k)
     edge.push_back({Vector3(depth, 0, block.above) + block.front() * ((k + 0.5) / contacts - 0.5) * across(block),
                     Vector3::UnitX(), normal(block), block.front() / contacts});

@@ -49,6 +49,7 @@ Rupture first_rupture(const CuttingBody& uncut, const std::vector<CuttingBody>& 
 
 std::vector<CuttingBody> cut_to(const CuttingCase& block, const CuttingBody& uncut, const std::vector<double>& depths) {
   std::vector<CuttingBody> cuts;
+  cuts.reserve(depths.size());
   for (const double depth : depths)
     cuts.push_back(cutting_body(block, depth, &uncut.nodes));
   return cuts;
@@ -64,8 +65,8 @@ struct Run {
 
 class Cutting {
  public:
-  Cutting(CuttingCase block, double first, double increment, double sharpness)
-      : block_(std::move(block)), increment_(increment), sharpness_(sharpness), now_(cutting_body(block_, 0, nullptr)),
+  Cutting(const CuttingCase& block, double first, double increment, double sharpness)
+      : block_(block), increment_(increment), sharpness_(sharpness), now_(cutting_body(block_, 0, nullptr)),
         next_(cutting_body(block_, first, &now_.nodes)), state_(push_blade(now_.patch, now_.advance(0))) {}
 
   Run to(double depth, double steady_from) {
