@@ -9,6 +9,7 @@
 #include "experiments/support/tilted_strip.hpp"
 
 #include "src/figure.hpp"
+#include "topology/errors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -45,7 +46,19 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
           return (frame.local(x)[1] > 0 ? 1 : -1) * force / (thickness * arm) * frame.normal;
         };
         const auto discretisation = solvers::discretise(body.problem, method.options());
-        const solvers::Field field = discretisation->solve();
+        solvers::Field field;
+        try {
+          field = discretisation->solve();
+        } catch (const NumericalError& error) {
+          if (method.method != solvers::Method::published)
+            throw;
+          // Its collocated traction rows can leave a slender body nearly singular: the record says so.
+          context.say(fmt::format("{}, {} nodes, seed {}: {}", method.name(), size, seed, error.what()));
+          table.add({std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
+                     fmt::format("{}", body.problem.nodes.size()), fmt::format("{}", seed),
+                     fmt::format("{:.4f}", body.fine), "not solved", fmt::format("{:.5g}", wanted)});
+          continue;
+        }
         // Mean over the ends of the arms.
         constexpr int rows = 8, columns = 4;
         double opening = 0;
@@ -63,6 +76,11 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
                    fmt::format("{:.4f}", body.fine), fmt::format("{:.5g}", opening), fmt::format("{:.5g}", wanted)});
         points.x.push_back(body.problem.nodes.size());
         points.y.push_back(opening / wanted);
+      }
+      if (errors.empty()) { // never solved: said above
+        if (size == sizes.back())
+          checks.push_back({"precut_beam_" + method.name() + "_solved_reported", 0, ">=", 0});
+        continue;
       }
       context.say(fmt::format("{}, {} nodes, median (worst): {}", method.name(), size, errors.text()));
       if (size != sizes.back())

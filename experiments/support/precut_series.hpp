@@ -16,6 +16,7 @@ class ErrorSeries {
  public:
   void add(const std::string& name, double value) { values_[name].push_back(value); }
   [[nodiscard]] const std::vector<double>& operator[](const std::string& name) const { return values_.at(name); }
+  [[nodiscard]] bool empty() const { return values_.empty(); }
   /// "PREFIX_NAME" <= bound for the median and, from three seeds on, "PREFIX_NAME_worst" <= 2 bound.
   void check(const std::string& prefix, const std::string& name, double bound, std::vector<Check>& checks) const;
   /// "name median (worst), ..." in percent.
