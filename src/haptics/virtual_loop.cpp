@@ -106,6 +106,7 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
   check_events(events);
   const topology::ContactQuery query(simulation.session().organ().domain->surface());
   std::vector<std::unique_ptr<HapticTick>> cores;
+  cores.reserve(settings.size());
   for (const HapticSettings& one : settings)
     cores.push_back(
         std::make_unique<HapticTick>(one, simulation.tool(), simulation.session().scenario().tool ? &query : nullptr));
