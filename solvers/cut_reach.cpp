@@ -1,0 +1,144 @@
+#include "solvers/cut_reach.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace spherecut::solvers {
+
+namespace {
+
+/// Of a sphere radius: eyes at a bulging face are lifted off it before they look (cut_sight.cpp), by 0.05 at both ends.
+constexpr double looking_around = 1.1;
+
+} // namespace
+
+std::vector<Vector3> sample_points(const topology::SurfaceMesh& sheet, std::size_t first_triangle, double spacing) {
+  std::vector<Vector3> points;
+  std::vector<std::array<Vector3, 3>> pending;
+  for (std::size_t t = first_triangle; t < sheet.triangles.size(); ++t) {
+    const Triangle& triangle = sheet.triangles[t];
+    pending.push_back({sheet.vertices[triangle[0]], sheet.vertices[triangle[1]], sheet.vertices[triangle[2]]});
+    while (!pending.empty()) {
+      const std::array<Vector3, 3> corner = pending.back();
+      pending.pop_back();
+      const double longest =
+          std::max({(corner[1] - corner[0]).norm(), (corner[2] - corner[1]).norm(), (corner[0] - corner[2]).norm()});
+      if (longest <= spacing) {
+        points.insert(points.end(), corner.begin(), corner.end());
+        continue;
+      }
+      const std::array<Vector3, 3> middle = {0.5 * (corner[0] + corner[1]), 0.5 * (corner[1] + corner[2]),
+                                             0.5 * (corner[2] + corner[0])};
+      pending.push_back({corner[0], middle[0], middle[2]});
+      pending.push_back({middle[0], corner[1], middle[1]});
+      pending.push_back({middle[2], middle[1], corner[2]});
+      pending.push_back(middle);
+    }
+  }
+  return points;
+}
+
+bool continues(const topology::Incision* before, const topology::Incision& now) {
+  if (before == nullptr)
+    return true;
+  if (now.sheets().size() < before->sheets().size())
+    return false;
+  for (std::size_t s = 0; s < before->sheets().size(); ++s) {
+    const topology::SurfaceMesh &a = before->sheets()[s], &b = now.sheets()[s];
+    if (b.triangles.size() < a.triangles.size() || b.vertices.size() < a.vertices.size() ||
+        !std::equal(a.triangles.begin(), a.triangles.end(), b.triangles.begin()) ||
+        !std::equal(a.vertices.begin(), a.vertices.end(), b.vertices.begin()))
+      return false;
+  }
+  return true;
+}
+
+NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed) {
+  NodeCloud present;
+  for (int i = 0; i < nodes.size(); ++i)
+    if (removed[i] == 0)
+      present.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+  return present;
+}
+
+Changes changes_between(const topology::Incision* before, const SpacingAt& spacing_before,
+                        const topology::Incision& now, const SpacingAt& spacing_now, double spacing) {
+  Changes changes;
+  for (std::size_t s = 0; s < now.sheets().size(); ++s) {
+    const std::size_t known =
+        before != nullptr && s < before->sheets().size() ? before->sheets()[s].triangles.size() : 0;
+    const std::vector<Vector3> points = sample_points(now.sheets()[s], known, spacing);
+    changes.faces.insert(changes.faces.end(), points.begin(), points.end());
+  }
+  // The reach of the enrichment goes with the spacing of the node nearest to a segment, so that counts too.
+  using Ends = std::array<double, 7>;
+  const auto ends = [](const topology::FrontSegment& f, const SpacingAt& spacing_at) {
+    return Ends{f.from.x(), f.from.y(), f.from.z(), f.to.x(), f.to.y(), f.to.z(), spacing_at(0.5 * (f.from + f.to))};
+  };
+  std::vector<Ends> old_front, new_front;
+  if (before != nullptr)
+    for (const topology::FrontSegment& segment : before->front())
+      old_front.push_back(ends(segment, spacing_before));
+  for (const topology::FrontSegment& segment : now.front())
+    new_front.push_back(ends(segment, spacing_now));
+  std::sort(old_front.begin(), old_front.end());
+  std::sort(new_front.begin(), new_front.end());
+  std::vector<Ends> different;
+  std::set_symmetric_difference(old_front.begin(), old_front.end(), new_front.begin(), new_front.end(),
+                                std::back_inserter(different));
+  for (const Ends& e : different) {
+    const Vector3 from(e[0], e[1], e[2]), to(e[3], e[4], e[5]);
+    const int parts = std::max(1, static_cast<int>(std::ceil((to - from).norm() / spacing)));
+    for (int k = 0; k <= parts; ++k)
+      changes.front.push_back(from + (to - from) * k / parts);
+  }
+  return changes;
+}
+
+void add_front(const topology::Incision* incision, double spacing, std::vector<Vector3>& places) {
+  if (incision == nullptr)
+    return;
+  for (const topology::FrontSegment& segment : incision->front()) {
+    const int parts = std::max(1, static_cast<int>(std::ceil((segment.to - segment.from).norm() / spacing)));
+    for (int k = 0; k <= parts; ++k)
+      places.push_back(segment.from + (segment.to - segment.from) * k / parts);
+  }
+}
+
+Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front,
+             const std::vector<Vector3>& all_front, double enriched, const std::vector<Vector3>& nodes,
+             const std::vector<double>& radii, double slack)
+    : to_faces_(faces), to_front_(front), to_all_(all_front), enriched_(enriched), slack_(slack) {
+  std::vector<Vector3> present;
+  for (std::size_t j = 0; j < nodes.size(); ++j) {
+    if (!(radii[j] > 0))
+      continue;
+    present.push_back(nodes[j]);
+    present_radii_.push_back(radii[j]);
+    if (const double spare = looking_around * radii[j] - to_faces_(nodes[j]) + slack; spare > 0)
+      by_faces_.push_back({nodes[j], radii[j], spare});
+    if (const double spare = looking_around * radii[j] - to_front_(nodes[j]) + slack; spare > 0)
+      by_front_.push_back({nodes[j], radii[j], spare});
+    // The branch functions at a node are those of the front nearest to it.
+    if (const double distance = to_front_(nodes[j]);
+        enriched > 0 && distance < (2 * enriched + 1) * radii[j] && distance < to_all_(nodes[j]) + 2 * slack)
+      by_branch_.push_back({nodes[j], radii[j], 0});
+  }
+  present_.emplace(present);
+}
+
+bool Reach::sees(const Vector3& x, double half) const {
+  const double faces = to_faces_(x) - half - slack_, front = to_front_(x) - half - slack_;
+  const auto holds = [&](const Eye& eye) {
+    return (eye.position - x).squaredNorm() < (eye.radius + half) * (eye.radius + half);
+  };
+  const auto concerns = [&](const std::vector<Eye>& eyes, double distance) {
+    return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) { return distance < eye.spare && holds(eye); });
+  };
+  return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front) ||
+         (!by_branch_.empty() && to_all_(x) - half - slack_ < enriched_ * radius_beside(to_all_, x) &&
+          std::any_of(by_branch_.begin(), by_branch_.end(), holds));
+}
+
+} // namespace spherecut::solvers

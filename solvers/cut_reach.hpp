@@ -1,0 +1,105 @@
+// What an increment of a cut changes, and which places and nodes that can reach: the questions that a local update
+// asks.
+#pragma once
+
+#include "solvers/nodes.hpp"
+#include "topology/point_tree.hpp"
+
+#include <optional>
+
+namespace spherecut::solvers {
+
+/// Points of a sheet no farther than `spacing` apart, m: corners and midpoints of its triangles, divided as needed.
+std::vector<Vector3> sample_points(const topology::SurfaceMesh& sheet, std::size_t first_triangle, double spacing);
+
+/// Whether the sheets of `now` continue those of `before` triangle by triangle.
+bool continues(const topology::Incision* before, const topology::Incision& now);
+
+/// The nodes that are not marked as removed, in their order.
+NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed);
+
+/// Spacing of the present node nearest to a place.
+class SpacingAt {
+ public:
+  SpacingAt(const NodeCloud& nodes, const std::vector<char>& removed) : SpacingAt(present_nodes(nodes, removed)) {}
+  [[nodiscard]] double operator()(const Vector3& x) const {
+    return spacings_[static_cast<std::size_t>(tree_.nearest(x).index)];
+  }
+
+ private:
+  explicit SpacingAt(const NodeCloud& present) : spacings_(present.spacings), tree_(present.positions) {}
+  std::vector<double> spacings_;
+  topology::PointTree tree_;
+};
+
+/// Where the cut differs: the new faces, and the front that was or has come.
+struct Changes {
+  std::vector<Vector3> faces, front;
+};
+
+/// `spacing` m: how far apart the places may be.
+Changes changes_between(const topology::Incision* before, const SpacingAt& spacing_before,
+                        const topology::Incision& now, const SpacingAt& spacing_now, double spacing);
+
+/// Places on the front of an incision (null: none) no farther than `spacing` apart.
+void add_front(const topology::Incision* incision, double spacing, std::vector<Vector3>& places);
+
+/// Distance to the nearest of some points, infinite when there are none.
+class Nearness {
+ public:
+  explicit Nearness(const std::vector<Vector3>& points) : points_(points) {
+    if (!points.empty())
+      tree_.emplace(points);
+  }
+  [[nodiscard]] std::optional<Vector3> place(const Vector3& x) const {
+    return tree_ ? std::optional(points_[static_cast<std::size_t>(tree_->nearest(x).index)]) : std::nullopt;
+  }
+  [[nodiscard]] double operator()(const Vector3& x) const {
+    return tree_ ? std::sqrt(tree_->nearest(x).squared_distance) : std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  std::vector<Vector3> points_;
+  std::optional<topology::PointTree> tree_;
+};
+
+/// Which places a change of the cut can reach: a point x sees a node y of sphere radius R another way only where some
+/// changed place p of faces or front lies on the way, |x - p| + |p - y| < R. Coarse nodes far from the change have
+/// large spheres that it does not concern.
+class Reach {
+ public:
+  /// `radii` of the spheres about `nodes`, 0: absent. `slack` m: how far places between the given ones may be off.
+  /// `all_front`: all there is of the front, changed or not; `enriched`: reach of its enrichment in sphere radii.
+  Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front, const std::vector<Vector3>& all_front,
+        double enriched, const std::vector<Vector3>& nodes, const std::vector<double>& radii, double slack);
+
+  /// Whether something within `half` m of x sees or is hidden differently, or is enriched by other functions.
+  [[nodiscard]] bool sees(const Vector3& x, double half) const;
+  /// Whether a place within `half` m of x is nearer to the front, or to the faces, than `radii` sphere radii there.
+  [[nodiscard]] bool near_front(const Vector3& x, double half, double radii) const {
+    return to_front_(x) - half - slack_ < radii * radius_beside(to_front_, x);
+  }
+  [[nodiscard]] bool near_faces(const Vector3& x, double half, double radii) const {
+    return to_faces_(x) - half - slack_ < radii * radius_beside(to_faces_, x);
+  }
+
+ private:
+  struct Eye {
+    Vector3 position;
+    double radius, spare;
+  };
+  /// Radius of the sphere about the node nearest to the change's place nearest to x.
+  [[nodiscard]] double radius_beside(const Nearness& change, const Vector3& x) const {
+    const std::optional<Vector3> place = change.place(x);
+    return place ? present_radii_[static_cast<std::size_t>(present_->nearest(*place).index)] : 0;
+  }
+
+  Nearness to_faces_, to_front_, to_all_;
+  double enriched_;
+  std::optional<topology::PointTree> present_;
+  std::vector<double> present_radii_;
+  std::vector<Eye> by_faces_, by_front_, by_branch_;
+  double slack_;
+};
+
+} // namespace spherecut::solvers

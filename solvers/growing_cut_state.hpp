@@ -1,0 +1,261 @@
+// What a growing cut keeps between increments (growing_cut.hpp). Private to its sources.
+#pragma once
+
+#include "solvers/cell_shapes.hpp"
+#include "solvers/elastic_body.hpp"
+#include "solvers/galerkin.hpp"
+#include "solvers/growing_cut.hpp"
+#include "solvers/held_changes.hpp"
+#include "solvers/schur_window.hpp"
+#include "solvers/stiffness_kernel.hpp"
+#include "topology/errors.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+
+/// Rings of new nodes stand this far from the sheet or its front, and crowded nodes within it are removed; in units of
+/// the sphere radius. What their spheres covered or will cover changes too.
+inline constexpr double node_margin = 0.35;
+
+/// Nodes are exchanged so far from new faces, in spacings (extend_sprinkling), and are nearest to places a little
+/// farther away.
+inline constexpr double exchange_reach = 3;
+
+/// Shares of the surface about some nodes are found from the surface this far around them, in spacings.
+inline constexpr double shares_reach = 4;
+/// A share itself changes when faces or surface nodes come this near to it, in spacings.
+inline constexpr double share_size = 2;
+
+struct GrowingCut::State {
+  struct Box {
+    BackgroundBox box;
+    std::vector<CellShapes> cells;                    // by node ids
+    std::vector<std::vector<QuadraturePoint>> points; // of each cell, kept where loads need them
+    bool exchanged = false;                           // since the condensation
+    std::vector<CellShapes> first{};                  // then: as they were at it
+  };
+
+  Problem problem;
+  GrowthOptions options;
+  double rho = 2;
+  std::vector<char> removed;
+  std::unique_ptr<Spheres> spheres;
+  std::vector<Box> boxes;
+  std::vector<DisplacementMean> held;
+  std::unique_ptr<SchurWindow> window;
+  std::vector<int> far_order;   // node of every far rank
+  std::vector<int> slot;        // block of three slots of every node in the window, -1 outside
+  std::vector<int> window_node; // node of every block of slots, -1 for room
+  int next_room = 0;
+  VectorX cell_loads;                     // 3N: body force and initial strain
+  VectorX first_loads;                    // 3N at condensation, all loads
+  VectorX external;                       // 3N as they stand, without those of prescribed displacements
+  VectorX loads;                          // 3N as they stand
+  MatrixX reduced_first;                  // by slots
+  mutable std::unique_ptr<Shares> shares; // null: not needed so far
+  AssemblyReport report;                  // of the condensation
+  std::vector<Anchor> anchors;            // by ids
+  SparseMatrix elastic;                   // stiffness at condensation without held means, in its elimination order
+  std::vector<int> elastic_order;         // node of every rank there
+  std::vector<DisplacementMean> contact;
+  MatrixX compliance;
+  VectorX base;
+
+  State(Problem p, GrowthOptions o) : problem(std::move(p)), options(std::move(o)) {
+    if (options.method.method != Method::galerkin)
+      throw InputError(
+          fmt::format("a growing cut is updated in method galerkin, not {}", to_string(options.method.method)));
+    for (int node : options.contact)
+      if (node < 0 || node >= problem.nodes.size())
+        throw InputError(
+            fmt::format("contact candidate {} does not exist; there are {} nodes", node, problem.nodes.size()));
+    if (options.way.triangles.empty())
+      throw InputError("the predicted way of the cut is empty");
+    rho = galerkin_support_radius(problem, options.method);
+    removed.assign(problem.nodes.size(), 0);
+  }
+
+  [[nodiscard]] BackgroundOptions background() const { return {options.method.cell_size, options.method.quadrature}; }
+  [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
+    return std::make_unique<Spheres>(problem.nodes.positions, problem.nodes.spacings, rho, Basis::linear,
+                                     worst_moment_condition, sight_about_cut(problem, options.method.sight), removed);
+  }
+  [[nodiscard]] double enrichment_reach() const {
+    return options.method.sight == SightRule::enriched ? sight_about_cut(problem, options.method.sight).reach / rho
+                                                       : 0; // in sphere radii
+  }
+  /// Largest sphere about a point, m.
+  [[nodiscard]] double radius_at(const Vector3& x) const {
+    double radius = 0;
+    for (int node : spheres->candidates(x))
+      radius = std::max(radius, spheres->radii()[node]);
+    return radius;
+  }
+  [[nodiscard]] bool has_cell_loads() const {
+    return problem.loads.body_force != nullptr || !problem.loads.initial_strain.isZero(0);
+  }
+
+  void evaluate(Box& box, const BackgroundCells& filled, CellEvaluator& evaluator) const {
+    box.cells.resize(filled.start.size() - 1);
+    box.points.resize(has_cell_loads() ? box.cells.size() : 0);
+    for (std::size_t c = 0; c < box.cells.size(); ++c) {
+      evaluator.evaluate(filled.of(static_cast<int>(c)), box.cells[c]);
+      if (has_cell_loads())
+        box.points[c].assign(filled.of(static_cast<int>(c)).begin(), filled.of(static_cast<int>(c)).end());
+    }
+  }
+
+  /// Adds sign times the stiffness of a cell, whose nodes are all in the window, to S.
+  void scatter(const CellShapes& by_node, double sign, CellEvaluator& evaluator, CellShapes& by_slot) {
+    by_slot = by_node;
+    evaluator.renumber(slot, by_slot);
+    const double mu = problem.material.shear_modulus(), lambda = problem.material.lame_lambda();
+    const int size = static_cast<int>(by_slot.nodes.size());
+    StiffnessColumn column;
+    for (int own = 0; own < size; ++own) {
+      stiffness_column(by_slot.gradients.data(), by_slot.points, by_slot.stride, own, size, own, lambda, mu, column);
+      const int first = 3 * by_slot.nodes[own];
+      for (int b = 0; b < 3; ++b) {
+        double* target = window->column(first + b);
+        for (int k = own; k < size; ++k)
+          for (int a = 0; a < 3; ++a)
+            target[3 * by_slot.nodes[k] + a] += sign * column.plane[3 * a + b][k];
+      }
+    }
+  }
+
+  /// The same of a held mean of problem `of`.
+  void scatter(const DisplacementMean& mean, const Problem& of, const Prescribed& entry, double sign) {
+    const double factor = sign * constraint_stiffness(of, entry.node);
+    for (std::size_t i = 0; i < mean.nodes.size(); ++i)
+      for (std::size_t j = 0; j < mean.nodes.size(); ++j)
+        if (slot[mean.nodes[i]] >= slot[mean.nodes[j]])
+          for (int c = 0; c < 3; ++c)
+            if (entry.components[c])
+              window->column(3 * slot[mean.nodes[j]] + c)[3 * slot[mean.nodes[i]] + c] +=
+                  factor * mean.weights[i] * mean.weights[j];
+  }
+
+  /// Body force and initial strain of a box, times `sign`.
+  void add_cell_loads(const Box& box, double sign, const Spheres& of, VectorX& into) const {
+    if (!has_cell_loads())
+      return;
+    const Matrix3 initial = initial_stress(problem);
+    ShapeFunctions shape;
+    for (std::size_t c = 0; c < box.cells.size(); ++c)
+      for (int q = 0; q < box.cells[c].points; ++q) {
+        const QuadraturePoint& point = box.points[c][q];
+        if (problem.loads.body_force && solvers::evaluate(of, point.position, shape)) {
+          const Vector3 force = sign * point.weight * problem.loads.body_force(point.position);
+          for (int k = 0; k < shape.size(); ++k)
+            into.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
+        }
+        const CellShapes& cell = box.cells[c];
+        const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
+        const double root = sign * std::sqrt(point.weight);
+        for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+          into.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) +=
+              root * initial * Vector3(x[k], x[cell.stride + k], x[2 * cell.stride + k]);
+      }
+  }
+
+  /// All loads as they stand.
+  void find_loads() {
+    external = cell_loads + tractions();
+    loads = external;
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      const Prescribed& entry = problem.prescribed[k];
+      const Vector3 value = problem.prescribed_field ? problem.prescribed_field(held[k].centroid) : entry.value;
+      const Vector3 force = constraint_stiffness(problem, entry.node) * held_part(entry, value);
+      for (std::size_t j = 0; j < held[k].nodes.size(); ++j)
+        loads.segment<3>(3 * static_cast<Eigen::Index>(held[k].nodes[j])) += held[k].weights[j] * force;
+    }
+  }
+
+  /// Of tractions on the surface and the lips.
+  [[nodiscard]] VectorX tractions() const {
+    VectorX right = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
+    ShapeFunctions shape;
+    const auto add = [&](const SurfacePoint& point, const Vector3& traction) {
+      if (traction.isZero(0))
+        return;
+      if (!solvers::evaluate(*spheres, point.position, shape))
+        throw NumericalError(fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m",
+                                         point.position.x(), point.position.y(), point.position.z()));
+      for (int k = 0; k < shape.size(); ++k)
+        right.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += point.weight * shape.value[k] * traction;
+    };
+    if (!problem.loads.traction && !problem.loads.lip_traction)
+      return right;
+    const NodeCloud present = present_nodes(problem.nodes, removed);
+    if (problem.loads.traction)
+      for (const SurfacePoint& point : surface_quadrature(*problem.domain, present, 0.5, 0, problem.incision.get()))
+        add(point, problem.loads.traction(point.position, point.normal));
+    if (problem.loads.lip_traction && problem.incision != nullptr)
+      for (const SurfacePoint& point : lip_quadrature(*problem.incision, present))
+        add(point, problem.loads.lip_traction(point.position, point.normal));
+    return right;
+  }
+
+  [[nodiscard]] DisplacementMean mean(int node) const {
+    if (removed[node] != 0)
+      throw InputError(fmt::format("node {} has been removed by the cut", node));
+    if (shares == nullptr)
+      shares = std::make_unique<Shares>(problem, removed);
+    return shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region);
+  }
+
+  /// Candidates that the cut has removed are none any more.
+  void find_contact() {
+    std::erase_if(options.contact, [&](int node) { return removed[node] != 0; });
+    contact.clear();
+    if (options.contact.empty())
+      return;
+    BoundingBox region{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
+    for (int node : options.contact) {
+      const double room = shares_reach * problem.nodes.spacings[node];
+      region.lower = region.lower.cwiseMin((problem.nodes.positions[node].array() - room).matrix());
+      region.upper = region.upper.cwiseMax((problem.nodes.positions[node].array() + room).matrix());
+    }
+    const Shares regional(problem, removed, region);
+    for (int node : options.contact)
+      contact.push_back(regional.patches.mean(regional.compact[node], *spheres, problem.prescribed_region));
+  }
+
+  /// Whether an increment along `way` may change what lies within `half` of x, m; also where the nodes that it
+  /// exchanges are of another spacing.
+  [[nodiscard]] auto reach_of(const topology::SurfaceMesh& way, bool nodes_may_coarsen) const {
+    const double slack = 0.5 * *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
+    const std::vector<Vector3> places = sample_points(way, 0, slack);
+    // The front of today near it: nodes that are exchanged there change the reach of its enrichment.
+    std::vector<Vector3> front = places;
+    if (problem.incision != nullptr && nodes_may_coarsen) {
+      const Nearness to_way(places);
+      const SpacingAt spacing_at(problem.nodes, removed);
+      for (const topology::FrontSegment& segment : problem.incision->front())
+        if (const Vector3 middle = 0.5 * (segment.from + segment.to);
+            to_way(middle) < exchange_reach * spacing_at(middle))
+          for (const Vector3& x : {segment.from, middle, segment.to})
+            front.push_back(x);
+    }
+    std::vector<Vector3> all_front = front;
+    add_front(problem.incision.get(), slack, all_front);
+    return [reach = std::make_shared<Reach>(places, front, all_front, enrichment_reach(), problem.nodes.positions,
+                                            spheres->radii(), slack),
+            margin = 1 + node_margin, enriched = std::max(1.0, enrichment_reach())](const Vector3& x, double half) {
+      return reach->sees(x, half) || reach->near_faces(x, half, margin) || reach->near_front(x, half, enriched);
+    };
+  }
+
+  void condense_all();
+  void condense_contact();
+  [[nodiscard]] VectorX window_right(const VectorX& right) const;
+  [[nodiscard]] MatrixX respond(const MatrixX& forces) const;
+  [[nodiscard]] VectorX elastic_forces(const VectorX& coefficients) const;
+};
+
+} // namespace spherecut::solvers

@@ -1,0 +1,34 @@
+// Means over the held surface of a body whose nodes and cut change, and what differs between two of its states.
+#pragma once
+
+#include "solvers/cut_reach.hpp"
+#include "solvers/surface_patches.hpp"
+
+namespace spherecut::solvers {
+
+/// The surface shared out among the present nodes, as the ordinary discretisation does it.
+struct Shares {
+  NodeCloud nodes;
+  std::vector<int> compact; // place of each node of the problem in `nodes`
+  SurfacePatches patches;
+
+  Shares(const Problem& problem, const std::vector<char>& removed,
+         const std::optional<BoundingBox>& region = std::nullopt);
+};
+
+/// What each prescribed entry holds, as the ordinary discretisation takes it.
+std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& spheres, const Shares& shares);
+
+/// Whether two means differ by no more than the order of summation.
+bool equal_to_rounding(const DisplacementMean& a, const DisplacementMean& b);
+
+/// A held mean that the two do not have in common: from one it has to go, to the other it has to come.
+struct HeldChange {
+  int before = -1, now = -1; // entries, -1: none
+};
+
+/// In the order of the entries now, then those that have gone.
+std::vector<HeldChange> held_changes(const std::vector<Prescribed>& before, const std::vector<DisplacementMean>& old,
+                                     const std::vector<Prescribed>& now, const std::vector<DisplacementMean>& held);
+
+} // namespace spherecut::solvers
