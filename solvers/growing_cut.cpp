@@ -26,6 +26,52 @@ double window_share(const Problem& problem, const DiscretisationOptions& method,
   return static_cast<double>(inside) / static_cast<double>(spacings.size());
 }
 
+GrowingCut::State::State(Problem p, GrowthOptions o) : problem(std::move(p)), options(std::move(o)) {
+  if (options.method.method != Method::galerkin)
+    throw InputError(
+        fmt::format("a growing cut is updated in method galerkin, not {}", to_string(options.method.method)));
+  for (int node : options.contact)
+    if (node < 0 || node >= problem.nodes.size())
+      throw InputError(
+          fmt::format("contact candidate {} does not exist; there are {} nodes", node, problem.nodes.size()));
+  if (options.way.triangles.empty())
+    throw InputError("the predicted way of the cut is empty");
+  rho = galerkin_support_radius(problem, options.method);
+  removed.assign(problem.nodes.size(), 0);
+}
+
+VectorX GrowingCut::State::tractions() const {
+  VectorX right = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
+  ShapeFunctions shape;
+  const auto add = [&](const SurfacePoint& point, const Vector3& traction) {
+    if (traction.isZero(0))
+      return;
+    if (!solvers::evaluate(*spheres, point.position, shape))
+      throw NumericalError(fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m",
+                                       point.position.x(), point.position.y(), point.position.z()));
+    for (int k = 0; k < shape.size(); ++k)
+      right.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += point.weight * shape.value[k] * traction;
+  };
+  if (!problem.loads.traction && !problem.loads.lip_traction)
+    return right;
+  const NodeCloud present = present_nodes(problem.nodes, removed);
+  if (problem.loads.traction)
+    for (const SurfacePoint& point : surface_quadrature(*problem.domain, present, 0.5, 0, problem.incision.get()))
+      add(point, problem.loads.traction(point.position, point.normal));
+  if (problem.loads.lip_traction && problem.incision != nullptr)
+    for (const SurfacePoint& point : lip_quadrature(*problem.incision, present))
+      add(point, problem.loads.lip_traction(point.position, point.normal));
+  return right;
+}
+
+DisplacementMean GrowingCut::State::mean(int node) const {
+  if (removed[node] != 0)
+    throw InputError(fmt::format("node {} has been removed by the cut", node));
+  if (shares == nullptr)
+    shares = std::make_unique<Shares>(problem, removed);
+  return shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region);
+}
+
 /// Builds everything from the problem as it stands. Removed nodes leave the arrays first: nothing refers to them yet
 /// but the ids of the caller, so they stay where they are and merely have no sphere.
 void GrowingCut::State::condense_all() {

@@ -13,7 +13,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 
 namespace spherecut::solvers {
 
@@ -65,19 +64,7 @@ struct GrowingCut::State {
   MatrixX compliance;
   VectorX base;
 
-  State(Problem p, GrowthOptions o) : problem(std::move(p)), options(std::move(o)) {
-    if (options.method.method != Method::galerkin)
-      throw InputError(
-          fmt::format("a growing cut is updated in method galerkin, not {}", to_string(options.method.method)));
-    for (int node : options.contact)
-      if (node < 0 || node >= problem.nodes.size())
-        throw InputError(
-            fmt::format("contact candidate {} does not exist; there are {} nodes", node, problem.nodes.size()));
-    if (options.way.triangles.empty())
-      throw InputError("the predicted way of the cut is empty");
-    rho = galerkin_support_radius(problem, options.method);
-    removed.assign(problem.nodes.size(), 0);
-  }
+  State(Problem p, GrowthOptions o);
 
   [[nodiscard]] BackgroundOptions background() const { return {options.method.cell_size, options.method.quadrature}; }
   [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
@@ -177,37 +164,9 @@ struct GrowingCut::State {
   }
 
   /// Of tractions on the surface and the lips.
-  [[nodiscard]] VectorX tractions() const {
-    VectorX right = VectorX::Zero(3 * static_cast<Eigen::Index>(problem.nodes.size()));
-    ShapeFunctions shape;
-    const auto add = [&](const SurfacePoint& point, const Vector3& traction) {
-      if (traction.isZero(0))
-        return;
-      if (!solvers::evaluate(*spheres, point.position, shape))
-        throw NumericalError(fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m",
-                                         point.position.x(), point.position.y(), point.position.z()));
-      for (int k = 0; k < shape.size(); ++k)
-        right.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += point.weight * shape.value[k] * traction;
-    };
-    if (!problem.loads.traction && !problem.loads.lip_traction)
-      return right;
-    const NodeCloud present = present_nodes(problem.nodes, removed);
-    if (problem.loads.traction)
-      for (const SurfacePoint& point : surface_quadrature(*problem.domain, present, 0.5, 0, problem.incision.get()))
-        add(point, problem.loads.traction(point.position, point.normal));
-    if (problem.loads.lip_traction && problem.incision != nullptr)
-      for (const SurfacePoint& point : lip_quadrature(*problem.incision, present))
-        add(point, problem.loads.lip_traction(point.position, point.normal));
-    return right;
-  }
+  [[nodiscard]] VectorX tractions() const;
 
-  [[nodiscard]] DisplacementMean mean(int node) const {
-    if (removed[node] != 0)
-      throw InputError(fmt::format("node {} has been removed by the cut", node));
-    if (shares == nullptr)
-      shares = std::make_unique<Shares>(problem, removed);
-    return shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region);
-  }
+  [[nodiscard]] DisplacementMean mean(int node) const;
 
   /// Candidates that the cut has removed are none any more.
   void find_contact() {
