@@ -1,5 +1,5 @@
-// The command line. Exit status: 0 done, 1 a check of an experiment failed, 2 unusable input or command line,
-// 3 numerical failure, 130 interrupted.
+// The command line. Exit status: 0 done, 1 a check of an experiment failed or a replay differs, 2 unusable input or
+// command line, 3 numerical failure, 130 interrupted.
 #include "experiments/experiment.hpp"
 #include "src/blas_threads.hpp"
 #include "src/haptics/run_haptics.hpp"
@@ -24,6 +24,18 @@ constexpr int status_interrupted = 130;
 int complain(const std::string& message, int status) {
   fmt::print(stderr, "spherecut: error: {}\n", message);
   return status;
+}
+
+int status_of(app::RunEnd end) {
+  switch (end) {
+  case app::RunEnd::complete:
+    return 0;
+  case app::RunEnd::interrupted:
+    return status_interrupted;
+  case app::RunEnd::differs:
+    break;
+  }
+  return status_check_failed;
 }
 
 void list_experiments(bool names_only) {
@@ -73,7 +85,11 @@ int run(int argc, char** argv) {
 
   app::HapticCommand haptic;
   auto* haptics = commands.add_subcommand("haptics", "Hold the tool of a scenario in real time, with a force at 1 kHz");
-  haptics->add_option("scenario", haptic.scenario, "TOML file")->required();
+  auto* held = haptics->add_option("scenario", haptic.scenario, "TOML file");
+  haptics
+      ->add_option("--replay", haptic.replay,
+                   "Run a recorded session again off line and compare; in place of a scenario")
+      ->excludes(held);
   haptics->add_option("--out", haptic.out, "Folder for the results; must not hold results yet")->required();
   haptics->add_option("--duration", haptic.duration, "Length of the session, s; default 10");
   haptics->add_flag("--virtual", haptic.in_virtual_time,
@@ -104,9 +120,9 @@ int run(int argc, char** argv) {
   }
 
   if (run_command->parsed())
-    return app::run_scenario(scenario, out, stdout) == app::RunEnd::complete ? 0 : status_interrupted;
+    return status_of(app::run_scenario(scenario, out, stdout));
   if (haptics->parsed())
-    return app::run_haptics(haptic, stdout) == app::RunEnd::complete ? 0 : status_interrupted;
+    return status_of(app::run_haptics(haptic, stdout));
   if (check->parsed())
     app::check_scenario(scenario, stdout);
   else if (list->parsed())

@@ -11,7 +11,8 @@
 namespace spherecut::app {
 namespace {
 
-constexpr std::string_view results[] = {"forces.csv", "cuts.csv", "summary.json", "series.pvd", "frames"};
+constexpr std::string_view results[] = {"forces.csv", "cuts.csv",    "summary.json",    "series.pvd",
+                                        "frames",     "haptic.json", "haptic.recording"};
 
 } // namespace
 

@@ -6,7 +6,7 @@
 
 namespace spherecut::app {
 
-enum class RunEnd { complete, interrupted };
+enum class RunEnd { complete, interrupted, differs }; // differs: a replay from its recording
 
 /// Reads the scenario, moves tool and blade along their ways, and leaves the results in `out`. Says how it goes on
 /// `screen`. SIGINT and SIGTERM end the run after the current step. Throws InputError and NumericalError; what was

@@ -153,7 +153,11 @@ ToolSettings tool(const Section& section, Offences& offences) {
   return tool;
 }
 
-HapticSettings haptics(const Section& section) {
+HeldDevice held_device(const std::string& name) {
+  return name == "script" ? HeldDevice::script : name == "recording" ? HeldDevice::recording : HeldDevice::hand;
+}
+
+HapticSettings haptics(const Section& section, const std::filesystem::path& scenario, Offences& offences) {
   HapticSettings haptics;
   haptics.rate = section.number("rate");
   haptics.model = force_model_from_string(section.text("model"));
@@ -161,7 +165,12 @@ HapticSettings haptics(const Section& section) {
   haptics.budget = section.number("budget");
   haptics.passivity = section.boolean("passivity");
   haptics.viewer_rate = section.number("viewer_rate");
-  haptics.device = section.text("device") == "script" ? HeldDevice::script : HeldDevice::hand;
+  haptics.device = held_device(section.text("device"));
+  if (section.has("recording"))
+    haptics.recording = scenario.parent_path() / section.text("recording");
+  else if (haptics.device == HeldDevice::recording)
+    offences.add(section.line("device"), "haptics.device = \"recording\": which one is missing; allowed: beside "
+                                         "haptics.recording = \"FILE\"");
   const Section limits = section.table("limits");
   haptics.limits = {limits.number("gain"),
                     limits.number("force"),
@@ -211,10 +220,7 @@ void check_blade_force(const Scenario& scenario, const Section& root, Offences& 
                              scenario.toughness));
 }
 
-} // namespace
-
-Scenario read_scenario(const std::filesystem::path& file) {
-  const ScenarioDocument document(file);
+Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::path& file) {
   const Section& root = document.root();
   Offences offences(file.string());
   Scenario scenario;
@@ -254,11 +260,21 @@ Scenario read_scenario(const std::filesystem::path& file) {
     check_blade_force(scenario, root, offences);
   if (!scenario.tool && !scenario.blade && scenario.precuts.empty())
     offences.add(1, "there is no tool, no blade and no precut: nothing to compute; allowed: one of them or more");
-  scenario.haptics = haptics(root.table("haptics"));
+  scenario.haptics = haptics(root.table("haptics"), file, offences);
   const Section output = root.table("output");
   scenario.output = {static_cast<int>(output.integer("vtp_every")), output.boolean("figures")};
   offences.throw_if_any();
   return scenario;
+}
+
+} // namespace
+
+Scenario read_scenario(const std::filesystem::path& file) {
+  return scenario_of(ScenarioDocument(file), file);
+}
+
+Scenario read_scenario_text(const std::filesystem::path& file, std::string text) {
+  return scenario_of(ScenarioDocument(file, std::move(text)), file);
 }
 
 } // namespace spherecut::app

@@ -119,5 +119,7 @@ struct Scenario {
 /// Reads and checks a scenario file. Throws InputError with one line for every offence: file:line, key, value and what
 /// is allowed.
 Scenario read_scenario(const std::filesystem::path& file);
+/// The same from a text that was once in that file: other files that it names are looked for beside it.
+Scenario read_scenario_text(const std::filesystem::path& file, std::string text);
 
 } // namespace spherecut::app

@@ -480,7 +480,9 @@ Vector3 direction(const Section& section, std::string_view name, std::string_vie
   return Vector3::UnitZ();
 }
 
-ScenarioDocument::ScenarioDocument(const std::filesystem::path& file) : text_(read_text(file)) {
+ScenarioDocument::ScenarioDocument(const std::filesystem::path& file) : ScenarioDocument(file, read_text(file)) {}
+
+ScenarioDocument::ScenarioDocument(const std::filesystem::path& file, std::string text) : text_(std::move(text)) {
   Offences offences(file.string());
   auto document = std::make_shared<toml::table>();
   try {

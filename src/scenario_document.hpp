@@ -70,6 +70,8 @@ class ScenarioDocument {
   /// Reads and checks the file: syntax, unknown keys, types, ranges, missing keys. Throws InputError naming every
   /// offence.
   explicit ScenarioDocument(const std::filesystem::path& file);
+  /// The same from a text, as if it were in that file.
+  ScenarioDocument(const std::filesystem::path& file, std::string text);
   [[nodiscard]] const Section& root() const { return root_; }
   [[nodiscard]] const std::string& text() const { return text_; }
 

@@ -41,11 +41,12 @@ struct ContactSnapshot {
   double rest_sum = 0, compliance_sum = 0; // of all entries: equal sums mean the same candidates, the same body
   double reach = 0;                        // m, of the candidates about the contact's point
 
-  bool resprinkled = false; // the nodes have followed the tool since the last snapshot
-  int cut_triangles = 0;    // added to the cut since the last snapshot
-  int degradation = 0;      // level of coarsening (see simulation.hpp)
-  int nodes = 0;            // of the body
-  double solve_seconds = 0; // wall clock, from pose to snapshot
+  bool resprinkled = false;   // the nodes have followed the tool since the last snapshot
+  int cut_triangles = 0;      // added to the cut since the last snapshot
+  int degradation = 0;        // level of coarsening (see simulation.hpp)
+  int nodes = 0;              // of the body
+  std::uint64_t topology = 0; // hash of the places of its nodes, the area of the cut and the surface with it
+  double solve_seconds = 0;   // wall clock, from pose to snapshot
 };
 
 /// Copies the state of a patch; `candidates` beyond most_candidates are left out, those farthest from the contact

@@ -20,7 +20,8 @@ struct DeviceState {
   double time = 0;                    // s, tick / rate of the loop
   Vector3 position = Vector3::Zero(); // m, reference point of the tool, origin of the blade's frame
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity(); // turns +z into the tool's axis; the blade's frame
-  bool connected = true; // false: nobody answers; the loop brings the force to zero
+  bool connected = true;               // false: nobody answers; the loop brings the force to zero
+  std::uint16_t mode = 0, buttons = 0; // what the hand has chosen and presses; recorded and replayed with the pose
 };
 
 class Device {

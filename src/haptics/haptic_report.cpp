@@ -204,6 +204,7 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
   nlohmann::json json{
       {"ticks_per_second", f.rate},
       {"overruns", f.loop.overruns},
+      {"unrecorded", f.loop.lost},
       {"sched_fifo", f.loop.fifo},
       {"latency_s", json_of(f.latency)},
       {"compute_s", json_of(f.compute)},

@@ -1,6 +1,7 @@
 // The [haptics] part of a scenario: rates, force model, and the device with its limits.
 #pragma once
 
+#include <filesystem>
 #include <string_view>
 
 namespace spherecut::app {
@@ -36,8 +37,9 @@ struct HandSettings {
 };
 
 enum class HeldDevice {
-  script, // follows the scenario's path whatever the force
-  hand,   // mass, spring and damper on that path
+  script,    // follows the scenario's path whatever the force
+  hand,      // mass, spring and damper on that path
+  recording, // follows what a device did in a recorded session
 };
 
 struct HapticSettings {
@@ -48,6 +50,7 @@ struct HapticSettings {
   bool passivity = true;   // the controller; the observer is always on
   double viewer_rate = 60; // frames per second at most
   HeldDevice device = HeldDevice::hand;
+  std::filesystem::path recording; // of the device of that name
   DeviceLimits limits;
   HandSettings hand;
 };

@@ -38,6 +38,7 @@ struct SolveRecord {
   std::string reason; // of the failure
   bool resprinkled = false;
   int cut_triangles = 0, nodes = 0, candidates = 0, active = 0;
+  std::uint64_t topology = 0;      // of cut surface and nodes, as ContactSnapshot::topology
   double asymmetry = 0;            // of the compliance
   Vector3 force = Vector3::Zero(); // N, of the solve
   double seconds = 0;              // wall clock

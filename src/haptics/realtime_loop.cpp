@@ -1,11 +1,14 @@
 #include "src/haptics/realtime_loop.hpp"
 
+#include "src/haptics/ring.hpp"
 #include "topology/errors.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <exception>
 #include <fmt/format.h>
 #include <pthread.h>
 #include <sched.h>
@@ -34,30 +37,38 @@ bool ask_for_fifo() {
   return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter) == 0;
 }
 
+constexpr std::size_t solve_slots = 1U << 14U; // waiting for the viewer's thread
+
 struct Shared {
+  explicit Shared(double rate) : ticks(static_cast<std::size_t>(std::ceil(ring_seconds * rate))), solves(solve_slots) {}
   TripleBuffer<DeviceState> poses;
   TripleBuffer<ContactSnapshot> snapshots;
+  Ring<TickRecord> ticks;   // haptic thread to viewer
+  Ring<SolveRecord> solves; // simulation thread to viewer
   std::atomic<bool> stop{false}, done{false};
 };
 
 // The haptic thread: allocates, locks, throws and logs nothing.
 void haptic_thread(const HapticSettings& settings, Device& device, const DeviceState& first, HapticTick& core,
-                   Shared& shared, const RealtimeOptions& options, std::vector<TickRecord>& ticks, std::uint64_t& done,
+                   Shared& shared, const RealtimeOptions& options, std::uint64_t count,
                    RealtimeReport& report) noexcept {
   report.fifo = options.fifo && ask_for_fifo();
   const bool spins = report.fifo && std::thread::hardware_concurrency() > 1;
   const auto period = static_cast<long long>(std::llround(static_cast<double>(second) / settings.rate));
   const auto spin = spins ? static_cast<long long>(options.spin * static_cast<double>(second)) : 0;
   const long long start = clock_now(CLOCK_MONOTONIC) + period;
-  for (done = 0; done < ticks.size() && !shared.stop.load(std::memory_order_relaxed); ++done) {
-    const long long due = start + static_cast<long long>(done) * period;
+  TickRecord record;
+  std::uint64_t tick = 0;
+  std::uint64_t lost = 0;
+  for (; tick < count && !shared.stop.load(std::memory_order_relaxed); ++tick) {
+    const long long due = start + static_cast<long long>(tick) * period;
     if (due - spin > clock_now(CLOCK_MONOTONIC))
       sleep_until(due - spin);
     long long began = clock_now(CLOCK_MONOTONIC);
     while (began < due)
       began = clock_now(CLOCK_MONOTONIC);
     const long long cpu = clock_now(CLOCK_THREAD_CPUTIME_ID);
-    const DeviceState state = done == 0 ? first : device.read(done);
+    const DeviceState state = tick == 0 ? first : device.read(tick);
     shared.poses.back() = state;
     shared.poses.publish();
     const bool arrives = shared.snapshots.waiting();
@@ -67,19 +78,21 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
     }
     const TickResult result = core.tick(state);
     device.apply(result.force);
-    TickRecord& record = ticks[done];
     record = record_of(state, result, arrives);
     record.latency = 1e-9 * static_cast<double>(began - due);
     record.compute = 1e-9 * static_cast<double>(clock_now(CLOCK_THREAD_CPUTIME_ID) - cpu);
+    lost += shared.ticks.push(record) ? 0 : 1;
     report.haptic_cpu_seconds += record.compute;
     if (clock_now(CLOCK_MONOTONIC) > due + period)
       ++report.overruns;
   }
+  report.ticks = tick;
+  report.lost += lost;
   shared.done.store(true, std::memory_order_release);
 }
 
 void simulation_thread(const HapticSettings& settings, HapticSimulation& simulation, Shared& shared, ViewerFeed& feed,
-                       std::vector<SolveRecord>& solves, RealtimeReport& report) {
+                       std::uint64_t& lost, RealtimeReport& report) {
   DegradationRule rule(settings.budget);
   std::uint64_t sequence = 0;
   while (!shared.done.load(std::memory_order_acquire)) {
@@ -91,71 +104,113 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
     const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level()};
     ContactSnapshot& snapshot = shared.snapshots.back();
     const long long began = clock_now(CLOCK_MONOTONIC);
-    const auto fail = [&](const std::exception& error) {
-      solves.push_back({.event = event, .failed = true, .reason = error.what()});
-    };
-    try {
-      simulation.solve(state, event.degradation, snapshot);
-    } catch (const NumericalError& error) {
-      fail(error);
+    const SolveRecord record = solve_recording(simulation, state, event, snapshot);
+    lost += shared.solves.push(record) ? 0 : 1;
+    if (record.failed)
       continue;
-    } catch (const InputError& error) {
-      fail(error);
-      continue;
-    }
-    snapshot.sequence = sequence;
-    solves.push_back(record_of(event, snapshot));
-    if (snapshot.resprinkled || snapshot.cut_triangles > 0)
-      rule.rebuilt(snapshot.solve_seconds);
-    feed.offer(simulation, snapshot);
     shared.snapshots.publish();
+    if (record.resprinkled || record.cut_triangles > 0)
+      rule.rebuilt(record.seconds);
+    feed.offer(simulation, record);
     report.solve_seconds += 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - began);
   }
 }
+
+// The viewer's thread: what the others leave behind.
+class Collector {
+ public:
+  Collector(Shared& shared, const RealtimeOptions& options, LoopRecords& records)
+      : shared_(shared), options_(options), records_(records) {}
+
+  void collect() {
+    // A tick that waits now uses a solve that waits by now: those go first.
+    const std::size_t ticks = shared_.ticks.waiting();
+    for (; shared_.solves.waiting() > 0; shared_.solves.pop())
+      take(shared_.solves.front());
+    for (std::size_t i = 0; i < ticks; ++i, shared_.ticks.pop())
+      take(shared_.ticks.front());
+  }
+
+ private:
+  void take(SolveRecord& solve) {
+    options_.on_solve(solve);
+    if (options_.keep)
+      records_.solves.push_back(std::move(solve));
+  }
+  void take(const TickRecord& tick) {
+    options_.on_tick(tick);
+    if (!options_.keep)
+      return;
+    records_.ticks.push_back(tick);
+    if (!tick.arrived)
+      return;
+    for (; arrived_ < records_.solves.size() && records_.solves[arrived_].event.sequence <= tick.sequence; ++arrived_)
+      if (records_.solves[arrived_].event.sequence == tick.sequence)
+        records_.solves[arrived_].event.arrival_tick = tick.device.tick;
+  }
+
+  Shared& shared_;
+  const RealtimeOptions& options_;
+  LoopRecords& records_;
+  std::size_t arrived_ = 0; // solves before this one have arrived or never will
+};
 
 } // namespace
 
 LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simulation, Device& device, double duration,
                          const RealtimeOptions& options, RealtimeReport& report) {
   const double count = std::round(duration * settings.rate);
-  if (!(count >= 1) || count > 1e8)
+  if (!(count >= 1) || (options.keep && count > 1e8))
     throw InputError(fmt::format("a haptic session of {:g} s at {:g} ticks per second; allowed: 1 to 1e8 ticks",
                                  duration, settings.rate));
   const long long before = clock_now(CLOCK_MONOTONIC);
   LoopRecords records;
-  records.ticks.resize(static_cast<std::size_t>(count));
   const Session& session = simulation.session();
   const topology::ContactQuery query(session.organ().domain->surface());
   HapticTick core(settings, simulation.tool(), session.scenario().tool ? &query : nullptr);
   const DeviceState first = device.read(0);
   simulation.prepare(first);
   core.start(first);
-  auto shared = std::make_unique<Shared>();
+  auto shared = std::make_unique<Shared>(settings.rate);
   ViewerFeed feed(settings.viewer_rate);
   report.prepare_seconds = 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - before);
 
   const long long start = clock_now(CLOCK_MONOTONIC);
-  std::uint64_t done = 0;
-  std::thread solver([&] { simulation_thread(settings, simulation, *shared, feed, records.solves, report); });
-  std::thread haptic(
-      [&] { haptic_thread(settings, device, first, core, *shared, options, records.ticks, done, report); });
-  while (!shared->done.load(std::memory_order_acquire)) {
-    if (feed.fetch())
-      options.view(feed.frame());
-    if (options.stop())
+  const auto ticks = count < 1e18 ? static_cast<std::uint64_t>(count) : ~std::uint64_t{0};
+  std::uint64_t lost_solves = 0;
+  std::thread solver([&] { simulation_thread(settings, simulation, *shared, feed, lost_solves, report); });
+  std::thread haptic([&] { haptic_thread(settings, device, first, core, *shared, options, ticks, report); });
+  Collector collector(*shared, options, records);
+  std::exception_ptr failure;
+  const auto guarded = [&](const auto& act) {
+    try {
+      if (!failure)
+        act();
+    } catch (...) {
+      failure = std::current_exception();
       shared->stop.store(true, std::memory_order_relaxed);
+    }
+  };
+  while (!shared->done.load(std::memory_order_acquire)) {
+    guarded([&] {
+      if (feed.fetch())
+        options.view(feed.frame());
+      collector.collect();
+      if (options.stop())
+        shared->stop.store(true, std::memory_order_relaxed);
+    });
     std::this_thread::sleep_for(std::chrono::milliseconds(8));
   }
   haptic.join();
   solver.join();
+  guarded([&] { collector.collect(); });
+  if (failure)
+    std::rethrow_exception(failure);
   report.seconds = 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - start);
-  report.stopped = done < records.ticks.size();
+  report.stopped = report.ticks < ticks;
+  report.lost += lost_solves;
   report.frames = feed.frames();
   report.viewer_seconds = feed.seconds();
-  records.ticks.resize(done);
-  for (const TickRecord& tick : records.ticks)
-    if (tick.arrived && tick.sequence > 0 && tick.sequence <= records.solves.size())
-      records.solves[tick.sequence - 1].event.arrival_tick = tick.device.tick;
   return records;
 }
 

@@ -19,19 +19,27 @@ struct RealtimeReport {
   double viewer_seconds = 0;     // in frames
   double haptic_cpu_seconds = 0; // processor time of the haptic thread in ticks
   std::uint64_t frames = 0;
-  bool stopped = false; // before its time
+  std::uint64_t ticks = 0;
+  std::uint64_t lost = 0; // ticks and solves that went unrecorded: the caller's thread was a whole ring behind
+  bool stopped = false;   // before its time
 };
 
 struct RealtimeOptions {
   bool fifo = true;   // ask for SCHED_FIFO
   double spin = 1e-4; // s before a tick is due from which the thread spins; only with SCHED_FIFO and a second core
-  std::function<bool()> stop = [] { return false; };                        // asked by the viewer's thread
-  std::function<void(const ViewerFrame&)> view = [](const ViewerFrame&) {}; // on the viewer's thread
+  std::function<bool()> stop = [] { return false; };                            // asked by the viewer's thread
+  std::function<void(const ViewerFrame&)> view = [](const ViewerFrame&) {};     // on the viewer's thread
+  std::function<void(const TickRecord&)> on_tick = [](const TickRecord&) {};    // on the viewer's thread, in order
+  std::function<void(const SolveRecord&)> on_solve = [](const SolveRecord&) {}; // likewise, before ticks that use it
+  bool keep = true; // ticks and solves for the returned records; false: on_tick and on_solve alone see them
 };
 
-/// Runs for `duration` seconds. Ticks that come late are made up at once, each with its own number, so that time in the
-/// loop is time on the clock; all of them are counted. Throws what preparing throws; a solve that fails later is in its
-/// record, and the loop goes on with the snapshot it has.
+/// Runs for `duration` seconds; with `keep` off that may be infinite, and memory stays bounded. Ticks that come late
+/// are made up at once, each with its own number, so that time in the loop is time on the clock; all of them are
+/// counted. Throws what preparing throws; a solve that fails later is in its record, and the loop goes on with the
+/// snapshot it has. What a function of `options` throws ends the session and is thrown on. The haptic thread hands its
+/// ticks to the viewer's through a ring of ring_seconds.
+inline constexpr double ring_seconds = 16;
 LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simulation, Device& device, double duration,
                          const RealtimeOptions& options, RealtimeReport& report);
 

@@ -1,6 +1,7 @@
 #include "src/haptics/run_haptics.hpp"
 
 #include "src/haptics/haptic_report.hpp"
+#include "src/haptics/replay.hpp"
 #include "src/interrupt.hpp"
 #include "src/output_file.hpp"
 #include "src/progress.hpp"
@@ -12,9 +13,59 @@
 
 namespace spherecut::app {
 
+namespace {
+
+constexpr const char* recording_name = "haptic.recording";
+constexpr std::uint64_t flush_ticks = 100; // between two lots on disk
+
+// Writes the recording of a session as it goes.
+class Recorder {
+ public:
+  Recorder(const std::filesystem::path& folder, const HapticSimulation& simulation)
+      : writer_(folder / recording_name,
+                recording_header(simulation.session().scenario(), simulation.session().organ().domain->surface())) {}
+  template <typename Options>
+  void listen(Options& options) {
+    options.on_tick = [this](const TickRecord& tick) {
+      writer_.add(tick);
+      if (tick.device.tick % flush_ticks == flush_ticks - 1)
+        writer_.flush();
+    };
+    options.on_solve = [this](const SolveRecord& solve) { writer_.add(solve); };
+  }
+  void finish(std::uint64_t lost) { writer_.finish(lost); }
+
+ private:
+  RecordingWriter writer_;
+};
+
+RunEnd run_replay(const HapticCommand& command, const InterruptWatch& watch, Progress& progress) {
+  const Recording recording = read_recording(command.replay);
+  progress.say(fmt::format("{}: {} ticks, {} solves, of {}{}", command.replay.string(), recording.ticks.size(),
+                           recording.solves.size(), recording.header.scenario.string(),
+                           recording.finished ? "" : "; the session was killed"));
+  HapticSimulation simulation(recorded_scenario(recording));
+  claim_results_folder(command.out);
+  LoopRecords records;
+  const ReplayReport report = replay(recording, simulation, records, [&] { return watch.interrupted(); });
+  write_haptics(command.out, records, findings_of(simulation.session().scenario().haptics, records, {}), {});
+  progress.say(text_of(report));
+  if (!report.same())
+    return RunEnd::differs;
+  return report.ticks < recording.ticks.size() ? RunEnd::interrupted : RunEnd::complete;
+}
+
+} // namespace
+
 std::unique_ptr<Device> make_device(const HapticSettings& settings, const HapticSimulation& simulation) {
-  if (settings.device == HeldDevice::script)
+  switch (settings.device) {
+  case HeldDevice::script:
     return std::make_unique<ScriptedPath>(simulation.path(), settings.rate);
+  case HeldDevice::recording:
+    return std::make_unique<RecordedMotion>(read_recording(settings.recording), settings.rate);
+  case HeldDevice::hand:
+    break;
+  }
   return std::make_unique<SimulatedHand>(simulation.path(), settings.hand, settings.rate);
 }
 
@@ -22,28 +73,39 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   const InterruptWatch watch;
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
+  if (command.scenario.empty() == command.replay.empty())
+    throw InputError("spherecut haptics needs a scenario, or --replay with a recording");
+  if (!command.replay.empty())
+    return run_replay(command, watch, progress);
   if (!(command.duration > 0) || command.duration > 1e5)
     throw InputError(fmt::format("--duration {:g} s: allowed: above 0, at most 1e5", command.duration));
   const Scenario scenario = read_scenario(command.scenario);
   const HapticSettings& settings = scenario.haptics;
   HapticSimulation simulation(scenario);
-  claim_results_folder(command.out);
   const std::unique_ptr<Device> device = make_device(settings, simulation);
+  claim_results_folder(command.out);
+  Recorder recorder(command.out, simulation);
   RealtimeReport report;
   LoopRecords records;
   if (command.in_virtual_time) {
     const auto ticks = static_cast<std::uint64_t>(std::max(1.0, std::round(command.duration * settings.rate)));
     const auto period = static_cast<std::uint64_t>(std::max(1.0, std::round(settings.budget * settings.rate)));
-    records = run_virtual(settings, simulation, *device, regular_solves(ticks, period, period), ticks);
+    VirtualOptions options;
+    options.stop = [&] { return watch.interrupted(); };
+    recorder.listen(options);
+    records = run_virtual(settings, simulation, *device, regular_solves(ticks, period, period), ticks, options);
+    report.stopped = records.ticks.size() < ticks;
   } else {
     say(fmt::format("{:g} s at {:g} ticks/s, model {}", command.duration, settings.rate, to_string(settings.model)));
     RealtimeOptions options;
     options.stop = [&] { return watch.interrupted(); };
+    recorder.listen(options);
     records = run_realtime(settings, simulation, *device, command.duration, options, report);
   }
+  recorder.finish(report.lost);
   HapticFindings findings = findings_of(settings, records, report);
   std::vector<SolvedForce> solved;
-  if (command.solved_stride > 0 && scenario.tool) {
+  if (command.solved_stride > 0 && scenario.tool && !report.stopped) {
     say("solving off line for the error of the force model");
     HapticSimulation again(scenario);
     solved = solve_recorded(again, records.ticks, static_cast<std::uint64_t>(command.solved_stride));
@@ -53,8 +115,8 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   say(text_of(findings));
   for (const std::string& remark : simulation.session().warnings())
     say("warning: " + remark);
-  say(fmt::format("results in {}: haptic_ticks.csv haptic_solves.csv haptic_deadlines.csv haptic.json",
-                  command.out.string()));
+  say(fmt::format("results in {}: haptic_ticks.csv haptic_solves.csv haptic_deadlines.csv haptic.json {}",
+                  command.out.string(), recording_name));
   return report.stopped ? RunEnd::interrupted : RunEnd::complete;
 }
 

@@ -4,10 +4,41 @@
 #include "topology/errors.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 
 namespace spherecut::app {
+namespace {
+
+// FNV-1a over words: equal bits, equal hash.
+class Hash {
+ public:
+  void add(std::uint64_t word) {
+    for (int byte = 0; byte < 8; ++byte)
+      value_ = (value_ ^ ((word >> (8 * byte)) & 0xff)) * 0x100000001b3U;
+  }
+  void add(double number) { add(std::bit_cast<std::uint64_t>(number)); }
+  [[nodiscard]] std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325U;
+};
+
+std::uint64_t topology_of(const Session& session, const StepResult& result) {
+  Hash hash;
+  for (const Vector3& x : session.sprinkling().nodes.positions)
+    for (int axis = 0; axis < 3; ++axis)
+      hash.add(x[axis]);
+  if (result.cut) {
+    hash.add(result.cut->area);
+    hash.add(result.cut->surface_hash);
+    hash.add(static_cast<std::uint64_t>(result.cut->closed_pairs));
+  }
+  return hash.value();
+}
+
+} // namespace
 
 void DegradationRule::rebuilt(double seconds) {
   if (seconds > budget_) {
@@ -57,14 +88,15 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   }
   result_ = session_.step(sample(device));
   const BodyModel& model = session_.model();
+  const solvers::ContactCondition condition = session_.scenario().contact.condition;
   if (model.patch.nodes.empty() || !model.state) {
     clear(snapshot);
     snapshot.pose = result_.pose;
     snapshot.contact = result_.contact;
+    snapshot.condition = condition;
   } else {
     const bool lips = model.lips && std::any_of(model.state->lips.closed.begin(), model.state->lips.closed.end(),
                                                 [](char closed) { return closed != 0; });
-    const solvers::ContactCondition condition = session_.scenario().contact.condition;
     if (lips)
       fill(solvers::held_patch(model.patch, *model.lips, model.state->lips.closed), model.state->tool, result_.contact,
            condition, snapshot);
@@ -77,7 +109,28 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   snapshot.cut_triangles = result_.cut ? result_.cut->triangles : 0;
   snapshot.degradation = degradation_;
   snapshot.nodes = result_.nodes;
+  snapshot.topology = topology_of(session_, result_);
   snapshot.solve_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
+                            ContactSnapshot& snapshot) {
+  const auto failed = [&](const std::exception& error) {
+    SolveRecord record;
+    record.event = event;
+    record.failed = true;
+    record.reason = error.what();
+    return record;
+  };
+  try {
+    simulation.solve(device, event.degradation, snapshot);
+  } catch (const NumericalError& error) {
+    return failed(error);
+  } catch (const InputError& error) { // of the pose: the contact has reached a fixed region
+    return failed(error);
+  }
+  snapshot.sequence = event.sequence;
+  return record_of(event, snapshot);
 }
 
 } // namespace spherecut::app

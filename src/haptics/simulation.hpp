@@ -3,6 +3,7 @@
 
 #include "src/haptics/contact_snapshot.hpp"
 #include "src/haptics/device.hpp"
+#include "src/haptics/loop_records.hpp"
 #include "src/session.hpp"
 
 namespace spherecut::app {
@@ -52,5 +53,9 @@ class HapticSimulation {
   StepResult result_;
   int degradation_ = 0;
 };
+
+/// Solves as an event says and tells what came of it. A failure leaves the snapshot as it was.
+SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
+                            ContactSnapshot& snapshot);
 
 } // namespace spherecut::app

@@ -30,8 +30,8 @@ class ViewerFeed {
   /// `rate` frames per second at most; 0: none.
   explicit ViewerFeed(double rate) : rate_(rate) {}
 
-  /// Simulation thread.
-  void offer(const HapticSimulation& simulation, const ContactSnapshot& snapshot);
+  /// Simulation thread; `solve`: the one that the simulation stands at.
+  void offer(const HapticSimulation& simulation, const SolveRecord& solve);
   [[nodiscard]] double seconds() const { return seconds_; } // spent on frames
   [[nodiscard]] std::uint64_t frames() const { return number_; }
 

@@ -28,7 +28,8 @@ class InFlight {
     spare_.pop_back();
     return *flying_.back().snapshot;
   }
-  void fail() {
+  /// The solve launched last never lands.
+  void drop() {
     spare_.push_back(std::move(flying_.back().snapshot));
     flying_.pop_back();
   }
@@ -86,6 +87,7 @@ SolveRecord record_of(const SolveEvent& event, const ContactSnapshot& snapshot) 
   record.candidates = snapshot.count;
   for (int c = 0; c < snapshot.count; ++c)
     record.active += snapshot.active[c];
+  record.topology = snapshot.topology;
   record.asymmetry = snapshot.asymmetry;
   record.force = snapshot.force;
   record.seconds = snapshot.solve_seconds;
@@ -102,7 +104,8 @@ std::vector<SolveEvent> regular_solves(std::uint64_t ticks, std::uint64_t period
 }
 
 std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings, HapticSimulation& simulation,
-                                     Device& device, const std::vector<SolveEvent>& events, std::uint64_t ticks) {
+                                     Device& device, const std::vector<SolveEvent>& events, std::uint64_t ticks,
+                                     const VirtualOptions& options) {
   check_events(events);
   const topology::ContactQuery query(simulation.session().organ().domain->surface());
   std::vector<std::unique_ptr<HapticTick>> cores;
@@ -114,7 +117,7 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
   std::vector<SolveRecord> solves;
   InFlight flights;
   auto next = events.begin();
-  for (std::uint64_t tick = 0; tick < ticks; ++tick) {
+  for (std::uint64_t tick = 0; tick < ticks && !options.stop(); ++tick) {
     const DeviceState state = device.read(tick);
     if (tick == 0) {
       simulation.prepare(state);
@@ -123,14 +126,10 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
     }
     for (; next != events.end() && next->pose_tick <= tick; ++next) {
       ContactSnapshot& snapshot = flights.launch(*next);
-      try {
-        simulation.solve(state, next->degradation, snapshot);
-        snapshot.sequence = next->sequence;
-        solves.push_back(record_of(*next, snapshot));
-      } catch (const NumericalError& error) {
-        flights.fail();
-        solves.push_back({.event = *next, .failed = true, .reason = error.what()});
-      }
+      solves.push_back(solve_recording(simulation, state, *next, snapshot));
+      options.on_solve(solves.back());
+      if (solves.back().failed || next->arrival_tick == SolveEvent::never)
+        flights.drop();
     }
     const bool arrives = flights.due(tick);
     const ContactSnapshot* arrived = arrives ? &flights.land(tick) : nullptr;
@@ -142,6 +141,7 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
         device.apply(result.force);
       records[m].ticks.push_back(record_of(state, result, arrives));
     }
+    options.on_tick(records.front().ticks.back());
   }
   for (LoopRecords& one : records)
     one.solves = solves;
@@ -149,8 +149,8 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
 }
 
 LoopRecords run_virtual(const HapticSettings& settings, HapticSimulation& simulation, Device& device,
-                        const std::vector<SolveEvent>& events, std::uint64_t ticks) {
-  return std::move(run_virtual(std::vector{settings}, simulation, device, events, ticks).front());
+                        const std::vector<SolveEvent>& events, std::uint64_t ticks, const VirtualOptions& options) {
+  return std::move(run_virtual(std::vector{settings}, simulation, device, events, ticks, options).front());
 }
 
 std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std::vector<TickRecord>& ticks,

@@ -1,0 +1,88 @@
+#include "src/haptics/replay.hpp"
+
+#include "src/build_identity.hpp"
+#include "topology/errors.hpp"
+#include "topology/wound.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+namespace {
+
+bool same_bits(const Vector3& a, const Vector3& b) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::bit_cast<std::uint64_t>(a[axis]) != std::bit_cast<std::uint64_t>(b[axis]))
+      return false;
+  return true;
+}
+
+bool same_solve(const SolveRecord& a, const SolveRecord& b) {
+  return a.failed == b.failed && a.resprinkled == b.resprinkled && a.cut_triangles == b.cut_triangles &&
+         a.nodes == b.nodes && a.topology == b.topology && same_bits(a.force, b.force);
+}
+
+} // namespace
+
+std::string text_of(const ReplayReport& r) {
+  std::string text = fmt::format("replay of {} ticks and {} solves: ", r.ticks, r.solves);
+  if (r.same())
+    text += "forces and topology are the same, bit by bit";
+  if (r.differing_tick)
+    text += fmt::format("the force first differs at tick {}, in {} ticks altogether, by up to {:.3g} N",
+                        *r.differing_tick, r.differing_ticks, r.largest);
+  if (r.differing_solve)
+    text += fmt::format("{}solve {} is the first that differs", r.differing_tick ? "; " : "", *r.differing_solve);
+  if (!r.same_build)
+    text += "\n  recorded by another build of this program";
+  if (!r.same_processor)
+    text += "\n  recorded on another processor";
+  return text;
+}
+
+Scenario recorded_scenario(const Recording& recording) {
+  return read_scenario_text(recording.header.scenario, recording.header.scenario_text);
+}
+
+ReplayReport replay(const Recording& recording, HapticSimulation& simulation, LoopRecords& records,
+                    const std::function<bool()>& stop) {
+  const Session& session = simulation.session();
+  if (recording.ticks.empty())
+    throw InputError("a recording without ticks cannot be replayed; allowed: one tick or more");
+  if (const auto organ = topology::surface_hash(session.organ().domain->surface()); organ != recording.header.organ)
+    throw InputError(fmt::format("the organ of {} is not the recorded one: its surface has the hash {:016x}, recorded "
+                                 "is {:016x}",
+                                 recording.header.scenario.string(), organ, recording.header.organ));
+  if (session.scenario().haptics.rate != recording.header.rate ||
+      session.scenario().nodes.random_seed != recording.header.seed)
+    throw InputError("rate or seed of the recording are not those of its scenario; this recording cannot be replayed");
+  std::vector<SolveEvent> events;
+  for (const SolveRecord& solve : recording.solves)
+    if (solve.event.pose_tick < recording.ticks.size())
+      events.push_back(solve.event);
+  RecordedMotion device(recording, recording.header.rate);
+  VirtualOptions options;
+  options.stop = stop;
+  records = run_virtual(session.scenario().haptics, simulation, device, events, recording.ticks.size(), options);
+  ReplayReport report;
+  report.ticks = records.ticks.size();
+  report.solves = std::min(records.solves.size(), events.size());
+  report.same_build = recording.header.build == build_identity();
+  report.same_processor = recording.header.processor == processor_name();
+  for (std::size_t i = 0; i < report.ticks; ++i) {
+    const TickRecord& now = records.ticks[i];
+    const RecordedTick& then = recording.ticks[i];
+    if (same_bits(now.force, then.force) && now.sequence == then.sequence)
+      continue;
+    report.differing_tick = report.differing_tick.value_or(i);
+    ++report.differing_ticks;
+    report.largest = std::max(report.largest, (now.force - then.force).norm());
+  }
+  for (std::size_t i = 0; i < report.solves && !report.differing_solve; ++i)
+    if (!same_solve(records.solves[i], recording.solves[i]))
+      report.differing_solve = recording.solves[i].event.sequence;
+  return report;
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,245 @@
+// Recordings of haptic sessions: replay to the bit, files that are refused, sessions that were killed.
+#include "src/haptics/realtime_loop.hpp"
+#include "src/haptics/replay.hpp"
+#include "src/haptics/run_haptics.hpp"
+
+#include "tests/src/scenario_text.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "topology/errors.hpp"
+
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <limits>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using spherecut::tests::cut_block;
+using spherecut::tests::read_file;
+using spherecut::tests::run_spherecut;
+using spherecut::tests::small_scenario;
+using spherecut::tests::TemporaryFolder;
+using spherecut::tests::write_file;
+
+namespace {
+
+/// The block with a blade that is drawn through its top in half a second.
+const std::string blade_block = cut_block + R"([blade]
+edge = [[0, -0.04, 0.022], [0, 0.04, 0.022]]
+[[blade.path]]
+time = 0
+position = [-0.032, 0, 0]
+[[blade.path]]
+time = 0.5
+position = [-0.012, 0, 0]
+[output]
+figures = false
+)";
+
+/// A short session in real time with its recording in `file`.
+LoopRecords record(const Scenario& scenario, const std::filesystem::path& file, double seconds) {
+  HapticSimulation simulation(scenario);
+  const auto device = make_device(scenario.haptics, simulation);
+  RecordingWriter writer(file, recording_header(scenario, simulation.session().organ().domain->surface()));
+  RealtimeOptions options;
+  options.fifo = false;
+  options.on_tick = [&](const TickRecord& tick) { writer.add(tick); };
+  options.on_solve = [&](const SolveRecord& solve) { writer.add(solve); };
+  RealtimeReport report;
+  LoopRecords records = run_realtime(scenario.haptics, simulation, *device, seconds, options, report);
+  CHECK(report.lost == 0);
+  CHECK(report.ticks == records.ticks.size());
+  writer.finish(report.lost);
+  return records;
+}
+
+/// A recording that was not computed: `ticks` ticks, a solve every ten that is taken over three later.
+void write_made_up(const std::filesystem::path& file, std::uint64_t ticks, bool finish) {
+  RecordingWriter writer(file, {"build", "processor", "/s.toml", "text", 3, 5, 1000});
+  for (std::uint64_t t = 0; t < ticks; ++t) {
+    if (t % 10 == 0) {
+      SolveRecord solve;
+      solve.event = {t / 10 + 1, t, SolveEvent::never, static_cast<int>(t / 10 % 3)};
+      solve.topology = 7 * t;
+      solve.force = {0, 0.1, static_cast<double>(t)};
+      writer.add(solve);
+    }
+    TickRecord tick;
+    tick.device = {t,
+                   1e-3 * static_cast<double>(t),
+                   {1e-3, 2e-3, 1e-5 * static_cast<double>(t)},
+                   Eigen::Quaterniond::Identity(),
+                   t != 5,
+                   2,
+                   9};
+    tick.force = {1, 2, static_cast<double>(t)};
+    tick.sequence = t < 3 ? 0 : (t - 3) / 10 + 1;
+    writer.add(tick);
+  }
+  writer.flush();
+  if (finish)
+    writer.finish();
+}
+
+} // namespace
+
+TEST_CASE("A session in real time is replayed with the same forces and topology to the bit") {
+  const auto& [text, cuts] = GENERATE(table<std::string, bool>({{small_scenario, false}, {blade_block, true}}));
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "a.recording";
+  const Scenario scenario = read_scenario(write_file(folder.path() / "s.toml", text));
+  const LoopRecords records = record(scenario, file, 0.5);
+  Recording recording = read_recording(file);
+  REQUIRE(recording.finished);
+  REQUIRE(recording.ticks.size() == records.ticks.size());
+  REQUIRE(recording.solves.size() == records.solves.size());
+  int increments = 0;
+  for (std::size_t i = 0; i < records.solves.size(); ++i) {
+    CHECK(recording.solves[i].event.arrival_tick == records.solves[i].event.arrival_tick);
+    increments += records.solves[i].cut_triangles > 0 ? 1 : 0;
+  }
+  CHECK((increments > 0) == cuts);
+  HapticSimulation simulation(recorded_scenario(recording));
+  LoopRecords again;
+  const ReplayReport report = replay(recording, simulation, again);
+  CHECK(report.same());
+  CHECK(report.same_build);
+  CHECK(report.ticks == recording.ticks.size());
+  CHECK(report.solves > 5);
+  if (cuts)
+    return;
+  // The comparison can tell: one pose in contact a micrometre off.
+  recording.ticks[450].device.position.z() -= 1e-6;
+  HapticSimulation other(recorded_scenario(recording));
+  const ReplayReport off = replay(recording, other, again);
+  REQUIRE(off.differing_tick);
+  CHECK(*off.differing_tick == 450);
+  CHECK(off.largest > 0);
+  recording.header.organ ^= 1;
+  HapticSimulation unused(recorded_scenario(recording));
+  CHECK_THROWS_WITH(replay(recording, unused, again), Catch::Contains("organ"));
+}
+
+TEST_CASE("A recording keeps every value, and a session that was killed all that was flushed") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "a.recording";
+  const bool finish = GENERATE(true, false);
+  write_made_up(file, 700, finish);
+  const Recording recording = read_recording(file);
+  CHECK(recording.finished == finish);
+  CHECK(recording.header.scenario_text == "text");
+  CHECK(recording.header.seed == 3);
+  REQUIRE(recording.ticks.size() == 700);
+  REQUIRE(recording.solves.size() == 70);
+  const RecordedTick& tick = recording.ticks[345];
+  CHECK(tick.device.position == Vector3(1e-3, 2e-3, 1e-5 * 345));
+  CHECK(tick.force == Vector3(1, 2, 345));
+  CHECK(tick.device.connected);
+  CHECK_FALSE(recording.ticks[5].device.connected);
+  CHECK(tick.device.mode == 2);
+  CHECK(tick.device.buttons == 9);
+  CHECK(recording.solves[34].event.arrival_tick == 343);
+  CHECK(recording.solves[34].event.degradation == 1);
+  CHECK(recording.solves[34].topology == 7 * 340);
+}
+
+TEST_CASE("A recording moves a device and stays where it ends") {
+  const TemporaryFolder folder;
+  write_made_up(folder.path() / "a.recording", 300, true);
+  const Recording recording = read_recording(folder.path() / "a.recording");
+  RecordedMotion device(recording, 1000);
+  CHECK(device.read(200).position.z() == 1e-5 * 200);
+  CHECK(device.read(5000).position.z() == 1e-5 * 299);
+  CHECK(device.read(5000).time == Approx(5));
+  CHECK_THROWS_AS(RecordedMotion(recording, 500), InputError);
+}
+
+TEST_CASE("Files that are no whole recording are refused wherever they are cut off or damaged") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "a.recording";
+  write_made_up(file, 40, true);
+  const std::string whole = read_file(file);
+  const auto refused = [&](const std::string& bytes, const std::string& what) {
+    write_file(file, bytes);
+    CHECK_THROWS_WITH(read_recording(file), Catch::Contains(what));
+  };
+  refused("", "not a recording");
+  refused("some text of no meaning at all", "not a recording");
+  std::string foreign = whole;
+  foreign[8] = 9;
+  refused(foreign, "format 9");
+  CHECK_THROWS_AS(read_recording(folder.path() / "none"), InputError);
+  int ends = 0; // between two lots: a session that was killed there
+  for (std::size_t size = 1; size < whole.size(); size += size < 400 ? 1 : 7) {
+    write_file(file, whole.substr(0, size));
+    try {
+      const Recording part = read_recording(file);
+      CHECK_FALSE(part.finished);
+      ++ends;
+    } catch (const InputError& error) {
+      CHECK(std::strstr(error.what(), "a.recording") != nullptr);
+    }
+  }
+  CHECK(ends <= 3);
+  for (std::size_t at = 16; at < whole.size(); at += 5) { // no damaged byte goes unseen
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x40);
+    write_file(file, damaged);
+    CHECK_THROWS_AS(read_recording(file), InputError);
+  }
+  refused(whole + "more", "cut off");
+  write_made_up(file, 40, false);
+  RecordingWriter lossy(file, {"build", "processor", "/s.toml", "text", 3, 5, 1000});
+  lossy.finish(4);
+  CHECK_THROWS_WITH(read_recording(file), Catch::Contains("4 ticks were lost"));
+}
+
+TEST_CASE("A session without end keeps nothing in memory and ends when it is told") {
+  const TemporaryFolder folder;
+  const Scenario scenario = read_scenario(write_file(folder.path() / "s.toml", small_scenario));
+  HapticSimulation simulation(scenario);
+  const auto device = make_device(scenario.haptics, simulation);
+  RealtimeOptions options;
+  options.fifo = false;
+  options.keep = false;
+  std::uint64_t seen = 0;
+  bool in_order = true;
+  options.on_tick = [&](const TickRecord& tick) { in_order = in_order && tick.device.tick == seen++; };
+  options.stop = [&] { return seen >= 100; };
+  RealtimeReport report;
+  const LoopRecords records =
+      run_realtime(scenario.haptics, simulation, *device, std::numeric_limits<double>::infinity(), options, report);
+  CHECK(records.ticks.empty());
+  CHECK(records.solves.empty());
+  CHECK(in_order);
+  CHECK(seen == report.ticks);
+  CHECK(report.stopped);
+  options.stop = [] { return false; };
+  options.on_tick = [](const TickRecord&) { throw InputError("the disk is full"); };
+  CHECK_THROWS_WITH(run_realtime(scenario.haptics, simulation, *device, 5, options, report), "the disk is full");
+}
+
+TEST_CASE("The command line records a session, replays it, moves a device by it and refuses garbage") {
+  const TemporaryFolder folder;
+  const auto path = [&](const char* name) { return (folder.path() / name).string(); };
+  write_file(folder.path() / "s.toml", small_scenario);
+  REQUIRE(run_spherecut(
+              {"haptics", path("s.toml"), "--out", path("a"), "--duration", "0.3", "--virtual", "--solved-every", "0"})
+              .status == 0);
+  const auto replayed = run_spherecut({"haptics", "--replay", path("a/haptic.recording"), "--out", path("b")});
+  CHECK(replayed.status == 0);
+  CHECK(replayed.out.find("the same, bit by bit") != std::string::npos);
+  const std::string ticks = read_file(folder.path() / "a/haptic_ticks.csv");
+  CHECK(ticks == read_file(folder.path() / "b/haptic_ticks.csv"));
+  const std::string held = small_scenario + "[haptics]\ndevice = \"recording\"\n";
+  write_file(folder.path() / "r.toml", held + "recording = \"a/haptic.recording\"\n");
+  REQUIRE(run_spherecut(
+              {"haptics", path("r.toml"), "--out", path("c"), "--duration", "0.3", "--virtual", "--solved-every", "0"})
+              .status == 0);
+  CHECK(ticks == read_file(folder.path() / "c/haptic_ticks.csv"));
+  write_file(folder.path() / "n.toml", held);
+  CHECK(run_spherecut({"check", path("n.toml")}).status == 2);
+  write_file(folder.path() / "g", "SPHCREC\n\1");
+  CHECK(run_spherecut({"haptics", "--replay", path("g"), "--out", path("d")}).status == 2);
+  CHECK(run_spherecut({"haptics", "--out", path("d")}).status == 2);
+}
