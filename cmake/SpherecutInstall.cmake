@@ -6,7 +6,9 @@ install(TARGETS spherecut_topology spherecut_solvers spherecut_app spherecut_opt
   EXPORT spherecutTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(EXPORT spherecutTargets NAMESPACE spherecut:: DESTINATION "${SPHERECUT_PACKAGE_FOLDER}")
 install(TARGETS spherecut RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
-install(DIRECTORY topology solvers src DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/spherecut" FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY topology solvers src DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/spherecut" FILES_MATCHING PATTERN "*.hpp"
+  PATTERN page EXCLUDE)
+install(DIRECTORY "${SPHERECUT_PAGE_FOLDER}/" DESTINATION "${CMAKE_INSTALL_DATADIR}/spherecut/page" OPTIONAL)
 install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/spherecut" FILES_MATCHING PATTERN "*.toml")
 install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 

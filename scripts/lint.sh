@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Formatting, clang-tidy and shell syntax over all tracked sources. Usage: scripts/lint.sh BUILD_FOLDER
+# Formatting, clang-tidy, shell syntax and types of the page over all tracked sources. Usage: scripts/lint.sh BUILD_FOLDER
 # clang-tidy leaves out units that include CGAL, OpenVDB or FCL: their headers take minutes and a gigabyte each.
 # What a unit said is kept under a hash of all it depends on, so that a repeat checks only what changed.
 set -euo pipefail
@@ -19,6 +19,14 @@ for shell in "${shells[@]}"; do
 done
 clang-format-14 --dry-run -Werror "${sources[@]}" || status=1
 printf 'lint: %d sources formatted, %d shell scripts parsed\n' "${#sources[@]}" "${#shells[@]}"
+
+page=src/viewer/page
+if [ -e $page/node_modules/typescript/bin/tsc ]; then
+  (cd $page && node node_modules/typescript/bin/tsc --noEmit) || status=1
+  printf 'lint: types of the page checked\n'
+else
+  printf 'lint: the packages of the page are not installed (./dev build does it): its types are not checked\n'
+fi
 
 # unit <tab> files it includes, itself first, following the project's own quoted includes.
 dependencies() {

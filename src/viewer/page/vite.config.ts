@@ -8,7 +8,7 @@ export default defineConfig({
     modulePreload: false,
     chunkSizeWarningLimit: 900,
     rollupOptions: {
-      output: { entryFileNames: 'page.js', assetFileNames: 'page[extname]', inlineDynamicImports: true },
+      output: { entryFileNames: 'assets/page.js', assetFileNames: 'assets/page[extname]', inlineDynamicImports: true },
     },
   },
 });

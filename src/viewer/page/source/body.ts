@@ -1,0 +1,190 @@
+// The organ in the picture: its surface, the walls of the wound, lips and front, following the frames.
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DynamicDrawUsage,
+  FrontSide,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshPhongMaterial,
+} from 'three';
+import { linearTable, sequential } from './colours';
+import { Part, type Scalars, type Topology, type Vec3 } from './protocol';
+import { castRay, frontEdges, type Hit, lipDistance, lipEdges, trianglesOf, vertexNormals } from './surface';
+
+const tissueColour = new Color('#9a4b45');
+const wallColour = new Color('#e0705f');
+const lipColour = new Color('#ffe3c2');
+const frontColour = new Color('#ffd24d');
+const tableSize = 256;
+const table = linearTable(sequential, tableSize);
+
+/** One of the two shaded parts: shares positions with the other, has normals of its own. */
+interface Skin {
+  mesh: Mesh<BufferGeometry, MeshPhongMaterial>;
+  triangles: Uint32Array;
+  normals: BufferAttribute;
+}
+
+/** A copy of the surface that rays can be cast at while the shown one moves. */
+export interface Snapshot {
+  positions: Float32Array;
+  triangles: Uint32Array;
+  normals: Float32Array;
+}
+
+export class Body {
+  readonly group = new Group();
+  topology: Topology | null = null;
+  private positions: BufferAttribute | null = null;
+  private colours: BufferAttribute | null = null;
+  private organ: Skin | null = null;
+  private wall: Skin | null = null;
+  private transparent = false;
+  private wireframe = false;
+
+  /** Another surface; it is at rest until the first vertices come. */
+  setTopology(topology: Topology): void {
+    this.clear();
+    this.topology = topology;
+    const positions = new BufferAttribute(topology.rest.slice(), 3);
+    positions.setUsage(DynamicDrawUsage);
+    const colours = new BufferAttribute(new Float32Array(3 * topology.vertexCount), 3);
+    colours.setUsage(DynamicDrawUsage);
+    this.positions = positions;
+    this.colours = colours;
+    const skin = (triangles: Uint32Array, colour: Color, shininess: number): Skin => {
+      const geometry = new BufferGeometry();
+      const normals = new BufferAttribute(new Float32Array(3 * topology.vertexCount), 3);
+      normals.setUsage(DynamicDrawUsage);
+      geometry.setAttribute('position', positions);
+      geometry.setAttribute('normal', normals);
+      geometry.setAttribute('color', colours);
+      geometry.setIndex(new BufferAttribute(triangles, 1));
+      const material = new MeshPhongMaterial({
+        color: colour,
+        specular: new Color('#2a2422'),
+        shininess,
+        side: FrontSide,
+        polygonOffset: true,
+        polygonOffsetFactor: 1,
+        polygonOffsetUnits: 1,
+      });
+      const mesh = new Mesh(geometry, material);
+      mesh.frustumCulled = false;
+      this.group.add(mesh);
+      return { mesh, triangles, normals };
+    };
+    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), tissueColour, 26);
+    this.wall = skin(trianglesOf(topology, (part) => part !== Part.organ), wallColour, 8);
+    const lines = (edges: Uint32Array, colour: Color): void => {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute('position', positions);
+      geometry.setIndex(new BufferAttribute(edges, 1));
+      const segments = new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
+      segments.frustumCulled = false;
+      segments.visible = edges.length > 0;
+      this.group.add(segments);
+    };
+    lines(lipEdges(topology), lipColour);
+    lines(frontEdges(topology), frontColour);
+    this.setLook(this.transparent, this.wireframe);
+    this.moved();
+  }
+
+  setVertices(vertices: Float32Array): void {
+    if (!this.positions || this.positions.array.length !== vertices.length) return;
+    this.positions.array.set(vertices);
+    this.moved();
+  }
+
+  /** Colours by value between `low` and `high`; null: the tissue's own. */
+  setScalars(scalars: Scalars | null, low: number, high: number): void {
+    if (!this.colours || !this.organ || !this.wall) return;
+    const coloured = scalars !== null && scalars.values.length === this.colours.count;
+    if (coloured) {
+      const span = high > low ? (tableSize - 1) / (high - low) : 0;
+      const target = this.colours.array as Float32Array;
+      for (let i = 0; i < scalars.values.length; ++i) {
+        const value = scalars.values[i] ?? 0;
+        const entry = 3 * Math.min(Math.max(Math.round((value - low) * span), 0), tableSize - 1);
+        target[3 * i] = table[entry] ?? 0;
+        target[3 * i + 1] = table[entry + 1] ?? 0;
+        target[3 * i + 2] = table[entry + 2] ?? 0;
+      }
+      this.colours.needsUpdate = true;
+    }
+    for (const [skin, own] of [[this.organ, tissueColour], [this.wall, wallColour]] as const) {
+      const material = skin.mesh.material;
+      if (material.vertexColors !== coloured) material.needsUpdate = true;
+      material.vertexColors = coloured;
+      if (coloured) material.color.set(0xffffff);
+      else material.color.copy(own);
+    }
+  }
+
+  /** `transparent`: what lies inside shows through. */
+  setLook(transparent: boolean, wireframe: boolean): void {
+    this.transparent = transparent;
+    this.wireframe = wireframe;
+    for (const skin of [this.organ, this.wall]) {
+      if (!skin) continue;
+      const material = skin.mesh.material;
+      material.transparent = transparent;
+      material.opacity = transparent ? 0.28 : 1;
+      material.depthWrite = !transparent;
+      material.wireframe = wireframe;
+      material.needsUpdate = true;
+    }
+  }
+
+  /** What rays can be cast at, as it is now. */
+  snapshot(): Snapshot | null {
+    if (!this.positions || !this.organ) return null;
+    return {
+      positions: (this.positions.array as Float32Array).slice(),
+      triangles: this.organ.triangles,
+      normals: (this.organ.normals.array as Float32Array).slice(),
+    };
+  }
+
+  /** Nearest point of the organ's own surface on a ray. */
+  cast(origin: Vec3, direction: Vec3): Hit | null {
+    if (!this.positions || !this.organ) return null;
+    return castRay(
+      this.positions.array as Float32Array,
+      this.organ.triangles,
+      this.organ.normals.array as Float32Array,
+      origin,
+      direction,
+    );
+  }
+
+  /** Largest distance between the two sides of the cut, m. */
+  lipsApart(): number {
+    return this.topology && this.positions ? lipDistance(this.topology, this.positions.array as Float32Array) : 0;
+  }
+
+  private moved(): void {
+    if (!this.positions || !this.organ || !this.wall) return;
+    this.positions.needsUpdate = true;
+    for (const skin of [this.organ, this.wall]) {
+      if (skin.triangles.length === 0) continue;
+      vertexNormals(this.positions.array as Float32Array, skin.triangles, skin.normals.array as Float32Array);
+      skin.normals.needsUpdate = true;
+    }
+  }
+
+  private clear(): void {
+    for (const child of [...this.group.children]) {
+      this.group.remove(child);
+      if (child instanceof Mesh || child instanceof LineSegments) {
+        (child.geometry as BufferGeometry).dispose();
+        (child.material as LineBasicMaterial | MeshPhongMaterial).dispose();
+      }
+    }
+  }
+}

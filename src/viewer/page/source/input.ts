@@ -1,0 +1,110 @@
+// Mouse, pen and touch on the picture. On the organ the left button or one finger presses; beside it they turn the view.
+import type { Orbit } from './orbit';
+import type { Ray, Stylus } from './stylus';
+
+interface Finger {
+  x: number; // px
+  y: number;
+}
+
+export interface PointerHost {
+  /** The ray through a point of the picture in pixels. */
+  ray(x: number, y: number): Ray;
+  /** A click meant for picking a node has been taken. */
+  pick(ray: Ray): boolean;
+  /** The pointer has moved to here, px. */
+  moved(x: number, y: number): void;
+  changed(): void;
+}
+
+export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: Stylus, host: PointerHost): void {
+  const fingers = new Map<number, Finger>();
+  let gesture: 'none' | 'press' | 'turn' | 'pan' | 'two' = 'none';
+  let depthAtStart = 0;
+
+  const at = (event: PointerEvent | WheelEvent): Finger => {
+    const box = canvas.getBoundingClientRect();
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  };
+
+  canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+  canvas.addEventListener('pointerdown', (event) => {
+    canvas.focus({ preventScroll: true });
+    canvas.setPointerCapture(event.pointerId);
+    const place = at(event);
+    fingers.set(event.pointerId, place);
+    if (event.pointerType === 'touch' && fingers.size === 2) {
+      stylus.release();
+      gesture = 'two';
+      return;
+    }
+    if (fingers.size > 1) return;
+    const ray = host.ray(place.x, place.y);
+    if (event.button === 1 || (event.button === 2 && event.shiftKey)) gesture = 'pan';
+    else if (event.button === 2) gesture = 'turn';
+    else if (host.pick(ray)) gesture = 'none';
+    else if (stylus.holding && stylus.point(ray)) {
+      host.moved(place.x, place.y);
+      depthAtStart = stylus.depths[stylus.mode];
+      gesture = 'press';
+      stylus.press();
+    } else gesture = 'turn';
+  });
+  canvas.addEventListener('pointermove', (event) => {
+    const place = at(event);
+    const before = fingers.get(event.pointerId);
+    if (!before) {
+      host.moved(place.x, place.y);
+      stylus.point(host.ray(place.x, place.y));
+      return;
+    }
+    const dx = place.x - before.x;
+    const dy = place.y - before.y;
+    if (gesture === 'two') {
+      pinch(event.pointerId, before, place);
+    } else if (gesture === 'press') {
+      host.moved(place.x, place.y);
+      stylus.point(host.ray(place.x, place.y));
+      if (event.pointerType === 'pen' && event.pressure > 0) stylus.setDepth(event.pressure * 2 * depthAtStart);
+      host.changed();
+    } else if (gesture === 'turn') {
+      orbit.turn(0.008 * dx, 0.008 * dy);
+      host.changed();
+    } else if (gesture === 'pan') {
+      orbit.pan(dx / canvas.clientHeight, -dy / canvas.clientHeight);
+      host.changed();
+    }
+    fingers.set(event.pointerId, place);
+  });
+  const lift = (event: PointerEvent): void => {
+    fingers.delete(event.pointerId);
+    if (gesture === 'press') {
+      stylus.release();
+      if (event.pointerType === 'pen') stylus.setDepth(depthAtStart);
+    }
+    if (gesture !== 'two' || fingers.size === 0) gesture = 'none';
+  };
+  canvas.addEventListener('pointerup', lift);
+  canvas.addEventListener('pointercancel', lift);
+  canvas.addEventListener(
+    'wheel',
+    (event) => {
+      event.preventDefault();
+      const notches = Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY) / 100, 1);
+      if (stylus.pressing) stylus.deepen(-0.0005 * notches * (event.shiftKey ? 4 : 1));
+      else orbit.zoom(Math.exp(-0.15 * notches));
+      host.changed();
+    },
+    { passive: false },
+  );
+
+  /** Two fingers turn the view by their middle and zoom by their distance. */
+  function pinch(id: number, before: Finger, place: Finger): void {
+    const other = [...fingers].find(([key]) => key !== id)?.[1];
+    if (!other) return;
+    const spread = (a: Finger): number => Math.hypot(a.x - other.x, a.y - other.y);
+    orbit.zoom(spread(place) / Math.max(spread(before), 1));
+    orbit.turn(0.004 * (place.x - before.x), 0.004 * (place.y - before.y));
+    host.changed();
+  }
+}

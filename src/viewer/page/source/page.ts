@@ -1,0 +1,451 @@
+import { drawBar, diverging, sequential, withUnit } from './colours';
+import { ForceChart } from './chart';
+import { Connection, type LinkState } from './connection';
+import { element } from './element';
+import { attachPointer } from './input';
+import { bindings } from './bindings';
+import { Keyboard } from './keys';
+import { Latency } from './latency';
+import { Messages } from './messages';
+import type { Snapshot } from './body';
+import { Panels } from './panels';
+import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Topology, Vec3, Welcome } from './protocol';
+import { savePicture } from './screenshot';
+import { castRay, type Hit } from './surface';
+import { type Ray, Stylus } from './stylus';
+import { View } from './view';
+
+const button = (id: string): HTMLButtonElement => element(id, HTMLButtonElement);
+const byId = (id: string): HTMLElement => element(id, HTMLElement);
+
+/** What the page knows, and how its parts hang together. */
+export class Page {
+  readonly view = new View(element('scene', HTMLCanvasElement));
+  readonly latency = new Latency();
+  session: SessionStart | null = null;
+  frame: Frame | null = null;
+  holder: number | null = null;
+  id = -1;
+  private readonly messages = new Messages(byId('messages'));
+  private readonly chart = new ForceChart(element('chart', HTMLCanvasElement));
+  private readonly panels: Panels;
+  private readonly stylus: Stylus;
+  private readonly keyboard: Keyboard;
+  private readonly connection: Connection;
+  private pending: Frame[] = [];
+  private pointer = { x: -1, y: -1 }; // px, of the stylus
+  private frozen: Snapshot | null = null;
+  private scalars: Scalars | null = null;
+  private nodes: Nodes | null = null;
+  private support: Support | null = null;
+  private slice: Slice | null = null;
+  private stages: Float32Array | null = null;
+  private drawn: number[] = []; // times of the last pictures, ms
+  private ratesShown = 0;
+  private lastStep = performance.now();
+  private wantsTool = true; // takes it when it is free
+
+  constructor() {
+    this.panels = new Panels({
+      overlays: (request) => this.connection?.send({ type: 'overlays', ...request }),
+      look: () => this.look(),
+      set: (settings) => this.connection.send({ type: 'set', ...settings }),
+      scenario: (name) => this.connection.send({ type: 'scenario', name }),
+      mode: (mode) => this.chooseMode(mode),
+    });
+    this.stylus = new Stylus(
+      { cast: (ray) => this.cast(ray), freeze: () => (this.frozen = this.view.body.snapshot()), thaw: () => (this.frozen = null) },
+      (message) => this.connection.send(message),
+      (n) => this.latency.posed(n, performance.now()),
+      (pressing) => button('press-hold').setAttribute('aria-pressed', String(pressing)),
+    );
+    this.keyboard = new Keyboard(bindings(this, this.stylus, this.view.orbit, this.panels));
+    this.keyboard.describe(byId('help-body'), [
+      ['Move over the organ', 'the tool hovers there'],
+      ['Left button, finger or pen on the organ', 'presses, cuts or grips; drag along the surface'],
+      ['Wheel while pressing, pen pressure, slider', 'depth'],
+      ['Drag beside the organ, right button, two fingers', 'turns the view'],
+      ['Middle button, Shift and right button', 'moves the view'],
+      ['Wheel, pinch', 'zoom'],
+    ]);
+    attachPointer(this.view.canvas, this.view.orbit, this.stylus, {
+      ray: (x, y) => this.view.ray(x, y),
+      pick: (ray) => this.pickAlong(ray),
+      moved: (x, y) => (this.pointer = { x, y }),
+      changed: () => this.view.change(),
+    });
+    this.attachButtons();
+    this.connection = new Connection(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`, {
+      onState: (state, reason) => this.linkChanged(state, reason),
+      onText: (message) => this.read(message),
+      onTopology: (topology) => this.newTopology(topology),
+      onFrame: (frame) => this.pending.push(frame),
+    });
+    setInterval(() => this.step(), 16);
+    requestAnimationFrame(() => this.paint());
+  }
+
+  get holding(): boolean {
+    return this.id >= 0 && this.holder === this.id;
+  }
+
+  // --- what the server says -------------------------------------------------------------------------------------------
+
+  private read(message: ServerText): void {
+    switch (message.type) {
+      case 'welcome':
+        return this.welcome(message);
+      case 'session':
+        return this.begin(message);
+      case 'holder':
+        this.holder = message.id;
+        return this.showRole();
+      case 'mode':
+        this.stylus.setMode(message.mode);
+        this.panels.setMode(message.mode);
+        return this.showDepth();
+      case 'building':
+        byId('link').textContent = 'building';
+        return this.messages.say('info', message.what);
+      case 'error':
+        if (message.about === 'mode') this.panels.setMode(this.stylus.mode);
+        if (message.about === 'scenario' && this.session) this.panels.scenario.value = this.session.scenario;
+        return this.messages.say('error', message.text);
+      case 'log':
+        return this.messages.say(message.level === 'warning' ? 'warning' : 'info', message.text);
+      case 'recording':
+        button('record').setAttribute('aria-pressed', String(message.on));
+        if (!message.on) this.panels.addRecording(message);
+        byId('record-state').textContent =
+          `${message.on ? 'Recording' : 'Recorded'} ${message.name}, ${message.seconds.toFixed(1)} s`;
+        return this.showRole();
+      case 'replay':
+        button('replay').setAttribute('aria-pressed', String(message.on));
+        byId('link').dataset['state'] = message.on ? 'replay' : 'open';
+        byId('link').textContent = message.on ? `replay of ${message.name ?? ''}` : 'live';
+        return;
+    }
+  }
+
+  private welcome(message: Welcome): void {
+    this.id = message.id;
+    this.wantsTool = true;
+    this.panels.setScenarios(message.scenarios);
+    for (const recording of message.recordings) this.panels.addRecording(recording);
+    document.title = message.server;
+  }
+
+  private begin(session: SessionStart): void {
+    const same = this.session?.scenario === session.scenario;
+    this.session = session;
+    this.latency.clear();
+    this.chart.clear();
+    this.pending = this.pending.filter((frame) => frame.epoch === session.epoch);
+    this.scalars = this.nodes = this.support = this.slice = this.stages = null;
+    byId('link').textContent = 'live';
+    this.view.tool.setSession(session);
+    if (!same) this.view.setSession(session);
+    this.stylus.setSession(session);
+    this.panels.setSession(session);
+    this.showDepth();
+    this.look();
+    if (this.pointer.x < 0) this.centrePointer();
+  }
+
+  private newTopology(topology: Topology): void {
+    this.view.body.setTopology(topology);
+    this.scalars = null;
+    this.view.body.setScalars(null, 0, 1);
+    this.view.change();
+  }
+
+  private linkChanged(state: LinkState, reason: string): void {
+    const link = byId('link');
+    link.dataset['state'] = state;
+    link.textContent = { connecting: 'connecting', open: 'live', closed: 'not connected' }[state];
+    if (state === 'open') return;
+    this.holder = null;
+    this.id = -1;
+    this.pending = [];
+    this.showRole();
+    if (state === 'closed') this.messages.say('error', `The connection to the server has ended${reason ? `: ${reason}` : ''}.`);
+  }
+
+  private showRole(): void {
+    if (this.holder === null && this.id >= 0 && this.wantsTool) {
+      this.wantsTool = false;
+      this.connection.send({ type: 'take' });
+    }
+    this.stylus.holding = this.holding;
+    this.panels.setHolding(this.holding);
+    byId('role').textContent =
+      this.id < 0 ? '' : this.holding ? 'you hold the tool' : this.holder === null ? 'nobody holds the tool' : `watching: viewer ${this.holder} holds the tool`;
+    const take = button('take');
+    take.hidden = this.id < 0;
+    take.textContent = this.holding ? 'Let go' : 'Take the tool';
+    take.disabled = !this.holding && this.holder !== null;
+    for (const id of ['reset', 'record', 'press-hold']) button(id).disabled = !this.holding;
+    button('replay').disabled = !this.holding || this.panels.recording === null;
+    button('download').disabled = this.panels.recording === null;
+  }
+
+  // --- the picture ----------------------------------------------------------------------------------------------------
+
+  private paint(): void {
+    requestAnimationFrame(() => this.paint());
+    const frames = this.pending;
+    this.pending = [];
+    for (const frame of frames) this.take(frame);
+    const now = performance.now();
+    if (this.view.draw()) {
+      this.drawn.push(now);
+      while ((this.drawn[0] ?? now) < now - 1000) this.drawn.shift();
+      // The picture counts when it is done, not when it is ordered.
+      if (this.frame) this.latency.drawn(this.frame.poseInSolve, performance.now());
+    }
+    frames.forEach(() => this.connection.shown());
+    if (frames.length > 0) this.showNumbers(now);
+  }
+
+  private take(frame: Frame): void {
+    const body = this.view.body;
+    if (frame.epoch !== this.session?.epoch || frame.topology !== body.topology?.topology) return;
+    this.frame = frame;
+    if (frame.vertices) body.setVertices(frame.vertices);
+    if (frame.vertices || frame.scalars) this.scalars = frame.scalars;
+    this.nodes = frame.nodes ?? this.nodes;
+    this.support = frame.support ?? this.support;
+    this.slice = frame.slice ?? this.slice;
+    this.stages = frame.stages ?? this.stages;
+    if (frame.scalars) this.colour();
+    if (frame.nodes || frame.support) this.showNodes();
+    if (frame.slice) this.showSlice();
+    this.view.tool.update(frame);
+    this.chart.add(frame.tickTime, Math.hypot(...frame.force));
+    this.panels.showFrame(frame);
+    this.view.change();
+  }
+
+  private showNumbers(now: number): void {
+    const frame = this.frame;
+    if (!frame) return;
+    element('force', HTMLOutputElement).textContent = Math.hypot(...frame.force).toFixed(3);
+    element('depth', HTMLOutputElement).textContent = (1000 * Math.max(frame.depth, 0)).toFixed(1);
+    const lag = Math.hypot(...frame.hand.map((x, d) => x - (frame.tip[d] ?? x)));
+    element('lag', HTMLOutputElement).textContent = (1000 * lag).toFixed(1);
+    this.chart.draw(frame.tickTime);
+    if (now - this.ratesShown < 250) return;
+    this.ratesShown = now;
+    this.panels.showRates(frame, this.drawn.length, this.latency, this.stages);
+  }
+
+  /** Applies what the switches ask for to what is known. */
+  private look(): void {
+    if (this.panels.colours.value === 'none') this.scalars = null;
+    const inside = this.panels.nodes.checked || this.panels.spheres.checked || this.panels.supports.checked;
+    this.view.body.setLook(inside || this.panels.slice.value !== 'none', this.panels.wire.checked);
+    this.view.tool.showSpring = this.panels.spring.checked;
+    if (this.frame) this.view.tool.update(this.frame);
+    if (!this.panels.supports.checked) this.support = null;
+    if (this.panels.slice.value === 'none') this.slice = null;
+    this.colour();
+    this.showNodes();
+    this.showSlice();
+    this.view.change();
+  }
+
+  private colour(): void {
+    const scalars = this.scalars;
+    this.view.body.setScalars(scalars, scalars?.low ?? 0, scalars?.high ?? 1);
+    if (scalars) {
+      const unit = scalars.quantity === 'displacement' ? 'm' : 'Pa';
+      const name = scalars.quantity === 'displacement' ? 'displacement' : 'von Mises stress';
+      this.showScale(name, withUnit(scalars.low, unit), withUnit(scalars.high, unit), false);
+    } else if (!this.slice) byId('scale').hidden = true;
+  }
+
+  private showScale(name: string, low: string, high: string, signed: boolean): void {
+    byId('scale').hidden = false;
+    byId('scale-name').textContent = name;
+    byId('scale-low').textContent = low;
+    byId('scale-high').textContent = high;
+    drawBar(element('scale-bar', HTMLCanvasElement), signed ? diverging : sequential);
+  }
+
+  private showNodes(): void {
+    const { nodes, spheres, supports } = this.panels;
+    this.view.overlays.setNodes(this.nodes, this.support, nodes.checked || supports.checked, spheres.checked);
+  }
+
+  private showSlice(): void {
+    const shows = this.panels.sliceShows;
+    const ends = this.view.overlays.setSlice(this.slice, shows);
+    if (!ends) {
+      if (!this.scalars) byId('scale').hidden = true;
+      return;
+    }
+    if (shows === 'organ') this.showScale('distance to the surface', withUnit(ends[0], 'm'), withUnit(ends[1], 'm'), true);
+    else this.showScale('distance to the cut', withUnit(ends[1], 'm'), withUnit(0, 'm'), false);
+  }
+
+  // --- the hand -------------------------------------------------------------------------------------------------------
+
+  private step(): void {
+    const now = performance.now();
+    const seconds = Math.min((now - this.lastStep) / 1000, 0.05);
+    this.lastStep = now;
+    if (this.keyboard.advance(seconds)) this.view.change();
+    this.stylus.advance(seconds);
+  }
+
+  private cast(ray: Ray): Hit | null {
+    const frozen = this.frozen;
+    const hit = frozen
+      ? castRay(frozen.positions, frozen.triangles, frozen.normals, ray.origin, ray.direction)
+      : this.view.body.cast(ray.origin, ray.direction);
+    this.view.setMark(this.holding ? hit : null);
+    this.view.change();
+    return hit;
+  }
+
+  private centrePointer(): void {
+    const { clientWidth, clientHeight } = this.view.canvas;
+    this.pointer = { x: 0.5 * clientWidth, y: 0.45 * clientHeight };
+  }
+
+  movePointer(dx: number, dy: number): void {
+    const { clientWidth, clientHeight } = this.view.canvas;
+    if (this.pointer.x < 0) this.centrePointer();
+    const x = Math.min(Math.max(this.pointer.x + dx, 0), clientWidth);
+    const y = Math.min(Math.max(this.pointer.y + dy, 0), clientHeight);
+    if (this.stylus.point(this.view.ray(x, y))) this.pointer = { x, y };
+  }
+
+  togglePress(): void {
+    if (this.stylus.pressing) return this.stylus.release();
+    this.movePointer(0, 0);
+    this.stylus.press();
+  }
+
+  chooseMode(mode: Mode): void {
+    if (this.session?.modes.includes(mode)) this.connection.send({ type: 'mode', mode });
+    else this.messages.say('warning', `This scenario has no ${mode}.`);
+  }
+
+  deepen(by: number): void {
+    this.stylus.deepen(by);
+    this.showDepth();
+  }
+
+  private showDepth(): void {
+    const slider = element('press-depth', HTMLInputElement);
+    const depth = 1000 * this.stylus.depths[this.stylus.mode];
+    slider.min = this.stylus.mode === 'grasper' ? '-20' : '0';
+    slider.value = String(depth);
+    byId('press-depth-value').textContent = `${depth.toFixed(1)} mm`;
+  }
+
+  /** In picking, the node under the ray that is nearest to the eye; false: clicks are not for picking. */
+  private pickAlong(ray: Ray): boolean {
+    const nodes = this.nodes;
+    if (!this.panels.supports.checked || !nodes) return false;
+    let best = -1;
+    let least = Infinity;
+    for (let i = 0; i < nodes.count; ++i) {
+      const offset = [0, 1, 2].map((d) => (nodes.spheres[4 * i + d] ?? 0) - (ray.origin[d] ?? 0)) as Vec3;
+      const along = offset.reduce((sum, value, d) => sum + value * (ray.direction[d] ?? 0), 0);
+      const away = Math.sqrt(Math.max(offset.reduce((sum, value) => sum + value * value, 0) - along * along, 0));
+      // Beside the ray counts more than behind other nodes.
+      const cost = away + 0.1 * along;
+      if (away < 0.02 * along && cost < least) {
+        least = cost;
+        best = i;
+      }
+    }
+    if (best < 0) return false;
+    this.panels.pick(best);
+    return true;
+  }
+
+  // --- buttons and keys -----------------------------------------------------------------------------------------------
+
+  private attachButtons(): void {
+    button('take').addEventListener('click', () => this.toggleTool());
+    button('reset').addEventListener('click', () => this.reset());
+    button('home').addEventListener('click', () => this.home());
+    button('help-open').addEventListener('click', () => this.help());
+    button('panels-toggle').addEventListener('click', () => this.togglePanels());
+    button('record').addEventListener('click', () => this.record());
+    button('replay').addEventListener('click', () => this.replay());
+    button('download').addEventListener('click', () => this.download());
+    button('screenshot').addEventListener('click', () => this.screenshot());
+    button('press-hold').addEventListener('click', () => this.togglePress());
+    element('press-depth', HTMLInputElement).addEventListener('input', (event) => {
+      this.stylus.setDepth(Number((event.target as HTMLInputElement).value) / 1000);
+      this.showDepth();
+    });
+    if (matchMedia('(max-width: 760px)').matches) this.togglePanels();
+    this.showDepth();
+    this.showRole();
+  }
+
+  reset(): void {
+    this.stylus.release();
+    this.connection.send({ type: 'reset' });
+  }
+
+  toggleTool(): void {
+    if (!button('take').disabled) this.connection.send({ type: this.holding ? 'release' : 'take' });
+  }
+
+  pickAtTip(): void {
+    if (this.frame) this.panels.pick(this.frame.tip);
+  }
+
+  help(): void {
+    element('help', HTMLDialogElement).showModal();
+  }
+
+  park(): void {
+    this.stylus.release();
+    this.connection.send({ type: 'park' });
+  }
+
+  home(): void {
+    this.view.orbit.home();
+    this.view.change();
+  }
+
+  record(): void {
+    this.connection.send({ type: 'record', on: button('record').getAttribute('aria-pressed') !== 'true' });
+  }
+
+  replay(): void {
+    const running = button('replay').getAttribute('aria-pressed') === 'true';
+    const name = this.panels.recording?.name ?? null;
+    if (running || name !== null) this.connection.send({ type: 'replay', name: running ? null : name });
+  }
+
+  download(): void {
+    const recording = this.panels.recording;
+    if (!recording) return;
+    const link = document.createElement('a');
+    link.href = recording.url;
+    link.download = recording.name;
+    link.click();
+  }
+
+  screenshot(): void {
+    this.view.drawNow();
+    const { frame, session } = this;
+    const force = frame ? `${Math.hypot(...frame.force).toFixed(3)} N, ` : '';
+    savePicture(this.view.canvas, `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);
+  }
+
+  togglePanels(): void {
+    const panels = byId('panels');
+    const shown = panels.dataset['shown'] === 'no';
+    panels.dataset['shown'] = shown ? 'yes' : 'no';
+    button('panels-toggle').setAttribute('aria-expanded', String(shown));
+  }
+}

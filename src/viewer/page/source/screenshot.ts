@@ -1,0 +1,25 @@
+/** Saves a canvas that has just been drawn as a PNG with a line of text below. */
+export function savePicture(picture: HTMLCanvasElement, caption: string): void {
+  const ratio = picture.width / Math.max(picture.clientWidth, 1);
+  const foot = Math.round(26 * ratio);
+  const canvas = document.createElement('canvas');
+  canvas.width = picture.width;
+  canvas.height = picture.height + foot;
+  const context = canvas.getContext('2d');
+  if (!context) return;
+  context.fillStyle = '#151c22';
+  context.fillRect(0, 0, canvas.width, canvas.height);
+  context.drawImage(picture, 0, 0);
+  context.fillStyle = '#dbe4ea';
+  context.font = `${13 * ratio}px system-ui, 'DejaVu Sans', sans-serif`;
+  context.textBaseline = 'middle';
+  context.fillText(caption, 10 * ratio, canvas.height - 0.5 * foot);
+  canvas.toBlob((blob) => {
+    if (!blob) return;
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(blob);
+    link.download = `spherecut-${new Date().toISOString().replace(/[:.]/g, '-')}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  }, 'image/png');
+}

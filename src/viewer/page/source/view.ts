@@ -1,0 +1,120 @@
+// The picture: renderer, lights and what stands in it. Draws when something has changed.
+import { Color, DirectionalLight, HemisphereLight, Mesh, MeshBasicMaterial, RingGeometry, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import { Body } from './body';
+import { Orbit } from './orbit';
+import { Overlays } from './overlays';
+import type { SessionStart, Vec3 } from './protocol';
+import type { Ray } from './stylus';
+import type { Hit } from './surface';
+import { ToolModel } from './tool_model';
+
+export class View {
+  readonly orbit = new Orbit();
+  readonly body = new Body();
+  readonly tool = new ToolModel();
+  readonly overlays = new Overlays();
+  readonly software: boolean; // drawn by the processor
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly lamp = new DirectionalLight('#fff4ea', 2.1);
+  private readonly mark: Mesh;
+  private stale = true;
+
+  /** Throws Error in words when the browser has no WebGL 2. */
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.software = drawsInSoftware();
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, powerPreference: 'high-performance' });
+    this.renderer.setPixelRatio(this.software ? 1 : Math.min(globalThis.devicePixelRatio, 2));
+    this.scene.background = new Color('#10171c');
+    this.mark = new Mesh(
+      new RingGeometry(0.72, 1, 32),
+      new MeshBasicMaterial({ color: '#62b6cb', transparent: true, opacity: 0.8, depthTest: false }),
+    );
+    this.mark.visible = false;
+    this.mark.renderOrder = 4;
+    this.scene.add(
+      new HemisphereLight('#dfe8f0', '#4a3a36', 1.15),
+      this.lamp,
+      this.lamp.target,
+      this.body.group,
+      this.overlays.group,
+      this.tool.group,
+      this.mark,
+    );
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+  }
+
+  setSession(session: SessionStart): void {
+    const { lower, upper } = session.bounds;
+    this.orbit.frameBox(lower, upper);
+    this.mark.scale.setScalar(0.018 * Math.hypot(upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]));
+    this.tool.setSession(session);
+    this.change();
+  }
+
+  /** Where the stylus is on the surface; null: nowhere. */
+  setMark(hit: Hit | null): void {
+    this.mark.visible = hit !== null;
+    if (!hit) return;
+    this.mark.position.set(...hit.point);
+    this.mark.quaternion.setFromUnitVectors(new Vector3(0, 0, 1), new Vector3(...hit.normal));
+  }
+
+  /** The picture has to be drawn again. */
+  change(): void {
+    this.stale = true;
+  }
+
+  /** Draws if anything has changed; true when it has drawn. */
+  draw(): boolean {
+    if (!this.stale) return false;
+    this.drawNow();
+    return true;
+  }
+
+  drawNow(): void {
+    this.stale = false;
+    const camera = this.orbit.camera;
+    const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+    const above = new Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
+    // A lamp over the left shoulder: shading tells the shape from every side.
+    this.lamp.position.copy(camera.position).addScaledVector(right, -0.35).addScaledVector(above, 0.45);
+    this.renderer.render(this.scene, camera);
+  }
+
+  ray(x: number, y: number): Ray {
+    const { clientWidth, clientHeight } = this.canvas;
+    const camera = this.orbit.camera;
+    const far = new Vector3((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight, 0.5).unproject(camera);
+    const direction = far.sub(camera.position).normalize();
+    return { origin: camera.position.toArray() as Vec3, direction: direction.toArray() as Vec3 };
+  }
+
+  /** Pixel of the picture where a point in metres is drawn. */
+  pixel(point: Vec3): { x: number; y: number } {
+    const at = new Vector3(...point).project(this.orbit.camera);
+    return { x: 0.5 * (at.x + 1) * this.canvas.clientWidth, y: 0.5 * (1 - at.y) * this.canvas.clientHeight };
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.canvas;
+    if (clientWidth === 0 || clientHeight === 0) return;
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    const size = this.renderer.getDrawingBufferSize(new Vector2());
+    this.overlays.setViewport(size.x, size.y);
+    this.orbit.resize(clientWidth, clientHeight);
+    this.change();
+    this.drawNow();
+  }
+}
+
+/** Whether WebGL is computed by the processor, where smoothing edges costs more than the picture. */
+function drawsInSoftware(): boolean {
+  const context = document.createElement('canvas').getContext('webgl2');
+  if (!context) throw new Error('This browser has no WebGL 2, which the picture needs.');
+  const details = context.getExtension('WEBGL_debug_renderer_info');
+  const name = details ? String(context.getParameter(details.UNMASKED_RENDERER_WEBGL)) : '';
+  context.getExtension('WEBGL_lose_context')?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
