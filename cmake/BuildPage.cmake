@@ -27,6 +27,9 @@ if(step STREQUAL "packages")
     execute_process(
       COMMAND "${NPM}" ci --ignore-scripts --no-audit --no-fund --prefer-offline --fetch-retries=1 --fetch-timeout=60000
       WORKING_DIRECTORY "${PAGE}" RESULT_VARIABLE status OUTPUT_VARIABLE said ERROR_VARIABLE said)
+    if(said MATCHES "EUSAGE|EINTEGRITY")
+      message(FATAL_ERROR "package.json and package-lock.json do not agree:\n${said}")
+    endif()
     if(NOT status EQUAL 0)
       string(REGEX MATCH "npm (ERR!|error)[^\n]*" first "${said}")
       message(NOTICE "

@@ -1,0 +1,53 @@
+// Debian's Chromium, headless, drawing with the processor; the page opened in it, its complaints collected.
+import { existsSync } from 'node:fs';
+import { type Browser, type BrowserContext, chromium, type Page as Tab } from 'playwright-core';
+
+export const chromiumPath = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find((path) => existsSync(path)) ?? '';
+
+export async function launch(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: chromiumPath,
+    args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
+  });
+}
+
+export interface Opened {
+  tab: Tab;
+  context: BrowserContext;
+  complaints: string[]; // console errors, uncaught exceptions, requests to elsewhere
+}
+
+export async function openPage(
+  browser: Browser,
+  address: string,
+  size: { width: number; height: number; touch?: boolean } = { width: 1280, height: 800 },
+  prepare?: (tab: Tab) => Promise<void>,
+): Promise<Opened> {
+  const context = await browser.newContext({
+    viewport: { width: size.width, height: size.height },
+    acceptDownloads: true,
+    hasTouch: size.touch ?? false,
+  });
+  const tab = await context.newPage();
+  const complaints: string[] = [];
+  tab.on('console', (message) => {
+    if (message.type() === 'error') complaints.push(message.text());
+  });
+  tab.on('pageerror', (error) => complaints.push(String(error)));
+  tab.on('request', (request) => {
+    const url = new URL(request.url());
+    if (!['data:', 'blob:'].includes(url.protocol) && url.origin !== new URL(address).origin) complaints.push(`asks ${url}`);
+  });
+  await prepare?.(tab);
+  await tab.goto(address);
+  return { tab, context, complaints };
+}
+
+/** Waits until `condition` holds in the page; says `what` when it does not in time. */
+export async function until(tab: Tab, what: string, condition: () => boolean, seconds = 20): Promise<void> {
+  try {
+    await tab.waitForFunction(condition, undefined, { timeout: 1000 * seconds, polling: 50 });
+  } catch (error) {
+    throw new Error(`not within ${seconds} s: ${what} (${String(error).split('\n')[0]})`);
+  }
+}
