@@ -66,7 +66,7 @@ export class Body {
       geometry.setIndex(new BufferAttribute(triangles, 1));
       const material = new MeshPhongMaterial({
         color: colour,
-        specular: new Color('#2a2422'),
+        specular: new Color('#1c1716'),
         shininess,
         side: FrontSide,
         polygonOffset: true,

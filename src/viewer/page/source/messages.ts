@@ -1,4 +1,4 @@
-// What the server says in words, for a while over the picture.
+// What the server says in words, for a while over the picture: the newest information, the last warnings and errors.
 
 export type Level = 'info' | 'warning' | 'error';
 
@@ -9,7 +9,9 @@ export class Messages {
 
   say(level: Level, text: string): void {
     for (const shown of this.list.children) {
-      if (shown.textContent === text) shown.remove();
+      const same = shown.textContent === text;
+      const news = level === 'info' && shown instanceof HTMLElement && shown.dataset['level'] === 'info';
+      if (same || news) shown.remove();
     }
     const line = document.createElement('p');
     line.dataset['level'] = level;

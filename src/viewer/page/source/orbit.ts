@@ -19,7 +19,7 @@ export class Orbit {
     const low = new Vector3(...lower);
     const high = new Vector3(...upper);
     this.start.target.copy(low).add(high).multiplyScalar(0.5);
-    this.start.distance = low.distanceTo(high) * 1.65;
+    this.start.distance = low.distanceTo(high) * 1.5;
     this.home();
   }
 

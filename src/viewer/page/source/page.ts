@@ -303,7 +303,7 @@ export class Page {
     const hit = frozen
       ? castRay(frozen.positions, frozen.triangles, frozen.normals, ray.origin, ray.direction)
       : this.view.body.cast(ray.origin, ray.direction);
-    this.view.setMark(this.holding ? hit : null);
+    this.view.setMark(this.holding && !frozen ? hit : null);
     this.view.change();
     return hit;
   }

@@ -152,7 +152,7 @@ export class ToolModel {
 }
 
 function metal(colour = steel): MeshPhongMaterial {
-  return new MeshPhongMaterial({ color: colour, specular: new Color('#666e74'), shininess: 60, side: DoubleSide });
+  return new MeshPhongMaterial({ color: colour, emissive: colour.clone().multiplyScalar(0.16), specular: new Color('#50585e'), shininess: 50, side: DoubleSide });
 }
 
 /** A solid of revolution along +z from `from`, m. */

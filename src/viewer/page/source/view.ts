@@ -16,14 +16,18 @@ export class View {
   readonly software: boolean; // drawn by the processor
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly lamp = new DirectionalLight('#fff4ea', 2.1);
+  private readonly lamp = new DirectionalLight('#fff4ea', 2.3);
   private readonly mark: Mesh;
   private stale = true;
+  private sharpness = 1; // drawn pixels per pixel of the page, where the processor draws
+  private drawSeconds = 0; // of a picture, smoothed
+  private readonly smooth: boolean;
 
   /** Throws Error in words when the browser has no WebGL 2. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.software = drawsInSoftware();
-    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, powerPreference: 'high-performance' });
+    this.smooth = !this.software || new URLSearchParams(location.search).has('smooth');
+    this.renderer = new WebGLRenderer({ canvas, antialias: this.smooth, powerPreference: 'high-performance' });
     this.renderer.setPixelRatio(this.software ? 1 : Math.min(globalThis.devicePixelRatio, 2));
     this.scene.background = new Color('#10171c');
     this.mark = new Mesh(
@@ -33,7 +37,7 @@ export class View {
     this.mark.visible = false;
     this.mark.renderOrder = 4;
     this.scene.add(
-      new HemisphereLight('#dfe8f0', '#4a3a36', 1.15),
+      new HemisphereLight('#e4ecf2', '#8a7672', 1.25),
       this.lamp,
       this.lamp.target,
       this.body.group,
@@ -69,8 +73,21 @@ export class View {
   /** Draws if anything has changed; true when it has drawn. */
   draw(): boolean {
     if (!this.stale) return false;
+    const start = performance.now();
     this.drawNow();
+    if (this.software) {
+      const gl = this.renderer.getContext();
+      const pixel = new Uint8Array(4); // reading one waits for all
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      this.drawSeconds += 0.2 * ((performance.now() - start) / 1000 - this.drawSeconds);
+      if (!this.smooth) this.adapt();
+    }
     return true;
+  }
+
+  /** Wall clock of a picture, s; 0 where graphics hardware draws and does not tell. */
+  get pictureSeconds(): number {
+    return this.drawSeconds;
   }
 
   drawNow(): void {
@@ -95,6 +112,17 @@ export class View {
   pixel(point: Vec3): { x: number; y: number } {
     const at = new Vector3(...point).project(this.orbit.camera);
     return { x: 0.5 * (at.x + 1) * this.canvas.clientWidth, y: 0.5 * (1 - at.y) * this.canvas.clientHeight };
+  }
+
+  /** Coarser pixels where the processor cannot keep up, finer ones where it can. */
+  private adapt(): void {
+    const wanted =
+      this.drawSeconds > 0.07 ? Math.max(0.5, this.sharpness - 0.25) : this.drawSeconds < 0.02 ? Math.min(1, this.sharpness + 0.25) : this.sharpness;
+    if (wanted === this.sharpness) return;
+    this.sharpness = wanted;
+    this.drawSeconds = 0.045;
+    this.renderer.setPixelRatio(wanted);
+    this.resize();
   }
 
   private resize(): void {

@@ -1,0 +1,207 @@
+// The page in Debian's Chromium against `spherecut serve`: node browser.test.mjs BUILD_FOLDER SOURCE_FOLDER
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import test, { after, before } from 'node:test';
+import type { Browser } from 'playwright-core';
+import { launch, type Opened, openPage, until } from './browser';
+import { chooseMode, hover, look, ready, stroke } from './hand';
+import { recordedForces, serve, type Served } from './server';
+
+const [build = '.', source = '.'] = process.argv.slice(2);
+let served: Served;
+let browser: Browser;
+let first: Opened;
+
+before(async () => {
+  // The liver of the demo with fewer triangles and nodes: the same page and server, sooner through a cut.
+  served = await serve(build, join(source, 'scenarios/liver_live.toml'), (text) =>
+    text
+      .replace('triangles = 20000', 'triangles = 5000')
+      .replace('fine_spacing = 0.009', 'fine_spacing = 0.013')
+      .replace('coarse_spacing = 0.026', 'coarse_spacing = 0.032'),
+  );
+  browser = await launch();
+  first = await openPage(browser, served.address);
+});
+
+after(async () => {
+  await browser?.close();
+  await served?.stop();
+});
+
+test('The page loads without a complaint and takes the tool', async () => {
+  await ready(first.tab);
+  assert.deepEqual(first.complaints, []);
+  const seen = await look(first.tab);
+  assert.equal(seen.role, 'you hold the tool');
+  assert.equal(seen.force, 0);
+  assert.equal(await first.tab.title(), `spherecut ${/\d+\.\d+\.\d+/.exec(await first.tab.title())?.[0]}`);
+});
+
+test('A press is felt: the readout is the force of the server, tick by tick', async () => {
+  const { tab } = first;
+  await tab.click('#record');
+  await until(tab, 'it records', () => document.getElementById('record')!.getAttribute('aria-pressed') === 'true');
+  await hover(tab, -0.02, -0.01);
+  await tab.mouse.down();
+  await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
+  await tab.waitForTimeout(1000);
+  const seen = await look(tab);
+  assert.ok(seen.depth > 0.003, `depth ${seen.depth}`);
+  assert.ok(Math.abs(seen.readout - seen.force) < 6e-4, `reads ${seen.readout}, frame ${seen.force}`);
+  await tab.mouse.up();
+  await until(tab, 'it has withdrawn', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
+  await tab.click('#record');
+  await until(tab, 'it has recorded', () => !(document.getElementById('download') as HTMLButtonElement).disabled);
+  const [download] = await Promise.all([tab.waitForEvent('download'), tab.click('#download')]);
+  const ticks = recordedForces(readFileSync(await download.path()));
+  const tick = ticks.reduce((best, next) => (Math.abs(next.time - seen.tickTime) < Math.abs(best.time - seen.tickTime) ? next : best));
+  assert.ok(Math.abs(tick.time - seen.tickTime) < 1e-6, `no tick at ${seen.tickTime}`);
+  tick.force.forEach((newtons, d) => assert.ok(Math.abs(newtons - seen.handForce[d]!) < 1e-6, `${tick.force} and ${seen.handForce}`));
+  assert.ok(Math.abs(Math.hypot(...tick.force) - seen.readout) < 6e-4, 'the force on the page is not that of the recording');
+});
+
+test('A recording is replayed, and the force comes back', async () => {
+  const { tab } = first;
+  await tab.click('#replay');
+  await until(tab, 'the press is felt again', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03, 30);
+  await tab.click('#replay');
+  await until(tab, 'the replay has ended', () => document.getElementById('replay')!.getAttribute('aria-pressed') === 'false');
+  await until(tab, 'the tool is free', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
+});
+
+test('A cut across the liver opens: the lips part in the geometry and in the picture', async () => {
+  const { tab } = first;
+  await chooseMode(tab, '2', 'blade');
+  await hover(tab, -0.055, 0.004);
+  await stroke(tab, [[-0.055, 0.004], [0.01, 0.0]], 1.5);
+  await until(tab, 'the cut opens', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4, 60);
+  await tab.mouse.up();
+  await tab.keyboard.press('k');
+  await until(tab, 'the lips are drawn', () => {
+    const page = globalThis.spherecut!;
+    page.view.drawNow();
+    const canvas = document.createElement('canvas');
+    [canvas.width, canvas.height] = [page.view.canvas.width, page.view.canvas.height];
+    const context = canvas.getContext('2d')!;
+    context.drawImage(page.view.canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+    let pale = 0;
+    for (let i = 0; i < data.length; i += 4) if (data[i]! > 220 && data[i + 1]! > 180 && data[i + 2]! > 130 && data[i]! > data[i + 2]! + 25) ++pale;
+    return pale > 40;
+  });
+  const seen = await look(tab);
+  assert.ok(seen.cutArea > 1e-4, `area ${seen.cutArea}`);
+  assert.match((await tab.textContent('#cut-state')) ?? '', /^Cut .* cm²/);
+});
+
+test('Nodes, supports and level sets show what the method sees', async () => {
+  const { tab } = first;
+  await tab.keyboard.press('n');
+  await tab.keyboard.press('p');
+  await until(tab, 'the supports of a node', () => /sees \d+ nodes/.test(document.getElementById('support-state')!.textContent!));
+  await tab.selectOption('#slice', 'cut');
+  await tab.selectOption('#colours', 'von_mises');
+  await until(tab, 'the scale bar', () => !document.getElementById('scale')!.hidden);
+  await tab.selectOption('#slice', 'none');
+  await until(tab, 'stresses', () => /stress/.test(document.getElementById('scale-name')!.textContent!));
+  await tab.selectOption('#colours', 'none');
+  for (const key of ['n', 'o']) await tab.keyboard.press(key);
+});
+
+test('A second viewer watches and cannot drive until the tool is let go', async () => {
+  const second = await openPage(browser, served.address, { width: 800, height: 600 });
+  await until(second.tab, 'it sees frames', () => globalThis.spherecut?.frame != null);
+  const watching = await look(second.tab);
+  assert.match(watching.role, /^watching/);
+  assert.ok(watching.lips > 2e-4, 'it does not see the wound');
+  assert.ok(await second.tab.isDisabled('#take'));
+  assert.ok(await second.tab.isDisabled('#reset'));
+  await first.tab.click('#take');
+  await until(first.tab, 'it has let go', () => !globalThis.spherecut!.holding);
+  await second.tab.click('#take');
+  await until(second.tab, 'it holds the tool', () => globalThis.spherecut!.holding);
+  await second.context.close();
+  await until(first.tab, 'the tool is free again', () => globalThis.spherecut!.holder === null);
+  await first.tab.keyboard.press('t');
+  await until(first.tab, 'it is back', () => globalThis.spherecut!.holding);
+  assert.deepEqual(second.complaints, []);
+});
+
+test('Reset makes the organ whole', async () => {
+  const { tab } = first;
+  const epoch = await tab.evaluate(() => globalThis.spherecut!.session!.epoch);
+  await tab.keyboard.press('r');
+  await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 40_000 });
+  await until(tab, 'it is whole', () => globalThis.spherecut!.frame!.cutArea === 0 && globalThis.spherecut!.view.body.lipsApart() === 0);
+});
+
+test('Errors of the server appear in words', async () => {
+  const { tab } = first;
+  await tab.evaluate(() => document.querySelectorAll('details').forEach((panel) => (panel.open = true)));
+  await tab.fill('#fine', '60'); // coarser than far away
+  await tab.click('#method-form button');
+  await until(tab, 'an error', () => document.querySelector('#messages [data-level=error]') !== null, 40);
+  assert.ok((await tab.textContent('#messages [data-level=error]'))!.length > 20);
+});
+
+test('Everything goes by keyboard', async () => {
+  const { tab } = first;
+  await tab.focus('#scene');
+  await chooseMode(tab, '1', 'probe');
+  await tab.keyboard.down('ArrowLeft');
+  await tab.waitForTimeout(300);
+  await tab.keyboard.up('ArrowLeft');
+  await tab.keyboard.press('Space');
+  await until(tab, 'the press is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.02);
+  const before = await look(tab);
+  await tab.keyboard.down('.');
+  await tab.waitForTimeout(600);
+  await tab.keyboard.up('.');
+  await tab.waitForTimeout(600);
+  assert.ok((await look(tab)).depth > before.depth + 0.001, 'not deeper');
+  await tab.keyboard.press('Escape');
+  await until(tab, 'it withdraws', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
+  await tab.keyboard.press('?');
+  await until(tab, 'the help', () => (document.getElementById('help') as HTMLDialogElement).open);
+  assert.match((await tab.textContent('#help-body')) ?? '', /turn the blade/);
+  await tab.keyboard.press('Escape');
+  // Every control has a name, and Tab reaches them.
+  const nameless = await tab.evaluate(() =>
+    [...document.querySelectorAll('button, input, select, canvas:not([aria-hidden])')]
+      .filter((control) => {
+        const labels = (control as HTMLInputElement).labels;
+        return !(control.textContent?.trim() || control.getAttribute('aria-label') || (labels && labels.length > 0));
+      })
+      .map((control) => control.id),
+  );
+  assert.deepEqual(nameless, []);
+  await tab.focus('#reset');
+  await tab.keyboard.press('Tab');
+  assert.equal(await tab.evaluate(() => document.activeElement?.id), 'home');
+});
+
+test('It works in a window of a telephone', async () => {
+  await first.tab.click('#take');
+  await until(first.tab, 'it has let go', () => !globalThis.spherecut!.holding);
+  const { tab, complaints, context } = await openPage(browser, served.address, { width: 390, height: 844, touch: true });
+  await ready(tab);
+  const wide = await tab.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+  assert.ok(wide <= 0, `${wide} pixels too wide`);
+  assert.ok(!(await tab.isVisible('#panels')));
+  await tab.tap('#view', { position: { x: 190, y: 300 } });
+  await tab.tap('#press-hold');
+  await until(tab, 'a press is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.02);
+  await tab.tap('#press-hold');
+  await tab.tap('#panels-toggle');
+  assert.ok(await tab.isVisible('#scenario'));
+  assert.ok((await tab.evaluate(() => document.getElementById('view')!.clientHeight)) > 300, 'no room for the picture');
+  assert.deepEqual(complaints, []);
+  await context.close();
+});
+
+test('Nothing was complained of to the end', () => {
+  assert.deepEqual(first.complaints, []);
+  assert.equal(served.process.exitCode, null, served.said());
+});
