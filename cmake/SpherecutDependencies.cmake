@@ -11,6 +11,7 @@ find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(tomlplusplus REQUIRED)
 find_package(fmt REQUIRED)
+find_package(Boost 1.74 REQUIRED) # Beast and Asio: headers
 find_package(BLAS REQUIRED)
 find_package(LAPACK REQUIRED)
 

@@ -62,6 +62,14 @@ MatrixX Discretisation::pattern_displacements(const std::vector<ForcePattern>&, 
   throw InputError(fmt::format("method {} has no forces in newtons to spread over points", to_string(method())));
 }
 
+void Discretisation::shape_at(const Vector3&, ShapeFunctions&) const {
+  throw InputError(fmt::format("method {} has no spheres here", to_string(method())));
+}
+
+double Discretisation::sphere_radius(int) const {
+  throw InputError(fmt::format("method {} has no spheres here", to_string(method())));
+}
+
 std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options) {
   switch (options.method) {
   case Method::collocation:

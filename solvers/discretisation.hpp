@@ -121,6 +121,8 @@ struct ForcePattern {
   std::vector<Vector3> forces;
 };
 
+struct ShapeFunctions; // solvers/shape_functions.hpp
+
 class Discretisation {
  public:
   virtual ~Discretisation() = default;
@@ -163,6 +165,12 @@ class Discretisation {
 
   /// Everything at a point of the body. Throws InputError when no support covers x.
   [[nodiscard]] virtual PointState at(const Vector3& x, const Field& field) const = 0;
+
+  /// Shape functions at a point of the body by node: the displacement there is the sum of value_j times coefficient_j
+  /// of a field. Throws InputError when no support covers x, or where the method has no spheres.
+  virtual void shape_at(const Vector3& x, ShapeFunctions& shape) const;
+  /// Radius of a node's sphere, m.
+  [[nodiscard]] virtual double sphere_radius(int node) const;
 
   /// Force that the constraint of each prescribed entry exerts on the body, N.
   [[nodiscard]] virtual std::vector<Vector3> constraint_forces(const Field& field) const = 0;

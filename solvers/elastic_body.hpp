@@ -62,6 +62,8 @@ class ElasticBody : public Discretisation {
   [[nodiscard]] const AssemblyReport& report() const override { return report_; }
   [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
   [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
+  void shape_at(const Vector3& x, ShapeFunctions& shape) const override { require_support(spheres_, x, shape); }
+  [[nodiscard]] double sphere_radius(int node) const override { return spheres_.radii()[node]; }
   [[nodiscard]] std::vector<Vector3> constraint_points() const override;
   [[nodiscard]] Vector3 contact_point(int node) const override { return problem_.nodes.positions[node]; }
   [[nodiscard]] MatrixX contact_displacements(const std::vector<int>& nodes,

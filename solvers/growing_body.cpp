@@ -241,11 +241,15 @@ VectorX GrowingBody::nodal_displacements(const Field& field) const {
   return supports_.displacements(field);
 }
 
-PointState GrowingBody::at(const Vector3& x, const Field& field) const {
-  thread_local ShapeFunctions shape;
+void GrowingBody::shape_at(const Vector3& x, ShapeFunctions& shape) const {
   require_support(cut_->spheres(), x, shape);
   for (int& node : shape.nodes)
     node = compact_[node];
+}
+
+PointState GrowingBody::at(const Vector3& x, const Field& field) const {
+  thread_local ShapeFunctions shape;
+  shape_at(x, shape);
   return state_from(problem_, shape, field);
 }
 

@@ -92,8 +92,13 @@ void BladeForce::go_to(const topology::BladePose& pose, const BodyModel& body) {
 
 void BladeForce::leave() {
   const topology::BladePose last = way_.back();
+  lift();
   way_ = {last};
   at_ = last;
+}
+
+void BladeForce::lift() {
+  way_.clear();
   meeting_ = {};
   state_.reset();
   proposal_.reset();

@@ -48,6 +48,9 @@ class BladeForce {
   /// The blade has left the body: its way starts anew from where it is.
   void leave();
 
+  /// The hand has let go of the blade: it is nowhere until it is put somewhere.
+  void lift();
+
   /// Poses through which the next proposal should cut, in order; none: no cut is near. A later cut ends where the edge
   /// would be left with the force of steady cutting at the end of its motion.
   [[nodiscard]] std::vector<topology::BladePose> wanted(const BodyModel& now);

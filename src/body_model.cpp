@@ -67,22 +67,34 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
 
 } // namespace
 
+int BodyModel::nearest_seen(const Vector3& x) const {
+  const std::vector<Vector3>& nodes = sprinkling.nodes.positions;
+  std::size_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (const double distance = (nodes[i] - x).squaredNorm();
+        distance < least && (incision == nullptr || !incision->blocks(x, nodes[i]))) {
+      least = distance;
+      nearest = i;
+    }
+  return static_cast<int>(nearest);
+}
+
 solvers::PointState BodyModel::at(const Vector3& x) const {
   if (!state)
     return {};
   try {
     return body->at(x, field);
   } catch (const InputError&) {
-    const std::vector<Vector3>& nodes = sprinkling.nodes.positions;
-    std::size_t nearest = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      if (const double distance = (nodes[i] - x).squaredNorm();
-          distance < least && (incision == nullptr || !incision->blocks(x, nodes[i]))) {
-        least = distance;
-        nearest = i;
-      }
-    return body->at(nodes[nearest], field);
+    return body->at(sprinkling.nodes.positions[nearest_seen(x)], field);
+  }
+}
+
+void BodyModel::shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const {
+  try {
+    body->shape_at(x, shape);
+  } catch (const InputError&) {
+    body->shape_at(sprinkling.nodes.positions[nearest_seen(x)], shape);
   }
 }
 

@@ -29,6 +29,10 @@ struct BodyModel {
   /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
   /// rest before the first solution.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const;
+  /// Shape functions there, with which the displacement is a sum over nodes; of a body that is built.
+  void shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const;
+  /// Nearest node that sees x; 0 where none does.
+  [[nodiscard]] int nearest_seen(const Vector3& x) const;
 };
 
 /// Whether a node of this kind is one of the organ's own surface, for a tool to touch.

@@ -6,6 +6,7 @@
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
 #include "src/version.hpp"
+#include "src/viewer/serve.hpp"
 #include "topology/errors.hpp"
 
 #include <CLI/CLI.hpp>
@@ -97,6 +98,15 @@ int run(int argc, char** argv) {
   haptics->add_option("--solved-every", haptic.solved_stride,
                       "Afterwards solve at every so many ticks for the model's error; 0: not; default 10");
 
+  app::ServeCommand served;
+  auto* serve = commands.add_subcommand("serve", "Press and cut in a browser: a live session at http://ADDRESS:PORT/");
+  serve->add_option("scenario", served.scenario, "TOML file; default liver_live.toml of those that come along");
+  serve->add_option("--port", served.port, "Port; 0: any free one; default 8080");
+  serve->add_option("--address", served.address, "IP address; default 127.0.0.1, this machine alone");
+  serve->add_flag("--open", served.open, "Open the page in a browser");
+  serve->add_option("--out", served.out, "Folder for recordings; default out/serve");
+  serve->add_option("--page", served.page, "Folder of the built page; default: beside the program or as installed");
+
   auto* experiment = commands.add_subcommand("experiment", "List or run the experiments");
   experiment->require_subcommand(1);
   auto* list = experiment->add_subcommand("list", "List the experiments");
@@ -123,6 +133,8 @@ int run(int argc, char** argv) {
     return status_of(app::run_scenario(scenario, out, stdout));
   if (haptics->parsed())
     return status_of(app::run_haptics(haptic, stdout));
+  if (serve->parsed())
+    return status_of(app::serve(served, stdout));
   if (check->parsed())
     app::check_scenario(scenario, stdout);
   else if (list->parsed())

@@ -58,6 +58,10 @@ class Session {
   /// contact need not. `sample`: where the tool is. Does nothing when nothing ever touches or cuts.
   void prepare(const StepSample& sample);
 
+  /// The blade leaves the tissue where it is, and the next step that has one only places it: its way does not cut in
+  /// between.
+  void lift_blade();
+
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const Organ& organ() const { return organ_; }
   [[nodiscard]] const solvers::Sprinkling& sprinkling() const { return model_.sprinkling; }
@@ -146,6 +150,7 @@ class Session {
   std::optional<solvers::Field> without_blade_; // field of model_ without blade; empty: that is model_.field
   std::optional<topology::SurfaceContact> last_contact_;
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
+  bool blade_lifted_ = false;                     // its next pose places it
   std::vector<solvers::PointState> node_states_;
   VectorX node_displacements_; // m, 3 a node, in the last step
   bool force_only_ = false;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
@@ -117,6 +118,20 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
   condense(near, next);
 }
 
+void Session::lift_blade() {
+  if (!scenario_.blade)
+    return;
+  last_blade_.reset();
+  blade_lifted_ = true;
+  if (blade_force_ == nullptr)
+    return;
+  blade_force_->lift();
+  if (mark_) // a proposal that is not taken any more
+    incisions_->go_back(*mark_);
+  mark_.reset();
+  shown_wound_.reset();
+}
+
 // Moves the blade; true when that cut something and the body with the new cut is built and solved. A refusal leaves
 // body, incision and wound as they were.
 bool Session::cut(const StepSample& sample, CutReport& report) {
@@ -136,7 +151,10 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
   {
     const StageTimer timer(report.seconds.topology);
     try {
-      swept = incisions_->move_to(*sample.blade, to_rest);
+      if (std::exchange(blade_lifted_, false))
+        incisions_->place(*sample.blade, to_rest);
+      else
+        swept = incisions_->move_to(*sample.blade, to_rest);
     } catch (const InputError& error) {
       refuse(error.what());
     } catch (const NumericalError& error) {

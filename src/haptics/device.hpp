@@ -14,6 +14,14 @@
 
 namespace spherecut::app {
 
+/// What the hand holds, as DeviceState::mode has it.
+enum class HandMode : std::uint16_t {
+  usual, // the tool, beside which a blade keeps to its own path; the blade in a scenario without a tool
+  probe, // the tool; a blade is lifted
+  blade, // the blade, which cuts where the hand draws it; a tool stays away from the organ
+  grasper,
+};
+
 /// Where a device is at a tick of the haptic loop.
 struct DeviceState {
   std::uint64_t tick = 0;             // of the loop

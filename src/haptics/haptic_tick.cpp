@@ -8,6 +8,11 @@ namespace {
 
 constexpr double rim = 0.8; // of the candidates' reach: a contact beyond it takes the patch along
 
+// A blade's force is that of the last solve, held: what it cuts next is not known before it is solved.
+bool holds_force(const DeviceState& device) {
+  return device.mode >= static_cast<std::uint16_t>(HandMode::blade);
+}
+
 } // namespace
 
 topology::ToolPose tool_pose(const topology::ToolShape& tool, const DeviceState& device) noexcept {
@@ -31,15 +36,31 @@ void HapticTick::start(const DeviceState& device) {
 }
 
 void HapticTick::locate(const DeviceState& device) noexcept {
-  if (organ_ == nullptr || located_ == device.tick + 1)
+  if (organ_ == nullptr || located_ == device.tick + 1 || holds_force(device))
     return;
-  contact_ = organ_->walk(tool_, tool_pose(tool_, device), contact_);
+  const topology::ToolPose pose = tool_pose(tool_, device);
+  contact_ = organ_->walk(tool_, pose, contact_);
+  // A tool that was put elsewhere leaves the walk behind; the solve has looked at the whole surface.
+  if (fresh_ && snapshot_->mode == device.mode) {
+    const topology::SurfaceContact there = organ_->walk(tool_, pose, snapshot_->contact);
+    if (there.depth > contact_.depth)
+      contact_ = there;
+  }
+  fresh_ = false;
   located_ = device.tick + 1;
 }
 
 ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
-  topology::ToolPose pose = tool_pose(tool_, device);
   outside = false;
+  if (snapshot_ != nullptr && snapshot_->mode != device.mode) // solved for what the hand held before
+    return {};
+  if (holds_force(device)) {
+    ModelForce held;
+    if (snapshot_ != nullptr)
+      held.force = snapshot_->force;
+    return held;
+  }
+  topology::ToolPose pose = tool_pose(tool_, device);
   if (organ_ != nullptr && snapshot_ != nullptr && snapshot_->count > 0 && contact_.depth > 0) {
     Vector3 away = contact_.point - snapshot_->contact.point;
     away -= away.dot(contact_.normal) * contact_.normal;
@@ -53,7 +74,8 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
 }
 
 void HapticTick::arrive(const ContactSnapshot& snapshot) noexcept {
-  arrived_ = !model_->solved(snapshot) || arrived_;
+  arrived_ = !model_->solved(snapshot) || snapshot.mode >= static_cast<std::uint16_t>(HandMode::blade) || arrived_;
+  fresh_ = true;
   snapshot_ = &snapshot;
 }
 

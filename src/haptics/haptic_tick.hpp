@@ -29,8 +29,9 @@ struct TickResult {
 ///
 /// At a new snapshot the force goes on from where the old one would have had it, by its last two ticks: the difference
 /// is added and fades linearly within HapticSettings::hand_over. When the contact leaves the candidates, the patch is
-/// taken along with the tool: the model is asked as if the tool were still at their rim. A device that does not answer
-/// brings the force to zero at the slew limit.
+/// taken along with the tool: the model is asked as if the tool were still at their rim. Of a blade or grasper the
+/// force is that of the last solve; just after the hand has changed what it holds there is none. A device that does not
+/// answer brings the force to zero at the slew limit.
 class HapticTick {
  public:
   /// `organ` follows the contact on the surface at rest; null: not followed. Tool and organ must outlive this.
@@ -56,6 +57,7 @@ class HapticTick {
   topology::SurfaceContact contact_;
   std::uint64_t located_ = 0; // tick after which contact_ was found, plus one; 0: never
   bool arrived_ = false;      // a snapshot that changes the force has come since the last tick
+  bool fresh_ = false;        // any snapshot has
   Vector3 last_model_ = Vector3::Zero(), model_before_ = Vector3::Zero(); // N, of the last two ticks
   Vector3 difference_ = Vector3::Zero();                                  // N, still to fade
   Vector3 fading_ = Vector3::Zero();                                      // N, per tick

@@ -10,6 +10,7 @@
 #include <ctime>
 #include <exception>
 #include <fmt/format.h>
+#include <optional>
 #include <pthread.h>
 #include <sched.h>
 #include <thread>
@@ -47,6 +48,11 @@ struct Shared {
   Ring<SolveRecord> solves; // simulation thread to viewer
   std::atomic<bool> stop{false}, done{false};
 };
+
+bool at_rest(const DeviceState& a, const DeviceState& b) {
+  return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs() && a.mode == b.mode &&
+         a.buttons == b.buttons;
+}
 
 // The haptic thread: allocates, locks, throws and logs nothing.
 void haptic_thread(const HapticSettings& settings, Device& device, const DeviceState& first, HapticTick& core,
@@ -92,15 +98,22 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
 }
 
 void simulation_thread(const HapticSettings& settings, HapticSimulation& simulation, Shared& shared, ViewerFeed& feed,
-                       std::uint64_t& lost, RealtimeReport& report) {
+                       const RealtimeOptions& options, std::uint64_t& lost, RealtimeReport& report) {
   DegradationRule rule(settings.budget);
   std::uint64_t sequence = 0;
+  std::optional<DeviceState> solved; // the last that was
   while (!shared.done.load(std::memory_order_acquire)) {
     if (!shared.poses.fetch()) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
       continue;
     }
     const DeviceState state = shared.poses.front();
+    if (!options.solve_at_rest && solved && at_rest(state, *solved)) {
+      feed.offer_again(simulation);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      continue;
+    }
+    solved = state;
     const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level()};
     ContactSnapshot& snapshot = shared.snapshots.back();
     const long long began = clock_now(CLOCK_MONOTONIC);
@@ -172,13 +185,14 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
   simulation.prepare(first);
   core.start(first);
   auto shared = std::make_unique<Shared>(settings.rate);
-  ViewerFeed feed(settings.viewer_rate);
+  ViewerFeed own(settings.viewer_rate);
+  ViewerFeed& feed = options.feed != nullptr ? *options.feed : own;
   report.prepare_seconds = 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - before);
 
   const long long start = clock_now(CLOCK_MONOTONIC);
   const auto ticks = count < 1e18 ? static_cast<std::uint64_t>(count) : ~std::uint64_t{0};
   std::uint64_t lost_solves = 0;
-  std::thread solver([&] { simulation_thread(settings, simulation, *shared, feed, lost_solves, report); });
+  std::thread solver([&] { simulation_thread(settings, simulation, *shared, feed, options, lost_solves, report); });
   std::thread haptic([&] { haptic_thread(settings, device, first, core, *shared, options, ticks, report); });
   Collector collector(*shared, options, records);
   std::exception_ptr failure;
@@ -193,7 +207,7 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
   };
   while (!shared->done.load(std::memory_order_acquire)) {
     guarded([&] {
-      if (feed.fetch())
+      if (options.feed == nullptr && feed.fetch())
         options.view(feed.frame());
       collector.collect();
       if (options.stop())

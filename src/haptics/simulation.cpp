@@ -56,6 +56,7 @@ HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const s
     : session_(std::move(scenario), std::move(say)) {
   session_.set_force_only(true);
   static_cast<void>(path());
+  parked_ = parked_tool();
 }
 
 const topology::ToolShape& HapticSimulation::tool() const {
@@ -66,7 +67,14 @@ const topology::ToolShape& HapticSimulation::tool() const {
 StepSample HapticSimulation::sample(const DeviceState& device) const {
   const Scenario& scenario = session_.scenario();
   StepSample sample{device.time, std::nullopt, std::nullopt};
-  if (scenario.tool) {
+  const auto mode = static_cast<HandMode>(device.mode);
+  if (mode == HandMode::blade) {
+    sample.tool = parked_;
+    if (scenario.blade)
+      sample.blade = topology::BladePose{device.time, device.position, device.orientation};
+  } else if (mode == HandMode::probe) {
+    sample.tool = scenario.tool ? std::optional(tool_pose(scenario.tool->shape, device)) : std::nullopt;
+  } else if (scenario.tool) {
     sample.tool = tool_pose(scenario.tool->shape, device);
     if (scenario.blade)
       sample.blade = blade_pose(*scenario.blade, device.time);
@@ -74,6 +82,18 @@ StepSample HapticSimulation::sample(const DeviceState& device) const {
     sample.blade = topology::BladePose{device.time, device.position, device.orientation};
   }
   return sample;
+}
+
+std::optional<topology::ToolPose> HapticSimulation::parked_tool() const {
+  const Scenario& scenario = session_.scenario();
+  if (!scenario.tool)
+    return std::nullopt;
+  topology::ToolPose pose = *session_.steps().front().tool;
+  double away = 0.5 * session_.organ().domain->bounds().extent().norm();
+  if (const auto* instrument = std::get_if<topology::Laparoscope>(&scenario.tool->shape))
+    away = std::min(away, 0.5 * (instrument->port - pose.point).norm());
+  pose.point += away * pose.axis;
+  return pose;
 }
 
 void HapticSimulation::prepare(const DeviceState& device) {
@@ -85,6 +105,10 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   if (degradation != degradation_) {
     session_.coarsen(std::pow(coarse_per_level, degradation));
     degradation_ = degradation;
+  }
+  if (const auto mode = static_cast<HandMode>(device.mode); mode != mode_) {
+    session_.lift_blade();
+    mode_ = mode;
   }
   result_ = session_.step(sample(device));
   const BodyModel& model = session_.model();
@@ -103,7 +127,13 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
     else
       fill(model.patch, model.state->tool, result_.contact, condition, snapshot);
   }
+  if (mode_ == HandMode::blade) {
+    clear(snapshot);
+    if (session_.blade() != nullptr)
+      snapshot.force = result_.cut->blade.force;
+  }
   snapshot.pose_tick = device.tick;
+  snapshot.mode = device.mode;
   snapshot.time = device.time;
   snapshot.resprinkled = result_.resprinkled;
   snapshot.cut_triangles = result_.cut ? result_.cut->triangles : 0;

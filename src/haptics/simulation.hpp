@@ -26,7 +26,8 @@ class DegradationRule {
   int level_ = 0, quick_ = 0;
 };
 
-/// The device holds the tool; in a scenario without a tool, the blade. A blade beside a tool follows its own path.
+/// The device holds what HandMode says. When the hand takes the blade anew that is lifted: it cuts from where it is
+/// then.
 class HapticSimulation {
  public:
   /// As Session. Throws InputError when there is neither tool nor blade to hold.
@@ -45,13 +46,18 @@ class HapticSimulation {
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const topology::ToolShape& tool() const;
   [[nodiscard]] std::vector<PathPose> path() const { return driven_path(session_.steps()); }
+  /// Where the tool is while the hand holds something else: away from the organ, on the line through the start of its
+  /// way. Nothing in a scenario without a tool.
+  [[nodiscard]] std::optional<topology::ToolPose> parked_tool() const;
 
  private:
   [[nodiscard]] StepSample sample(const DeviceState& device) const;
 
   Session session_;
   StepResult result_;
+  std::optional<topology::ToolPose> parked_;
   int degradation_ = 0;
+  HandMode mode_ = HandMode::usual; // of the last solve
 };
 
 /// Solves as an event says and tells what came of it. A failure leaves the snapshot as it was.

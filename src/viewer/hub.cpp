@@ -1,0 +1,472 @@
+#include "src/viewer/hub.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <fstream>
+#include <sched.h>
+#include <utility>
+
+namespace spherecut::app {
+namespace {
+
+constexpr std::size_t log_lines = 200;                        // kept for telling
+constexpr auto log_interval = std::chrono::milliseconds(100); // between two lines
+constexpr auto cutting_shown = std::chrono::milliseconds(300);
+constexpr double reach = 2; // of the organ's diagonal, from its middle: so far away a hand may be
+
+double seconds_since(std::chrono::steady_clock::time_point then) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
+}
+
+/// Whether threads of this process may have a real-time priority.
+bool fifo_granted() {
+  bool granted = false;
+  std::thread([&granted] {
+    sched_param parameter{};
+    parameter.sched_priority = 80;
+    granted = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter) == 0;
+  }).join();
+  return granted;
+}
+
+/// The title that a scenario file gives itself, without reading the rest; empty: none.
+std::string title_of(const std::filesystem::path& file) {
+  std::ifstream text(file);
+  for (std::string line; std::getline(text, line) && (line.empty() || line.front() != '[');) {
+    if (line.rfind("title", 0) != 0)
+      continue;
+    const auto from = line.find('"');
+    const auto to = line.rfind('"');
+    if (from != std::string::npos && to > from)
+      return line.substr(from + 1, to - from - 1);
+  }
+  return {};
+}
+
+std::string shortened(const std::string& text) {
+  return text.substr(0, std::min<std::size_t>(text.size(), 2000));
+}
+
+} // namespace
+
+Hub::Hub(HubOptions options, std::function<void(const std::string&)> say)
+    : options_(std::move(options)), say_(std::move(say)), fifo_(fifo_granted()) {
+  session_ = std::make_unique<LiveSession>(read_scenario(options_.scenario), options_.speed,
+                                           [this](const std::string& line) { say_here(line); });
+  target_ = session_->parked(session_->modes().front());
+  session_->start();
+}
+
+Hub::~Hub() {
+  for (const auto& building : {building_.get(), next_.get()})
+    if (building != nullptr && building->thread.joinable())
+      building->thread.join();
+  session_.reset();
+  if (ending_.joinable())
+    ending_.join();
+}
+
+void Hub::say_here(const std::string& line) {
+  const std::lock_guard lock(log_mutex_);
+  if (log_.size() >= log_lines)
+    log_.pop_front();
+  log_.push_back(line);
+}
+
+void Hub::send_all(const std::string& text) {
+  std::vector<int> ids; // sending may end a client
+  for (const auto& [id, client] : clients_)
+    if (client.greeted)
+      ids.push_back(id);
+  for (const int id : ids)
+    send(id, text);
+}
+
+void Hub::opened(int client) {
+  clients_.emplace(client, Client{});
+}
+
+void Hub::closed(int client) {
+  clients_.erase(client);
+  request_overlays();
+  if (holder_ == client)
+    let_go();
+}
+
+std::optional<CloseReason> Hub::message(int client, std::string_view text) {
+  const auto found = clients_.find(client);
+  if (found == clients_.end())
+    return CloseReason{CloseCode::policy, "not known here"};
+  Client& from = found->second;
+  Request request;
+  try {
+    request = parse_request(text);
+  } catch (const InputError& error) {
+    return CloseReason{CloseCode::invalid, error.what()};
+  }
+  if (request.type == RequestType::hello) {
+    if (request.number != protocol_version)
+      return CloseReason{CloseCode::policy, fmt::format("version {} is spoken here", protocol_version)};
+    greet(client, from);
+  } else if (!from.greeted) {
+    return CloseReason{CloseCode::policy, "hello comes first"};
+  } else if (needs_tool(request.type) && holder_ != client) {
+    send(client, error_text("no_tool", "take the tool first", to_string(request.type)));
+  } else {
+    try {
+      act(client, from, request);
+    } catch (const InputError& error) {
+      send(client, error_text("refused", shortened(error.what()), to_string(request.type)));
+    }
+  }
+  return std::nullopt;
+}
+
+void Hub::greet(int client, Client& from) {
+  from.greeted = true;
+  send(client, welcome_text(client, scenarios(), {}, options_.viewers, options_.speed));
+  send(client, session_text(*session_, epoch_, target_.mode));
+  send(client, holder_text(holder_));
+  if (building_ != nullptr)
+    send(client, building_text(building_->what));
+}
+
+void Hub::act(int client, Client& from, const Request& request) {
+  switch (request.type) {
+  case RequestType::hello:
+    break;
+  case RequestType::credit:
+    from.credit = std::min(most_credit, from.credit + request.number);
+    break;
+  case RequestType::take:
+    take(client);
+    break;
+  case RequestType::release:
+    let_go();
+    break;
+  case RequestType::mode:
+    set_mode(client, request.mode);
+    break;
+  case RequestType::pose:
+    move(request);
+    break;
+  case RequestType::park:
+    put_down(target_.mode);
+    break;
+  case RequestType::grip:
+    target_.buttons = request.on ? 1 : 0;
+    session_->aim(target_);
+    break;
+  case RequestType::reset:
+    build(client, session_->scenario(), "reset", "from the start");
+    break;
+  case RequestType::scenario:
+    choose(client, *request.name);
+    break;
+  case RequestType::set: {
+    Scenario scenario = next_ != nullptr                              ? *next_->scenario
+                        : building_ != nullptr && building_->scenario ? *building_->scenario
+                                                                      : session_->scenario();
+    apply(request.settings, scenario);
+    build(client, std::move(scenario), "set", "with other settings");
+    break;
+  }
+  case RequestType::overlays:
+    change(from, client, request.overlays);
+    break;
+  case RequestType::record:
+  case RequestType::replay:
+    send(client, error_text("unavailable", "recordings are not part of this build", to_string(request.type)));
+    break;
+  }
+}
+
+void Hub::take(int client) {
+  if (holder_ != 0 && holder_ != client) {
+    send(client, error_text("taken", "another viewer holds the tool", "take"));
+    return;
+  }
+  holder_ = client;
+  send_all(holder_text(holder_));
+}
+
+void Hub::let_go() {
+  holder_ = 0;
+  put_down(target_.mode);
+  send_all(holder_text(holder_));
+}
+
+void Hub::put_down(HandMode mode) {
+  const std::uint32_t number = target_.number;
+  const std::uint32_t jumps = target_.jumps;
+  target_ = session_->parked(mode);
+  target_.number = number;
+  target_.jumps = jumps + 1;
+  parked_ = true;
+  session_->aim(target_);
+}
+
+void Hub::set_mode(int client, HandMode mode) {
+  const std::vector<HandMode> modes = session_->modes();
+  if (std::find(modes.begin(), modes.end(), mode) == modes.end()) {
+    send(client, error_text("unavailable", "this scenario has no such tool", "mode"));
+    return;
+  }
+  put_down(mode);
+  send_all(mode_text(mode));
+}
+
+// A tool that comes from its parking place is put down where it is led, unless that is inside the organ: then it has to
+// go there through the surface.
+void Hub::move(const Request& request) {
+  target_.number = request.pose;
+  const BoundingBox box = session_->domain().bounds();
+  const double most = reach * box.extent().norm();
+  const Vector3 away = request.position - box.centre();
+  target_.position = box.centre() + (away.norm() > most ? Vector3(most / away.norm() * away) : away);
+  if (request.orientation)
+    target_.orientation = *request.orientation;
+  if (std::exchange(parked_, false) && session_->clear_of_organ(target_))
+    ++target_.jumps;
+  session_->aim(target_);
+}
+
+void Hub::change(Client& from, int client, const OverlaysChange& overlays) {
+  if (overlays.colour)
+    from.overlays.colour = *overlays.colour;
+  if (overlays.nodes)
+    from.overlays.nodes = *overlays.nodes;
+  if (overlays.stages)
+    from.overlays.stages = *overlays.stages;
+  if (overlays.pick)
+    from.overlays.pick = *overlays.pick;
+  if (overlays.slice)
+    from.overlays.slice = *overlays.slice;
+  if (from.overlays.pick)
+    from.overlays.pick->key = client;
+  if (from.overlays.slice)
+    from.overlays.slice->key = client;
+  request_overlays();
+}
+
+void Hub::request_overlays() {
+  ViewerRequest request;
+  for (const auto& [id, client] : clients_) {
+    request.displacement = request.displacement || client.overlays.colour == Overlays::Colour::displacement;
+    request.von_mises = request.von_mises || client.overlays.colour == Overlays::Colour::von_mises;
+    request.nodes = request.nodes || client.overlays.nodes;
+    if (client.overlays.pick)
+      request.picks.push_back(*client.overlays.pick);
+    if (client.overlays.slice)
+      request.slices.push_back(*client.overlays.slice);
+  }
+  session_->request(std::move(request));
+}
+
+std::vector<ScenarioEntry> Hub::scenarios() const {
+  std::vector<ScenarioEntry> list;
+  const std::filesystem::path folder = options_.scenario.parent_path();
+  std::error_code error;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(folder.empty() ? std::filesystem::path(".") : folder, error)) {
+    if (entry.path().extension() != ".toml")
+      continue;
+    const std::string name = entry.path().filename().string();
+    list.push_back({name, title_of(entry.path())});
+  }
+  std::sort(list.begin(), list.end(), [](const ScenarioEntry& a, const ScenarioEntry& b) { return a.name < b.name; });
+  return list;
+}
+
+void Hub::choose(int client, const std::string& name) {
+  const std::vector<ScenarioEntry> list = scenarios();
+  if (std::none_of(list.begin(), list.end(), [&](const ScenarioEntry& entry) { return entry.name == name; }))
+    throw InputError(fmt::format("there is no scenario '{}' in the list", name));
+  build(client, read_scenario(options_.scenario.parent_path() / name), "scenario", name);
+}
+
+void Hub::build(int client, Scenario scenario, std::string_view about, const std::string& what) {
+  next_ = std::make_unique<Building>();
+  next_->about = about;
+  next_->what = what;
+  next_->client = client;
+  next_->scenario = std::move(scenario);
+  if (building_ == nullptr)
+    start_building();
+}
+
+void Hub::start_building() {
+  building_ = std::move(next_);
+  send_all(building_text(building_->what));
+  Building& job = *building_;
+  job.thread = std::thread([this, &job, scenario = *job.scenario] {
+    try {
+      job.session =
+          std::make_unique<LiveSession>(scenario, options_.speed, [this](const std::string& line) { say_here(line); });
+    } catch (const InputError& error) {
+      job.code = "refused";
+      job.failure = error.what();
+    } catch (const std::exception& error) {
+      job.code = "solver";
+      job.failure = error.what();
+    }
+    job.done.store(true, std::memory_order_release);
+  });
+}
+
+void Hub::finish_building() {
+  if (building_ == nullptr || !building_->done.load(std::memory_order_acquire))
+    return;
+  building_->thread.join();
+  const std::unique_ptr<Building> job = std::move(building_);
+  if (job->session != nullptr) {
+    // The old one may be in a long solve: it ends on a thread of its own, one at a time.
+    if (ending_.joinable())
+      ending_.join();
+    ending_ = std::thread([old = std::move(session_)]() mutable { old.reset(); });
+    session_ = std::move(job->session);
+    ++epoch_;
+    const std::vector<HandMode> modes = session_->modes();
+    const bool kept = std::find(modes.begin(), modes.end(), target_.mode) != modes.end();
+    target_.jumps = 0;
+    put_down(kept ? target_.mode : modes.front());
+    request_overlays();
+    measured_ = Clock::now();
+    ticks_before_ = solves_before_ = pictures_before_ = cuts_seen_ = 0;
+    compute_before_ = 0;
+    session_->start();
+    send_all(session_text(*session_, epoch_, target_.mode));
+  } else {
+    say_(fmt::format("the session goes on as it was: {}", job->failure));
+    if (clients_.count(job->client) != 0)
+      send(job->client, error_text(job->code, shortened(job->failure), job->about));
+    send_all(session_text(*session_, epoch_, target_.mode));
+  }
+  if (next_ != nullptr)
+    start_building();
+}
+
+void Hub::tick() {
+  finish_building();
+  std::vector<int> silent;
+  for (const auto& [id, client] : clients_)
+    if (!client.greeted && seconds_since(client.since) > options_.hello_patience)
+      silent.push_back(id);
+  for (const int id : silent)
+    server_->close(id, {CloseCode::policy, "hello did not come"});
+  tell_log();
+  tell_failures();
+  const LiveTick& tick = session_->tick();
+  measure(tick);
+  send_frames(tick);
+}
+
+void Hub::tell_log() {
+  if (seconds_since(log_told_) < std::chrono::duration<double>(log_interval).count())
+    return;
+  std::string line;
+  {
+    const std::lock_guard lock(log_mutex_);
+    if (log_.empty())
+      return;
+    line = std::move(log_.front());
+    log_.pop_front();
+  }
+  log_told_ = Clock::now();
+  say_(line);
+  send_all(log_text(shortened(line)));
+}
+
+void Hub::tell_failures() {
+  for (const std::string& reason : session_->failures()) {
+    say_("solver: " + reason);
+    send_all(error_text("solver", shortened(reason), "session"));
+  }
+}
+
+void Hub::measure(const LiveTick& tick) {
+  if (const std::uint64_t cuts = session_->cuts(); cuts != cuts_seen_) {
+    cuts_seen_ = cuts;
+    cut_at_ = Clock::now();
+  }
+  const double passed = seconds_since(measured_);
+  if (passed < 1)
+    return;
+  const std::uint64_t ticks = tick.record.device.tick;
+  const std::uint64_t solves = session_->solves();
+  const std::uint64_t pictures = session_->frame().number;
+  const auto done = static_cast<double>(ticks - ticks_before_);
+  rates_.ticks = done / passed;
+  rates_.solves = static_cast<double>(solves - solves_before_) / passed;
+  rates_.pictures = static_cast<double>(pictures - pictures_before_) / passed;
+  rates_.tick_seconds = done > 0 ? (tick.compute - compute_before_) / done : 0;
+  measured_ = Clock::now();
+  ticks_before_ = ticks;
+  solves_before_ = solves;
+  pictures_before_ = pictures;
+  compute_before_ = tick.compute;
+}
+
+std::uint32_t Hub::state_bits(const LiveTick& tick) const {
+  std::uint32_t bits = 0;
+  const auto set = [&](std::uint32_t bit, bool on) { bits |= on ? bit : 0; };
+  set(state_contact, tick.record.active > 0 || tick.record.tissue.squaredNorm() > 0);
+  set(state_held, holder_ != 0);
+  set(state_cutting, cuts_seen_ > 0 && Clock::now() - cut_at_ < cutting_shown);
+  set(state_failed, session_->failing());
+  set(state_building, building_ != nullptr);
+  set(state_limited, tick.record.limited);
+  set(state_fifo, fifo_);
+  return bits;
+}
+
+void Hub::send_frames(const LiveTick& tick) {
+  session_->fetch_frame();
+  const ViewerFrame& frame = session_->frame();
+  if (frame.number == 0)
+    return;
+  std::vector<int> ids;
+  ids.reserve(clients_.size());
+  for (const auto& [id, client] : clients_)
+    ids.push_back(id);
+  for (const int id : ids) {
+    const auto found = clients_.find(id);
+    if (found == clients_.end() || !found->second.greeted)
+      continue;
+    Client& client = found->second;
+    const bool picture = client.picture != frame.number || client.epoch != epoch_;
+    const bool due = seconds_since(client.last_frame) >= 1 / options_.frame_rate;
+    if (server_->waiting(id) > 0 || client.credit == 0) {
+      if (picture && client.picture != 0 && std::exchange(client.missed, frame.number) != frame.number)
+        ++client.left_out;
+    } else if (due && (picture || client.tick != tick.record.device.tick)) {
+      send_frame(id, client, tick, picture);
+    }
+  }
+}
+
+void Hub::send_frame(int id, Client& client, const LiveTick& tick, bool picture) {
+  const ViewerFrame& frame = session_->frame();
+  if (client.topology != frame.topology->number || client.epoch != epoch_) {
+    client.topology = frame.topology->number;
+    server_->send_binary(id, encode_topology(*frame.topology, ++client.messages, epoch_));
+  }
+  client.epoch = epoch_;
+  client.picture = frame.number;
+  client.tick = tick.record.device.tick;
+  client.last_frame = Clock::now();
+  --client.credit;
+  FrameContext context;
+  context.message = ++client.messages;
+  context.epoch = epoch_;
+  context.state = state_bits(tick);
+  context.number_in_solve = session_->number_at(frame.pose_tick);
+  context.left_out = client.left_out;
+  context.rates = rates_;
+  const Overlays overlays = client.overlays;
+  server_->send_binary(id, encode_frame(frame, tick, context, overlays, id, picture));
+}
+
+} // namespace spherecut::app

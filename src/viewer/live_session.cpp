@@ -1,0 +1,177 @@
+#include "src/viewer/live_session.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <limits>
+#include <utility>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double parking = 0.15; // of the organ's diagonal, beyond where the tool starts
+
+PathPose start_of(const std::vector<StepSample>& steps, bool blade) {
+  for (const StepSample& sample : steps)
+    if (blade && sample.blade)
+      return {0, sample.blade->position, sample.blade->orientation};
+    else if (!blade && sample.tool)
+      return {0, sample.tool->point, Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), sample.tool->axis)};
+  return {};
+}
+
+} // namespace
+
+LiveSession::LiveSession(Scenario scenario, double speed, std::function<void(const std::string&)> say)
+    : scenario_(std::move(scenario)), simulation_(std::make_unique<HapticSimulation>(scenario_, std::move(say))) {
+  const Session& session = simulation_->session();
+  domain_ = session.organ().domain;
+  nodes_ = session.sprinkling().nodes.size();
+  fine_ = session.zone().spacing.fine;
+  coarse_ = session.zone().spacing.coarse;
+  if (nodes_ > most_live_nodes)
+    throw InputError(
+        fmt::format("{} nodes; a live session takes at most {}: give a coarser spacing", nodes_, most_live_nodes));
+  if (scenario_.tool)
+    tool_start_ = start_of(session.steps(), false);
+  if (scenario_.blade)
+    blade_start_ = start_of(session.steps(), true);
+  query_ = std::make_unique<topology::ContactQuery>(domain_->surface());
+  const HapticSettings& settings = scenario_.haptics;
+  const PointerTarget start = parked(modes().front());
+  hand_ = std::make_unique<PointerHand>(settings.hand, settings.rate, speed, start);
+  feed_ = std::make_unique<ViewerFeed>(settings.viewer_rate);
+  simulation_->prepare(hand_->read(0));
+}
+
+LiveSession::~LiveSession() {
+  stop_ = true;
+  if (thread_.joinable())
+    thread_.join();
+}
+
+void LiveSession::start() {
+  thread_ = std::thread([this] { run(); });
+}
+
+void LiveSession::run() {
+  RealtimeOptions options;
+  options.keep = false;
+  options.solve_at_rest = false;
+  options.feed = feed_.get();
+  options.stop = [this] { return stop_.load(); };
+  options.on_tick = [this](const TickRecord& record) { note(record); };
+  options.on_solve = [this](const SolveRecord& record) { note(record); };
+  RealtimeReport report;
+  try {
+    static_cast<void>(run_realtime(scenario_.haptics, *simulation_, *hand_, std::numeric_limits<double>::infinity(),
+                                   options, report));
+  } catch (const std::exception& error) {
+    const std::lock_guard lock(failures_mutex_);
+    failures_.push_back(fmt::format("the loop has ended: {}", error.what()));
+    failing_ = true;
+  }
+}
+
+void LiveSession::note(const TickRecord& record) noexcept {
+  latency_ = std::max(latency_, record.latency);
+  if (record.device.tick % 1000 == 999)
+    summed_.worst_latency = std::exchange(latency_, 0.0);
+  summed_.record = record;
+  summed_.compute += record.compute;
+  if (record.latency + record.compute > 1 / scenario_.haptics.rate)
+    ++summed_.overruns;
+  ticks_.back() = summed_;
+  ticks_.publish();
+}
+
+void LiveSession::note(const SolveRecord& record) {
+  failing_ = record.failed;
+  if (record.failed) {
+    const std::lock_guard lock(failures_mutex_);
+    if (std::exchange(last_failure_, record.reason) != record.reason)
+      failures_.push_back(record.reason);
+    return;
+  }
+  if (record.cut_triangles > 0)
+    ++cuts_;
+  ++solves_;
+}
+
+std::vector<std::string> LiveSession::failures() {
+  const std::lock_guard lock(failures_mutex_);
+  return std::exchange(failures_, {});
+}
+
+const LiveTick& LiveSession::tick() {
+  if (!ticks_.fetch())
+    return newest_;
+  newest_ = ticks_.front();
+  const PointerHandState& state = hand_->state();
+  newest_.hand = state.hand;
+  newest_.number = state.number;
+  find_contact();
+  return newest_;
+}
+
+void LiveSession::find_contact() {
+  const DeviceState& device = newest_.record.device;
+  if (device.mode != static_cast<std::uint16_t>(HandMode::blade)) {
+    const topology::ToolPose pose = tool_pose(simulation_->tool(), device);
+    newest_.axis = pose.axis;
+    newest_.contact = query_->first_touch(simulation_->tool(), pose);
+    return;
+  }
+  newest_.axis = device.orientation * Vector3::UnitZ();
+  double least = std::numeric_limits<double>::infinity();
+  for (const Vector3& x : scenario_.blade->edge) {
+    const Vector3 place = device.orientation * x + device.position;
+    if (const double distance = domain_->signed_distance(place); distance < least) {
+      least = distance;
+      newest_.contact.point = domain_->closest_surface_point(place);
+    }
+  }
+  newest_.contact.normal = domain_->normal(newest_.contact.point);
+  newest_.record.depth = -least;
+}
+
+std::vector<HandMode> LiveSession::modes() const {
+  std::vector<HandMode> modes;
+  if (scenario_.tool)
+    modes.push_back(HandMode::probe);
+  if (scenario_.blade)
+    modes.push_back(HandMode::blade);
+  return modes;
+}
+
+PointerTarget LiveSession::parked(HandMode mode) const {
+  const double away = parking * domain_->bounds().extent().norm();
+  PointerTarget target;
+  target.mode = mode;
+  if (mode == HandMode::blade) {
+    target.orientation = blade_start_->orientation;
+    target.position = blade_start_->position + away * domain_->normal(blade_start_->position);
+    return target;
+  }
+  target.orientation = tool_start_->orientation;
+  const topology::ToolPose pose =
+      topology::pose_at(scenario_.tool->shape, tool_start_->position, tool_start_->orientation * Vector3::UnitZ());
+  target.position = pose.point + away * pose.axis;
+  return target;
+}
+
+bool LiveSession::clear_of_organ(const PointerTarget& target) const {
+  if (target.mode != HandMode::blade) {
+    const double radius = topology::tip_radius(scenario_.tool->shape);
+    const topology::ToolPose pose =
+        tool_pose(scenario_.tool->shape, {0, 0, target.position, target.orientation, true, 0, 0});
+    return domain_->signed_distance(pose.point + radius * pose.axis) > radius;
+  }
+  const std::vector<Vector3>& edge = scenario_.blade->edge;
+  return std::all_of(edge.begin(), edge.end(), [&](const Vector3& x) {
+    return domain_->signed_distance(target.orientation * x + target.position) > 0;
+  });
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,94 @@
+// A session that goes on until it is told to stop, with the tool in the hand of a viewer: the real loop of three
+// threads (src/haptics/realtime_loop.hpp) behind calls that a viewer's thread makes and that never wait for it.
+#pragma once
+
+#include "src/haptics/pointer_hand.hpp"
+#include "src/haptics/realtime_loop.hpp"
+
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+namespace spherecut::app {
+
+/// The haptic loop at one tick, and sums since the start.
+struct LiveTick {
+  TickRecord record;
+  topology::SurfaceContact contact; // on the surface at rest; of a blade where its edge is deepest
+  Vector3 axis = Vector3::UnitZ();  // of the tool
+  Vector3 hand = Vector3::Zero();   // m, where the pointer's hand is
+  std::uint32_t number = 0;         // of the viewer's message that it follows
+  std::uint64_t overruns = 0;
+  double compute = 0;       // s of processor time in ticks
+  double worst_latency = 0; // s, of the last whole second of ticks
+};
+
+inline constexpr int most_live_nodes = 6000; // a live session with more would not be one
+
+class LiveSession {
+ public:
+  /// Builds and condenses the body; takes seconds. Throws InputError and NumericalError. `say` is called from this
+  /// thread and later from that of the simulation.
+  LiveSession(Scenario scenario, double speed, std::function<void(const std::string&)> say);
+  /// Stops; waits for the solve that is under way.
+  ~LiveSession();
+  LiveSession(const LiveSession&) = delete;
+  LiveSession& operator=(const LiveSession&) = delete;
+
+  void start();
+
+  [[nodiscard]] const Scenario& scenario() const { return scenario_; }
+  [[nodiscard]] const topology::Domain& domain() const { return *domain_; }
+  [[nodiscard]] std::vector<HandMode> modes() const;
+  /// Nodes at the start.
+  [[nodiscard]] int nodes() const { return nodes_; }
+  [[nodiscard]] double fine_spacing() const { return fine_; }     // m
+  [[nodiscard]] double coarse_spacing() const { return coarse_; } // m
+  /// Away from the organ: the number of a target there is 0.
+  [[nodiscard]] PointerTarget parked(HandMode mode) const;
+  /// Whether the tool can be put down at a place without being in the organ at rest.
+  [[nodiscard]] bool clear_of_organ(const PointerTarget& target) const;
+
+  // One viewer thread:
+  void aim(const PointerTarget& target) { hand_->aim(target); }
+  void request(ViewerRequest request) { feed_->request(std::move(request)); }
+  bool fetch_frame() { return feed_->fetch(); }
+  [[nodiscard]] const ViewerFrame& frame() const { return feed_->frame(); }
+  /// Number of the viewer's message that a tick of the last seconds followed.
+  [[nodiscard]] std::uint32_t number_at(std::uint64_t tick) const { return hand_->number_at(tick); }
+  /// The newest tick.
+  const LiveTick& tick();
+  [[nodiscard]] std::uint64_t solves() const { return solves_; }
+  [[nodiscard]] std::uint64_t cuts() const { return cuts_; } // solves that cut something
+  [[nodiscard]] bool failing() const { return failing_; }    // the last solve failed
+  /// Why solves have failed since the last call, each reason once, and what ended the loop.
+  std::vector<std::string> failures();
+
+ private:
+  void run();
+  void note(const TickRecord& record) noexcept;
+  void note(const SolveRecord& record);
+
+  void find_contact();
+
+  Scenario scenario_;
+  std::unique_ptr<HapticSimulation> simulation_;
+  std::shared_ptr<const topology::Domain> domain_;
+  int nodes_ = 0;
+  double fine_ = 0, coarse_ = 0;
+  std::optional<PathPose> tool_start_, blade_start_;
+  std::unique_ptr<PointerHand> hand_;
+  std::unique_ptr<ViewerFeed> feed_;
+  std::unique_ptr<topology::ContactQuery> query_;
+  TripleBuffer<LiveTick> ticks_; // from the loop's thread
+  LiveTick newest_, summed_;     // the viewer thread's; the loop's
+  double latency_ = 0;           // s, worst in this second, the loop's
+  std::atomic<std::uint64_t> solves_{0}, cuts_{0};
+  std::atomic<bool> failing_{false}, stop_{false};
+  std::mutex failures_mutex_;
+  std::vector<std::string> failures_; // guarded
+  std::string last_failure_;          // guarded
+  std::thread thread_;
+};
+
+} // namespace spherecut::app
