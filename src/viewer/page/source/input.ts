@@ -14,6 +14,8 @@ export interface PointerHost {
   pick(ray: Ray): boolean;
   /** The pointer has moved to here, px. */
   moved(x: number, y: number): void;
+  /** By metres. */
+  deepen(by: number): void;
   changed(): void;
 }
 
@@ -90,8 +92,8 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: S
     'wheel',
     (event) => {
       event.preventDefault();
-      const notches = Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY) / 100, 1);
-      if (stylus.pressing) stylus.deepen(-0.0005 * notches * (event.shiftKey ? 4 : 1));
+      const notches = Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY) / 100, 3);
+      if (stylus.pressing) host.deepen(-0.0005 * notches);
       else orbit.zoom(Math.exp(-0.15 * notches));
       host.changed();
     },

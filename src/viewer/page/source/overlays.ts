@@ -48,10 +48,10 @@ function discMaterial(ring: boolean): ShaderMaterial {
         vec2 at = 2.0 * gl_PointCoord - 1.0;
         float r = length(at);
         if (r > 1.0) discard;
-        ${ring ? 'if (r < 1.0 - 3.0 / max(pixels, 6.0)) discard; gl_FragColor = vec4(colour, 0.5);' : 'gl_FragColor = vec4(colour * (1.0 - 0.45 * r * r), 1.0);'}
+        ${ring ? 'if (r < 1.0 - 3.0 / max(pixels, 6.0)) discard; gl_FragColor = vec4(colour, 0.25);' : 'gl_FragColor = vec4(colour * (1.0 - 0.45 * r * r), 1.0);'}
         #include <colorspace_fragment>
       }`,
-    transparent: ring,
+    transparent: true,
     depthWrite: !ring,
     blending: ring ? AdditiveBlending : NormalBlending,
   });
@@ -77,6 +77,7 @@ export class Overlays {
       object.visible = false;
       this.group.add(object);
     }
+    this.discs.renderOrder = 1; // over the organ, which is transparent then
     this.rings.renderOrder = 2;
     this.bubble.renderOrder = 3;
   }
@@ -105,7 +106,7 @@ export class Overlays {
       const colour = hidden.has(i) ? hiddenColour : seen.has(i) ? seenColour : own;
       tint.set([colour.r, colour.g, colour.b], 3 * i);
     }
-    const dot = radii.map((radius) => 0.07 * radius);
+    const dot = radii.map((radius) => 0.05 * radius);
     const fill = (points: Points<BufferGeometry>, radius: Float32Array): void => {
       points.geometry.dispose();
       points.geometry = new BufferGeometry();
@@ -146,14 +147,14 @@ export class Overlays {
     const width = Math.hypot(slice.first[0] ?? 0, slice.first[1] ?? 0, slice.first[2] ?? 0);
     const reach = 0.3 * width;
     const step = niceStep(reach / 6);
-    const line = (0.7 * width) / count;
+    const line = width / count;
     const pixels = new Uint8Array(4 * count * count);
     for (let i = 0; i < count * count; ++i) {
       const value = values[i] ?? 0;
       const [r, g, b] = shows === 'organ' ? diverging(0.5 + (0.5 * value) / reach) : sequential(1 - value / reach);
       const nearest = step * Math.round(value / step);
-      const onZero = Math.abs(value) < line;
-      const dim = Math.abs(value - nearest) < 0.5 * line ? 0.72 : 1;
+      const onZero = Math.abs(value) < 0.6 * line;
+      const dim = Math.abs(value - nearest) < 0.55 * line ? 0.72 : 1;
       pixels.set(onZero ? [255, 255, 255, 255] : [dim * r, dim * g, dim * b, 255], 4 * i);
     }
     const texture = new DataTexture(pixels, count, count, RGBAFormat, UnsignedByteType);

@@ -57,7 +57,7 @@ export class Page {
       { cast: (ray) => this.cast(ray), freeze: () => (this.frozen = this.view.body.snapshot()), thaw: () => (this.frozen = null) },
       (message) => this.connection.send(message),
       (n) => this.latency.posed(n, performance.now()),
-      (pressing) => button('press-hold').setAttribute('aria-pressed', String(pressing)),
+      (pressing) => this.showPress(pressing),
     );
     this.keyboard = new Keyboard(bindings(this, this.stylus, this.view.orbit, this.panels));
     this.keyboard.describe(byId('help-body'), [
@@ -72,6 +72,7 @@ export class Page {
       ray: (x, y) => this.view.ray(x, y),
       pick: (ray) => this.pickAlong(ray),
       moved: (x, y) => (this.pointer = { x, y }),
+      deepen: (by) => this.deepen(by),
       changed: () => this.view.change(),
     });
     this.attachButtons();
@@ -325,6 +326,11 @@ export class Page {
     if (this.stylus.pressing) return this.stylus.release();
     this.movePointer(0, 0);
     this.stylus.press();
+  }
+
+  private showPress(pressing: boolean): void {
+    button('press-hold').setAttribute('aria-pressed', String(pressing));
+    if (pressing) this.view.setMark(null);
   }
 
   chooseMode(mode: Mode): void {

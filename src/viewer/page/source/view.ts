@@ -21,13 +21,11 @@ export class View {
   private stale = true;
   private sharpness = 1; // drawn pixels per pixel of the page, where the processor draws
   private drawSeconds = 0; // of a picture, smoothed
-  private readonly smooth: boolean;
 
   /** Throws Error in words when the browser has no WebGL 2. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.software = drawsInSoftware();
-    this.smooth = !this.software || new URLSearchParams(location.search).has('smooth');
-    this.renderer = new WebGLRenderer({ canvas, antialias: this.smooth, powerPreference: 'high-performance' });
+    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, powerPreference: 'high-performance' });
     this.renderer.setPixelRatio(this.software ? 1 : Math.min(globalThis.devicePixelRatio, 2));
     this.scene.background = new Color('#10171c');
     this.mark = new Mesh(
@@ -80,7 +78,7 @@ export class View {
       const pixel = new Uint8Array(4); // reading one waits for all
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
       this.drawSeconds += 0.2 * ((performance.now() - start) / 1000 - this.drawSeconds);
-      if (!this.smooth) this.adapt();
+      if (this.sharpness <= 1) this.adapt();
     }
     return true;
   }
@@ -116,12 +114,18 @@ export class View {
 
   /** Coarser pixels where the processor cannot keep up, finer ones where it can. */
   private adapt(): void {
-    const wanted =
-      this.drawSeconds > 0.07 ? Math.max(0.5, this.sharpness - 0.25) : this.drawSeconds < 0.02 ? Math.min(1, this.sharpness + 0.25) : this.sharpness;
+    let wanted = this.sharpness;
+    if (this.drawSeconds > 0.07) wanted = Math.max(0.5, wanted - 0.25);
+    else if (this.drawSeconds < 0.02) wanted = Math.min(1, wanted + 0.25);
     if (wanted === this.sharpness) return;
-    this.sharpness = wanted;
     this.drawSeconds = 0.045;
-    this.renderer.setPixelRatio(wanted);
+    this.sharpen(wanted);
+  }
+
+  /** Draws `sharpness` pixels per pixel of the page; above 1 edges are smooth without multisampling. */
+  sharpen(sharpness: number): void {
+    this.sharpness = sharpness;
+    this.renderer.setPixelRatio(sharpness);
     this.resize();
   }
 

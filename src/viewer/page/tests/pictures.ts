@@ -1,0 +1,79 @@
+// Pictures of the page for README and docs: node pictures.mjs BUILD_FOLDER SOURCE_FOLDER OUTPUT_FOLDER
+import { join } from 'node:path';
+import type { Page as Tab } from 'playwright-core';
+import { launch, openPage, until } from './browser';
+import { chooseMode, hover, look, ready, stroke } from './hand';
+import { serve } from './server';
+
+const [build = '.', source = '.', out = '.'] = process.argv.slice(2);
+/** A picture with smooth edges, small enough to be kept: below 150 kB. */
+async function photograph(tab: Tab, name: string): Promise<void> {
+  await tab.evaluate(() => globalThis.spherecut!.view.sharpen(2));
+  for (const quality of [84, 74, 62, 50]) {
+    const bytes = await tab.screenshot({ path: join(out, `viewer_${name}.jpg`), type: 'jpeg', quality });
+    if (bytes.length < 150_000) break;
+  }
+  await tab.evaluate(() => globalThis.spherecut!.view.sharpen(1));
+}
+
+const served = await serve(build, join(source, 'scenarios/liver_live.toml'));
+const browser = await launch();
+try {
+  const { tab, context } = await openPage(browser, served.address, { width: 1280, height: 800 });
+  await ready(tab);
+  const keep = async (name: string): Promise<void> => {
+    await tab.waitForTimeout(700);
+    await photograph(tab, name);
+    console.log(name, JSON.stringify(await look(tab)));
+  };
+  await hover(tab, -0.03, -0.012);
+  await tab.mouse.down();
+  await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.05);
+  await tab.mouse.wheel(0, -800);
+  await tab.waitForTimeout(2500);
+  await keep('press');
+  await tab.selectOption('#colours', 'von_mises');
+  await tab.waitForTimeout(1200);
+  await keep('stress');
+  await tab.selectOption('#colours', 'none');
+  await tab.mouse.up();
+  await chooseMode(tab, '2', 'blade');
+  for (let i = 0; i < 6; ++i) await tab.keyboard.press('.', { delay: 150 });
+  await hover(tab, -0.06, 0.004);
+  await stroke(tab, [[-0.06, 0.004], [-0.035, 0.004], [-0.01, 0.001], [0.012, -0.002]], 2.5);
+  await until(tab, 'the cut is through', () => globalThis.spherecut!.frame!.cutArea > 5e-4, 60);
+  await tab.waitForTimeout(6000);
+  await keep('cutting');
+  await tab.mouse.up();
+  await tab.keyboard.press('k');
+  await tab.waitForTimeout(3000);
+  await tab.mouse.move(600, 600);
+  await tab.evaluate(() => {
+    const orbit = globalThis.spherecut!.view.orbit;
+    orbit.turn(0, 0.35);
+    orbit.zoom(1.9);
+    orbit.pan(0.1, -0.17);
+    globalThis.spherecut!.view.change();
+  });
+  await keep('wound');
+  await tab.keyboard.press('n');
+  await tab.evaluate(() => globalThis.spherecut!.pickAtTip());
+  await tab.waitForTimeout(1500);
+  await keep('nodes');
+  for (const key of ['n', 'o']) await tab.keyboard.press(key);
+  await tab.selectOption('#slice', 'cut');
+  await tab.selectOption('#slice-axis', '0');
+  await tab.evaluate(() => globalThis.spherecut!.home());
+  await tab.waitForTimeout(1500);
+  await keep('slice');
+  await context.close();
+  const phone = await openPage(browser, served.address, { width: 390, height: 760, touch: true });
+  await ready(phone.tab);
+  await phone.tab.tap('#view', { position: { x: 170, y: 300 } });
+  await phone.tab.tap('#press-hold');
+  await phone.tab.waitForTimeout(3500);
+  await photograph(phone.tab, 'phone');
+} finally {
+  await browser.close();
+  await served.stop();
+}
