@@ -1,17 +1,26 @@
 #!/usr/bin/env bash
-# One test of the page under node: run.sh NODE BUILD_FOLDER unit|browser [ARGUMENTS]. Exits 77 (skipped) and says why when the
-# page was not built or there is no browser.
+# The page of `spherecut serve` under test: run.sh BUILD_FOLDER KIND [ARGUMENTS]
+#   unit             the protocol's decoder and the surface, under node
+#   browser          the page in Chromium against the server
+#   pictures FOLDER  pictures of the page, JPEG below 150 kB, for docs/images
+#   measure          frame rate and latency at 20,000 triangles
+#   soak SECONDS [SEED]  random pressing and cutting
+# Exits 77 (skipped) and says why when the page was not built or there is no browser.
 set -euo pipefail
-node=$1 build=$2 kind=$3
-shift 3
+source=$(cd "$(dirname "$(readlink -f "$0")")/../.." && pwd)
+build=$1 kind=$2
+shift 2
+export OPENBLAS_NUM_THREADS=1
 
 skip() {
   printf '\n  NOTE: THE TESTS OF THE PAGE ARE SKIPPED (%s): %s\n\n' "$kind" "$1"
   exit 77
 }
+node=$(command -v node || command -v nodejs) || skip "nodejs is not installed"
 [ -e "$build/page/index.html" ] || skip "the page is not built; that needs nodejs, npm and, once, the network"
 if [ "$kind" = unit ]; then
   exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs"
 fi
 command -v chromium >/dev/null || skip "the Debian package chromium is not installed"
-exec timeout 280 "$node" "$build/page-tests/browser.test.mjs" "$build" "$@"
+[ "$kind" = browser ] && kind=browser.test
+exec "$node" "$build/page-tests/$kind.mjs" "$build" "$source" "$@"

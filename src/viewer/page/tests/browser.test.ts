@@ -5,13 +5,15 @@ import { join } from 'node:path';
 import test, { after, before } from 'node:test';
 import type { Browser } from 'playwright-core';
 import { launch, type Opened, openPage, until } from './browser';
-import { chooseMode, hover, look, ready, stroke } from './hand';
+import { chooseMode, hover, look, ready, type Seen, stroke } from './hand';
 import { recordedForces, serve, type Served } from './server';
 
 const [build = '.', source = '.'] = process.argv.slice(2);
 let served: Served;
 let browser: Browser;
 let first: Opened;
+let records = false; // the server makes recordings
+let pressed: Seen;
 
 before(async () => {
   // The liver of the demo with fewer triangles and nodes: the same page and server, sooner through a cut.
@@ -39,31 +41,40 @@ test('The page loads without a complaint and takes the tool', async () => {
   assert.equal(await first.tab.title(), `spherecut ${/\d+\.\d+\.\d+/.exec(await first.tab.title())?.[0]}`);
 });
 
-test('A press is felt: the readout is the force of the server, tick by tick', async () => {
+test('A press is felt, and the readout is the force of the frame', async () => {
   const { tab } = first;
   await tab.click('#record');
-  await until(tab, 'it records', () => document.getElementById('record')!.getAttribute('aria-pressed') === 'true');
+  await until(tab, 'it records or says why not', () =>
+    document.getElementById('record')!.getAttribute('aria-pressed') === 'true' || document.querySelector('#messages [data-level=error]') !== null);
+  records = (await tab.getAttribute('#record', 'aria-pressed')) === 'true';
   await hover(tab, -0.02, -0.01);
   await tab.mouse.down();
   await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
   await tab.waitForTimeout(1000);
-  const seen = await look(tab);
-  assert.ok(seen.depth > 0.003, `depth ${seen.depth}`);
-  assert.ok(Math.abs(seen.readout - seen.force) < 6e-4, `reads ${seen.readout}, frame ${seen.force}`);
+  pressed = await look(tab);
+  assert.ok(pressed.depth > 0.003, `depth ${pressed.depth}`);
+  assert.ok(Math.abs(pressed.readout - pressed.force) < 6e-4, `reads ${pressed.readout}, frame ${pressed.force}`);
   await tab.mouse.up();
   await until(tab, 'it has withdrawn', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
+});
+
+test('The readout is the force in the recording of the server at that tick', async (context) => {
+  const { tab } = first;
+  if (!records) return context.skip('this server makes no recordings');
   await tab.click('#record');
   await until(tab, 'it has recorded', () => !(document.getElementById('download') as HTMLButtonElement).disabled);
   const [download] = await Promise.all([tab.waitForEvent('download'), tab.click('#download')]);
   const ticks = recordedForces(readFileSync(await download.path()));
-  const tick = ticks.reduce((best, next) => (Math.abs(next.time - seen.tickTime) < Math.abs(best.time - seen.tickTime) ? next : best));
-  assert.ok(Math.abs(tick.time - seen.tickTime) < 1e-6, `no tick at ${seen.tickTime}`);
-  tick.force.forEach((newtons, d) => assert.ok(Math.abs(newtons - seen.handForce[d]!) < 1e-6, `${tick.force} and ${seen.handForce}`));
-  assert.ok(Math.abs(Math.hypot(...tick.force) - seen.readout) < 6e-4, 'the force on the page is not that of the recording');
+  const away = ({ time }: { time: number }): number => Math.abs(time - pressed.tickTime);
+  const tick = ticks.reduce((best, next) => (away(next) < away(best) ? next : best));
+  assert.ok(away(tick) < 1e-6, `no tick at ${pressed.tickTime}`);
+  tick.force.forEach((newtons, d) => assert.ok(Math.abs(newtons - pressed.handForce[d]!) < 1e-6, `${tick.force} and ${pressed.handForce}`));
+  assert.ok(Math.abs(Math.hypot(...tick.force) - pressed.readout) < 6e-4, 'the force on the page is not that of the recording');
 });
 
-test('A recording is replayed, and the force comes back', async () => {
+test('A recording is replayed, and the force comes back', async (context) => {
   const { tab } = first;
+  if (!records) return context.skip('this server makes no recordings');
   await tab.click('#replay');
   await until(tab, 'the press is felt again', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03, 30);
   await tab.click('#replay');
@@ -142,8 +153,7 @@ test('Errors of the server appear in words', async () => {
   await tab.evaluate(() => document.querySelectorAll('details').forEach((panel) => (panel.open = true)));
   await tab.fill('#fine', '60'); // coarser than far away
   await tab.click('#method-form button');
-  await until(tab, 'an error', () => document.querySelector('#messages [data-level=error]') !== null, 40);
-  assert.ok((await tab.textContent('#messages [data-level=error]'))!.length > 20);
+  await until(tab, 'an error', () => /spacing/.test(document.querySelector('#messages [data-level=error]:last-child')?.textContent ?? ''), 40);
 });
 
 test('Everything goes by keyboard', async () => {
