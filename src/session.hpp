@@ -59,7 +59,7 @@ class Session {
   void prepare(const StepSample& sample);
 
   /// The blade leaves the tissue where it is, and the next step that has one only places it: its way does not cut in
-  /// between.
+  /// between. From now on its way is not taken to be the scenario's: nodes are fine at the front of the cut.
   void lift_blade();
 
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
@@ -151,6 +151,7 @@ class Session {
   std::optional<topology::SurfaceContact> last_contact_;
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
   bool blade_lifted_ = false;                     // its next pose places it
+  bool hand_led_ = false;                         // the blade goes where it likes, not along the scenario's path
   std::vector<solvers::PointState> node_states_;
   VectorX node_displacements_; // m, 3 a node, in the last step
   bool force_only_ = false;

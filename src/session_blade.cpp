@@ -94,6 +94,8 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
     next.coarseness = coarseness_;
     require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
     check_pieces(sample.time);
+    if (hand_led_)
+      zone_.spacing.segments = solvers::front_segments(*next.incision, zone_.spacing.fine);
     {
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();

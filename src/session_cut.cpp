@@ -123,6 +123,7 @@ void Session::lift_blade() {
     return;
   last_blade_.reset();
   blade_lifted_ = true;
+  hand_led_ = true;
   if (blade_force_ == nullptr)
     return;
   blade_force_->lift();
@@ -172,6 +173,8 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     next.incision = incisions_->incision();
     require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
     check_pieces(sample.time);
+    if (hand_led_)
+      zone_.spacing.segments = solvers::front_segments(*next.incision, zone_.spacing.fine);
     {
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();

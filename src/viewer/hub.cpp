@@ -1,5 +1,6 @@
 #include "src/viewer/hub.hpp"
 
+#include "src/haptics/replay.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 namespace spherecut::app {
 namespace {
 
+constexpr const char* recording_extension = ".recording";
 constexpr std::size_t log_lines = 200;                        // kept for telling
 constexpr auto log_interval = std::chrono::milliseconds(100); // between two lines
 constexpr auto cutting_shown = std::chrono::milliseconds(300);
@@ -53,7 +55,7 @@ std::string shortened(const std::string& text) {
 
 Hub::Hub(HubOptions options, std::function<void(const std::string&)> say)
     : options_(std::move(options)), say_(std::move(say)), fifo_(fifo_granted()) {
-  session_ = std::make_unique<LiveSession>(read_scenario(options_.scenario), options_.speed,
+  session_ = std::make_unique<LiveSession>(read_scenario(options_.scenario), LiveOptions{options_.speed, {}, {}},
                                            [this](const std::string& line) { say_here(line); });
   target_ = session_->parked(session_->modes().front());
   session_->start();
@@ -126,7 +128,7 @@ std::optional<CloseReason> Hub::message(int client, std::string_view text) {
 
 void Hub::greet(int client, Client& from) {
   from.greeted = true;
-  send(client, welcome_text(client, scenarios(), {}, options_.viewers, options_.speed));
+  send(client, welcome_text(client, scenarios(), recordings(), options_.viewers, options_.speed));
   send(client, session_text(*session_, epoch_, target_.mode));
   send(client, holder_text(holder_));
   if (building_ != nullptr)
@@ -177,8 +179,10 @@ void Hub::act(int client, Client& from, const Request& request) {
     change(from, client, request.overlays);
     break;
   case RequestType::record:
+    record(client, request.on);
+    break;
   case RequestType::replay:
-    send(client, error_text("unavailable", "recordings are not part of this build", to_string(request.type)));
+    replay(client, request.name);
     break;
   }
 }
@@ -287,12 +291,79 @@ void Hub::choose(int client, const std::string& name) {
   build(client, read_scenario(options_.scenario.parent_path() / name), "scenario", name);
 }
 
-void Hub::build(int client, Scenario scenario, std::string_view about, const std::string& what) {
+// A recording begins with a session, so that it can be run again from there.
+void Hub::record(int client, bool on) {
+  if (!on) {
+    session_->stop_recording();
+    return;
+  }
+  if (session_->recording() || session_->replays() || changed_) {
+    send(client, error_text("unavailable",
+                            session_->recording() ? "this session is being recorded"
+                            : changed_            ? "a recording refers to the scenario as its file has it: choose the "
+                                                    "scenario anew"
+                                                  : "a replay is going on",
+                            "record"));
+    return;
+  }
+  std::error_code error;
+  std::filesystem::create_directories(options_.recordings, error);
+  if (error)
+    throw InputError(fmt::format("cannot make the folder {}: {}", options_.recordings.string(), error.message()));
+  build(client, session_->scenario(), "record", "from the start, recorded", {unused_recording(), {}, {}});
+}
+
+void Hub::replay(int client, const std::optional<std::string>& name) {
+  if (!name) {
+    if (session_->replays())
+      build(client, session_->scenario(), "replay", "from the start");
+    return;
+  }
+  const std::vector<RecordingEntry> list = recordings();
+  if (std::none_of(list.begin(), list.end(), [&](const RecordingEntry& entry) { return entry.name == *name; }))
+    throw InputError(fmt::format("there is no recording '{}' in the list", *name));
+  const auto recording = std::make_shared<const Recording>(read_recording(options_.recordings / *name));
+  build(client, recorded_scenario(*recording), "replay", "replay of " + *name, {{}, recording, *name});
+}
+
+std::filesystem::path Hub::unused_recording() const {
+  for (int number = 1;; ++number) {
+    std::filesystem::path file = options_.recordings / fmt::format("session-{}{}", number, recording_extension);
+    if (std::error_code error; !std::filesystem::exists(file, error))
+      return file;
+  }
+}
+
+std::vector<RecordingEntry> Hub::recordings() const {
+  std::vector<RecordingEntry> list;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(options_.recordings, error))
+    if (entry.path().extension() == recording_extension)
+      list.push_back({entry.path().filename().string(), entry.file_size(error)});
+  std::sort(list.begin(), list.end(), [](const RecordingEntry& a, const RecordingEntry& b) { return a.name < b.name; });
+  return list;
+}
+
+void Hub::tell_recording() {
+  const bool now = session_->recording();
+  if (now == recording_)
+    return;
+  recording_ = now;
+  const std::filesystem::path& file = session_->recorded_to();
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+  send_all(recording_text(now, {file.filename().string(), error ? 0 : bytes}, session_->tick().record.device.time));
+}
+
+void Hub::build(int client, Scenario scenario, std::string_view about, const std::string& what,
+                const Recorded& recorded) {
   next_ = std::make_unique<Building>();
   next_->about = about;
   next_->what = what;
   next_->client = client;
   next_->scenario = std::move(scenario);
+  next_->options = {options_.speed, recorded.to, recorded.from};
+  next_->replayed = recorded.name;
   if (building_ == nullptr)
     start_building();
 }
@@ -304,7 +375,7 @@ void Hub::start_building() {
   job.thread = std::thread([this, &job, scenario = *job.scenario] {
     try {
       job.session =
-          std::make_unique<LiveSession>(scenario, options_.speed, [this](const std::string& line) { say_here(line); });
+          std::make_unique<LiveSession>(scenario, job.options, [this](const std::string& line) { say_here(line); });
     } catch (const InputError& error) {
       job.code = "refused";
       job.failure = error.what();
@@ -328,8 +399,13 @@ void Hub::finish_building() {
     ending_ = std::thread([old = std::move(session_)]() mutable { old.reset(); });
     session_ = std::move(job->session);
     ++epoch_;
+    changed_ = job->about == "set" || (changed_ && job->about != "scenario" && job->about != "replay");
+    recording_ = false;
+    if (!replaying_.empty() || session_->replays())
+      send_all(replay_text(session_->replays(), session_->replays() ? job->replayed : replaying_));
+    replaying_ = session_->replays() ? job->replayed : "";
     const std::vector<HandMode> modes = session_->modes();
-    const bool kept = std::find(modes.begin(), modes.end(), target_.mode) != modes.end();
+    const bool kept = !session_->replays() && std::find(modes.begin(), modes.end(), target_.mode) != modes.end();
     target_.jumps = 0;
     put_down(kept ? target_.mode : modes.front());
     request_overlays();
@@ -358,6 +434,7 @@ void Hub::tick() {
     server_->close(id, {CloseCode::policy, "hello did not come"});
   tell_log();
   tell_failures();
+  tell_recording();
   const LiveTick& tick = session_->tick();
   measure(tick);
   send_frames(tick);
@@ -414,6 +491,8 @@ std::uint32_t Hub::state_bits(const LiveTick& tick) const {
   const auto set = [&](std::uint32_t bit, bool on) { bits |= on ? bit : 0; };
   set(state_contact, tick.record.active > 0 || tick.record.tissue.squaredNorm() > 0);
   set(state_held, holder_ != 0);
+  set(state_recording, session_->recording());
+  set(state_replay, session_->replays());
   set(state_cutting, cuts_seen_ > 0 && Clock::now() - cut_at_ < cutting_shown);
   set(state_failed, session_->failing());
   set(state_building, building_ != nullptr);

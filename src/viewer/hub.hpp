@@ -11,11 +11,19 @@
 namespace spherecut::app {
 
 struct HubOptions {
-  std::filesystem::path scenario; // the first one; its folder is the list to choose from
+  std::filesystem::path scenario;   // the first one; its folder is the list to choose from
+  std::filesystem::path recordings; // folder of those made here; made with the first
   int viewers = 16;
   double speed = 0.5;         // m/s, of the hand at most
   double frame_rate = 60;     // frames a second to a client at most
   double hello_patience = 10; // s
+};
+
+/// What a new session has to do with recordings.
+struct Recorded {
+  std::filesystem::path to{};              // it is written there
+  std::shared_ptr<const Recording> from{}; // it plays this
+  std::string name{};                      // of that
 };
 
 class Hub {
@@ -54,6 +62,8 @@ class Hub {
     std::string what;  // in words
     int client = 0;    // that asked
     std::optional<Scenario> scenario;
+    LiveOptions options;
+    std::string replayed;                 // name of the recording; empty: none
     std::atomic<bool> done{false};        // then the thread has left the rest to the server's
     std::unique_ptr<LiveSession> session; // null: it failed
     std::string code, failure;
@@ -73,7 +83,14 @@ class Hub {
   void request_overlays();
   void choose(int client, const std::string& name);
 
-  void build(int client, Scenario scenario, std::string_view about, const std::string& what);
+  void record(int client, bool on);
+  void replay(int client, const std::optional<std::string>& name);
+  void tell_recording();
+  [[nodiscard]] std::filesystem::path unused_recording() const;
+  [[nodiscard]] std::vector<RecordingEntry> recordings() const;
+
+  void build(int client, Scenario scenario, std::string_view about, const std::string& what,
+             const Recorded& recorded = {});
   void start_building();
   void finish_building();
   void say_here(const std::string& line);
@@ -95,6 +112,9 @@ class Hub {
   Clock::time_point log_told_;
 
   std::unique_ptr<LiveSession> session_;
+  bool changed_ = false;   // settings of the session, from those of its file
+  bool recording_ = false; // told so
+  std::string replaying_;  // name; empty: nothing is
   std::uint32_t epoch_ = 1;
   bool fifo_ = false;
   PointerTarget target_;

@@ -10,7 +10,9 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double parking = 0.15; // of the organ's diagonal, beyond where the tool starts
+constexpr std::uint64_t flush_ticks = 256;               // between two writes of a recording
+constexpr std::uint64_t most_recorded_ticks = 3'600'000; // an hour: then it ends
+constexpr double parking = 0.15;                         // of the organ's diagonal, beyond where the tool starts
 
 PathPose start_of(const std::vector<StepSample>& steps, bool blade) {
   for (const StepSample& sample : steps)
@@ -23,8 +25,9 @@ PathPose start_of(const std::vector<StepSample>& steps, bool blade) {
 
 } // namespace
 
-LiveSession::LiveSession(Scenario scenario, double speed, std::function<void(const std::string&)> say)
-    : scenario_(std::move(scenario)), simulation_(std::make_unique<HapticSimulation>(scenario_, std::move(say))) {
+LiveSession::LiveSession(Scenario scenario, const LiveOptions& options, std::function<void(const std::string&)> say)
+    : scenario_(std::move(scenario)), simulation_(std::make_unique<HapticSimulation>(scenario_, std::move(say))),
+      record_(options.record) {
   const Session& session = simulation_->session();
   domain_ = session.organ().domain;
   nodes_ = session.sprinkling().nodes.size();
@@ -39,10 +42,19 @@ LiveSession::LiveSession(Scenario scenario, double speed, std::function<void(con
     blade_start_ = start_of(session.steps(), true);
   query_ = std::make_unique<topology::ContactQuery>(domain_->surface());
   const HapticSettings& settings = scenario_.haptics;
-  const PointerTarget start = parked(modes().front());
-  hand_ = std::make_unique<PointerHand>(settings.hand, settings.rate, speed, start);
+  if (options.replay != nullptr) {
+    device_ = std::make_unique<RecordedMotion>(*options.replay, settings.rate);
+  } else {
+    auto hand = std::make_unique<PointerHand>(settings.hand, settings.rate, options.speed, parked(modes().front()));
+    hand_ = hand.get();
+    device_ = std::move(hand);
+  }
   feed_ = std::make_unique<ViewerFeed>(settings.viewer_rate);
-  simulation_->prepare(hand_->read(0));
+  simulation_->prepare(device_->read(0));
+  if (!record_.empty()) {
+    writer_ = std::make_unique<RecordingWriter>(record_, recording_header(scenario_, domain_->surface()));
+    recording_ = true;
+  }
 }
 
 LiveSession::~LiveSession() {
@@ -65,16 +77,51 @@ void LiveSession::run() {
   options.on_solve = [this](const SolveRecord& record) { note(record); };
   RealtimeReport report;
   try {
-    static_cast<void>(run_realtime(scenario_.haptics, *simulation_, *hand_, std::numeric_limits<double>::infinity(),
+    static_cast<void>(run_realtime(scenario_.haptics, *simulation_, *device_, std::numeric_limits<double>::infinity(),
                                    options, report));
   } catch (const std::exception& error) {
     const std::lock_guard lock(failures_mutex_);
     failures_.push_back(fmt::format("the loop has ended: {}", error.what()));
     failing_ = true;
   }
+  end_recording(report.lost);
 }
 
-void LiveSession::note(const TickRecord& record) noexcept {
+void LiveSession::aim(const PointerTarget& target) {
+  if (hand_ != nullptr)
+    hand_->aim(target);
+}
+
+// A recording that cannot be written any more ends; the session goes on.
+void LiveSession::end_recording(std::uint64_t lost) {
+  if (writer_ == nullptr)
+    return;
+  try {
+    writer_->finish(lost);
+  } catch (const InputError& error) {
+    const std::lock_guard lock(failures_mutex_);
+    failures_.push_back(fmt::format("the recording could not be ended: {}", error.what()));
+  }
+  writer_.reset();
+  recording_ = false;
+}
+
+void LiveSession::note(const TickRecord& record) {
+  if (writer_ != nullptr) {
+    const bool full = record.device.tick >= most_recorded_ticks;
+    try {
+      writer_->add(record);
+      if (record.device.tick % flush_ticks == flush_ticks - 1)
+        writer_->flush();
+    } catch (const InputError& error) {
+      const std::lock_guard lock(failures_mutex_);
+      failures_.push_back(fmt::format("the recording has ended: {}", error.what()));
+      writer_.reset();
+      recording_ = false;
+    }
+    if (full || stop_recording_)
+      end_recording(0);
+  }
   latency_ = std::max(latency_, record.latency);
   if (record.device.tick % 1000 == 999)
     summed_.worst_latency = std::exchange(latency_, 0.0);
@@ -87,6 +134,8 @@ void LiveSession::note(const TickRecord& record) noexcept {
 }
 
 void LiveSession::note(const SolveRecord& record) {
+  if (writer_ != nullptr)
+    writer_->add(record);
   failing_ = record.failed;
   if (record.failed) {
     const std::lock_guard lock(failures_mutex_);
@@ -108,9 +157,13 @@ const LiveTick& LiveSession::tick() {
   if (!ticks_.fetch())
     return newest_;
   newest_ = ticks_.front();
-  const PointerHandState& state = hand_->state();
-  newest_.hand = state.hand;
-  newest_.number = state.number;
+  newest_.hand = newest_.record.device.position;
+  newest_.number = 0;
+  if (hand_ != nullptr) {
+    const PointerHandState& state = hand_->state();
+    newest_.hand = state.hand;
+    newest_.number = state.number;
+  }
   find_contact();
   return newest_;
 }

@@ -4,6 +4,7 @@
 
 #include "src/haptics/pointer_hand.hpp"
 #include "src/haptics/realtime_loop.hpp"
+#include "src/haptics/recording.hpp"
 
 #include <atomic>
 #include <mutex>
@@ -25,11 +26,17 @@ struct LiveTick {
 
 inline constexpr int most_live_nodes = 6000; // a live session with more would not be one
 
+struct LiveOptions {
+  double speed = 0.5;                        // m/s, of the pointer's hand at most
+  std::filesystem::path record{};            // file to write the session to; empty: it is not recorded
+  std::shared_ptr<const Recording> replay{}; // whose motion is followed instead of a pointer; null: none
+};
+
 class LiveSession {
  public:
   /// Builds and condenses the body; takes seconds. Throws InputError and NumericalError. `say` is called from this
   /// thread and later from that of the simulation.
-  LiveSession(Scenario scenario, double speed, std::function<void(const std::string&)> say);
+  LiveSession(Scenario scenario, const LiveOptions& options, std::function<void(const std::string&)> say);
   /// Stops; waits for the solve that is under way.
   ~LiveSession();
   LiveSession(const LiveSession&) = delete;
@@ -50,12 +57,20 @@ class LiveSession {
   [[nodiscard]] bool clear_of_organ(const PointerTarget& target) const;
 
   // One viewer thread:
-  void aim(const PointerTarget& target) { hand_->aim(target); }
+  /// Without effect in a replay.
+  void aim(const PointerTarget& target);
+  [[nodiscard]] bool replays() const { return hand_ == nullptr; }
+  [[nodiscard]] bool recording() const { return recording_; }
+  [[nodiscard]] const std::filesystem::path& recorded_to() const { return record_; }
+  /// The file is whole soon after, when recording() is false.
+  void stop_recording() { stop_recording_ = true; }
   void request(ViewerRequest request) { feed_->request(std::move(request)); }
   bool fetch_frame() { return feed_->fetch(); }
   [[nodiscard]] const ViewerFrame& frame() const { return feed_->frame(); }
   /// Number of the viewer's message that a tick of the last seconds followed.
-  [[nodiscard]] std::uint32_t number_at(std::uint64_t tick) const { return hand_->number_at(tick); }
+  [[nodiscard]] std::uint32_t number_at(std::uint64_t tick) const {
+    return hand_ != nullptr ? hand_->number_at(tick) : 0;
+  }
   /// The newest tick.
   const LiveTick& tick();
   [[nodiscard]] std::uint64_t solves() const { return solves_; }
@@ -66,8 +81,9 @@ class LiveSession {
 
  private:
   void run();
-  void note(const TickRecord& record) noexcept;
+  void note(const TickRecord& record);
   void note(const SolveRecord& record);
+  void end_recording(std::uint64_t lost);
 
   void find_contact();
 
@@ -77,7 +93,11 @@ class LiveSession {
   int nodes_ = 0;
   double fine_ = 0, coarse_ = 0;
   std::optional<PathPose> tool_start_, blade_start_;
-  std::unique_ptr<PointerHand> hand_;
+  std::unique_ptr<Device> device_;
+  PointerHand* hand_ = nullptr; // device_; null in a replay
+  std::filesystem::path record_;
+  std::unique_ptr<RecordingWriter> writer_; // the loop's; null: nothing is recorded
+  std::atomic<bool> recording_{false}, stop_recording_{false};
   std::unique_ptr<ViewerFeed> feed_;
   std::unique_ptr<topology::ContactQuery> query_;
   TripleBuffer<LiveTick> ticks_; // from the loop's thread

@@ -69,12 +69,16 @@ RunEnd serve(const ServeCommand& command, std::FILE* screen) {
 
   HubOptions settings;
   settings.scenario = scenario_of(command);
+  settings.recordings = command.out.empty() ? std::filesystem::path("out/serve") : command.out;
   std::unique_ptr<Hub> hub;
   WebServerOptions options;
   options.address = command.address;
   options.port = command.port;
   options.clients = settings.viewers;
   options.file = [&](std::string_view path) -> std::optional<std::filesystem::path> {
+    static constexpr std::string_view recordings = "/recordings";
+    if (path.substr(0, recordings.size() + 1) == "/recordings/")
+      return file_below(settings.recordings, path.substr(recordings.size()));
     return page.empty() ? std::nullopt : file_below(page, path);
   };
   options.no_page = "The page is not built. ./dev build makes it (it needs node and npm), or give its folder with "

@@ -1,0 +1,259 @@
+// The web server alone, with a client of its own: what is served, who is let in, and what a client can do to it.
+#include "src/viewer/web_server.hpp"
+
+#include "tests/support/temporary_folder.hpp"
+#include "tests/support/web_client.hpp"
+#include "topology/errors.hpp"
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+
+namespace {
+
+/// A server with a page of two files that answers "echo" with the same text, ends a client at "bad", and sends 100 kB
+/// a tick to a client that has said "flood", when nothing waits for it.
+class TestServer {
+ public:
+  explicit TestServer(WebServerOptions options = {}) {
+    std::ofstream(folder_.path() / "index.html") << "<p>page</p>";
+    std::filesystem::create_directory(folder_.path() / "assets");
+    std::ofstream(folder_.path() / "assets" / "page.js") << "let a = 1;";
+    std::ofstream(folder_.path() / ".secret") << "secret";
+    std::filesystem::create_symlink("/etc/passwd", folder_.path() / "link.txt");
+    options.port = 0;
+    options.file = [this](std::string_view path) { return file_below(folder_.path(), path); };
+    WebServer::Handlers handlers;
+    handlers.opened = [this](int) { ++opened; };
+    handlers.closed = [this](int client) {
+      ++closed;
+      flooded_.erase(std::remove(flooded_.begin(), flooded_.end(), client), flooded_.end());
+    };
+    handlers.message = [this](int client, std::string_view text) -> std::optional<CloseReason> {
+      ++messages;
+      if (text == "bad")
+        return CloseReason{CloseCode::invalid, "this is bad"};
+      if (text == "flood")
+        flooded_.push_back(client);
+      if (text == "talk")
+        for (int i = 0; i < 4000; ++i)
+          server_->send_text(client, std::string(1000, 'x'));
+      server_->send_text(client, std::string(text));
+      return std::nullopt;
+    };
+    handlers.tick = [this] {
+      for (const int client : flooded_)
+        if (server_->waiting(client) == 0) {
+          server_->send_binary(client, std::string(100'000, 'b'));
+          ++floods;
+        }
+      if (stop_)
+        server_->stop();
+    };
+    server_ = std::make_unique<WebServer>(std::move(options), std::move(handlers));
+    thread_ = std::thread([this] { server_->run(); });
+  }
+  ~TestServer() {
+    stop_ = true;
+    thread_.join();
+  }
+  TestServer(const TestServer&) = delete;
+  TestServer& operator=(const TestServer&) = delete;
+
+  [[nodiscard]] int port() const { return server_->port(); }
+  std::atomic<int> opened{0}, closed{0}, messages{0}, floods{0};
+
+ private:
+  TemporaryFolder folder_;
+  std::vector<int> flooded_; // the server's thread alone
+  std::unique_ptr<WebServer> server_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+bool echoes(WebSocketClient& client) {
+  client.send("echo");
+  const auto answer = client.receive();
+  return answer && answer->bytes == "echo";
+}
+
+template <typename Condition>
+bool soon(const Condition& condition) {
+  for (int i = 0; i < 1000 && !condition(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return condition();
+}
+
+} // namespace
+
+TEST_CASE("The page is served with its types, and nothing beside it") {
+  const TestServer server;
+  const HttpAnswer page = http_request(server.port(), "/");
+  CHECK(page.status == 200);
+  CHECK(page.body == "<p>page</p>");
+  CHECK(page.type == "text/html; charset=utf-8");
+  CHECK(http_request(server.port(), "/assets/page.js?v=1").body == "let a = 1;");
+  CHECK(http_request(server.port(), "/assets/page.js").type == "text/javascript; charset=utf-8");
+  const HttpAnswer head = http_request(server.port(), "/", {}, "HEAD");
+  CHECK(head.status == 200);
+  CHECK(head.body.empty());
+  CHECK(http_request(server.port(), "/nothing.js").status == 404);
+  CHECK(http_request(server.port(), "/", {}, "POST").status == 405);
+  for (const char* escape :
+       {"/../etc/passwd", "/assets/../../etc/passwd", "/%2e%2e/etc/passwd", "/..%2f..%2fetc/passwd", "/.secret",
+        "/%2esecret", "/link.txt", "//etc/passwd", "/assets/", "/assets", "/a%00b", "/..\\index.html", "/%zz"}) {
+    CAPTURE(escape);
+    CHECK(http_request(server.port(), escape).status == 404);
+  }
+  CHECK(http_request(server.port(), "/" + std::string(9000, 'a')).status == 431);
+}
+
+TEST_CASE("Hosts that another's DNS points here and pages from elsewhere are refused") {
+  const TestServer server;
+  const std::string port = std::to_string(server.port());
+  CHECK(http_request(server.port(), "/", "evil.example:" + port).status == 403);
+  CHECK(http_request(server.port(), "/", "127.0.0.1:1").status == 403);
+  CHECK(http_request(server.port(), "/", "localhost:" + port).status == 200);
+  CHECK(http_request(server.port(), "/", "[::1]:" + port).status == 200);
+  for (const std::string& origin :
+       {std::string("http://evil.example"), "http://evil.example:" + port, "https://127.0.0.1:" + port,
+        std::string("http://127.0.0.1:1"), std::string("null"), "http://127.0.0.1.evil.example:" + port}) {
+    CAPTURE(origin);
+    const WebSocketClient client(server.port(), origin);
+    CHECK_FALSE(client.open());
+    CHECK(client.status() == 403);
+  }
+  const WebSocketClient rebound(server.port(), "http://evil.example:" + port, "evil.example:" + port);
+  CHECK(rebound.status() == 403);
+  CHECK(server.opened == 0);
+  WebSocketClient same(server.port(), "http://127.0.0.1:" + port);
+  CHECK(echoes(same));
+  WebSocketClient local(server.port(), "http://localhost:" + port, "localhost:" + port);
+  CHECK(echoes(local));
+  WebSocketClient program(server.port());
+  CHECK(echoes(program));
+}
+
+TEST_CASE("What hosts and origins are allowed follows from the address served") {
+  CHECK(host_allowed("127.0.0.1:80", "127.0.0.1", 80));
+  CHECK(host_allowed("localhost", "127.0.0.1", 80));
+  CHECK_FALSE(host_allowed("localhost", "127.0.0.1", 8080));
+  CHECK_FALSE(host_allowed("", "127.0.0.1", 80));
+  CHECK_FALSE(host_allowed("10.0.0.7:8080", "127.0.0.1", 8080));
+  CHECK(host_allowed("10.0.0.7:8080", "0.0.0.0", 8080));
+  CHECK_FALSE(host_allowed("lab.example:8080", "0.0.0.0", 8080));
+  CHECK(origin_allowed("http://10.0.0.7:8080", "10.0.0.7:8080", "0.0.0.0", 8080));
+  CHECK_FALSE(origin_allowed("http://10.0.0.9:8080", "10.0.0.7:8080", "0.0.0.0", 8080));
+  CHECK_FALSE(origin_allowed("http://10.0.0.7:8080@evil.example", "10.0.0.7:8080", "0.0.0.0", 8080));
+  CHECK_FALSE(origin_allowed("http://localhost:99999", "localhost:8080", "127.0.0.1", 8080));
+}
+
+TEST_CASE("A malformed, binary, long or too frequent message ends that client and no other") {
+  WebServerOptions options;
+  options.messages_per_second = 50;
+  const TestServer server(options);
+  WebSocketClient good(server.port());
+  REQUIRE(echoes(good));
+  const auto code_after = [&](const auto& act) {
+    WebSocketClient client(server.port());
+    act(client);
+    CHECK(client.wait_for_close());
+    return client.close_code();
+  };
+  CHECK(code_after([](WebSocketClient& client) { client.send("bad"); }) == 1007);
+  CHECK(code_after([](WebSocketClient& client) { client.send_binary("bytes"); }) == 1003);
+  // The server stops reading in the middle: its close can be lost with what is left unread.
+  const int too_long = code_after([](WebSocketClient& client) { client.send(std::string(70'000, 'a')); });
+  CHECK((too_long == 1009 || too_long == 1006));
+  CHECK(code_after([](WebSocketClient& client) { client.send("\xff\xfe"); }) == 1007);
+  CHECK(code_after([](WebSocketClient& client) {
+          for (int i = 0; i < 60; ++i)
+            client.send("echo");
+        }) == 1008);
+  CHECK(echoes(good));
+  CHECK(soon([&] { return server.closed == 5; }));
+}
+
+TEST_CASE("A client that does not read costs one message, and too much text ends it") {
+  const TestServer server;
+  WebSocketClient reader(server.port());
+  WebSocketClient silent(server.port());
+  silent.send("flood");
+  // The system's buffers between the two take some; then nothing more is made.
+  int before = -1;
+  CHECK(soon([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    return std::exchange(before, server.floods.load()) == server.floods;
+  }));
+  CHECK(server.floods < 200);
+  CHECK(echoes(reader));
+  WebSocketClient mute(server.port());
+  mute.send("talk");
+  CHECK(soon([&] { return server.closed >= 1; }));
+  CHECK(echoes(reader));
+}
+
+TEST_CASE("A thousand reconnects and ten thousand messages of noise leave the server as it was") {
+  WebServerOptions options;
+  options.messages_per_second = 1e6;
+  TestServer server(options);
+  for (int i = 0; i < 1000; ++i) {
+    WebSocketClient client(server.port());
+    REQUIRE(client.open());
+    if (i % 3 == 0)
+      client.send("echo");
+  }
+  CHECK(soon([&] { return server.closed == server.opened; }));
+  CHECK(server.opened == 1000);
+  std::uint64_t random = 1;
+  std::optional<WebSocketClient> client;
+  for (int i = 0; i < 10'000; ++i) {
+    if (!client || !client->open())
+      client.emplace(server.port());
+    std::string noise;
+    for (std::uint64_t n = 0; n < 1 + random % 60; ++n) {
+      random = random * 6364136223846793005U + 1442695040888963407U;
+      noise += static_cast<char>(random >> 57U);
+    }
+    client->send(i % 500 == 499 ? "bad" : noise);
+    while (client->receive(0)) {
+    }
+    if (i % 500 == 499)
+      CHECK(client->wait_for_close());
+  }
+  WebSocketClient last(server.port());
+  CHECK(echoes(last));
+}
+
+TEST_CASE("A taken port, a bad address and a bad port are told") {
+  const TestServer server;
+  WebServerOptions options;
+  options.port = server.port();
+  CHECK_THROWS_WITH(WebServer(options, {}), Catch::Contains("--port") && Catch::Contains("in use"));
+  options.port = 0;
+  options.address = "nowhere";
+  CHECK_THROWS_AS(WebServer(options, {}), InputError);
+  options.address = "127.0.0.1";
+  options.port = 70000;
+  CHECK_THROWS_AS(WebServer(options, {}), InputError);
+}
+
+TEST_CASE("More clients than allowed are turned away until one goes") {
+  WebServerOptions options;
+  options.clients = 2;
+  const TestServer server(options);
+  auto first = std::make_unique<WebSocketClient>(server.port());
+  const WebSocketClient second(server.port());
+  CHECK(first->open());
+  CHECK(second.open());
+  CHECK(WebSocketClient(server.port()).status() == 503);
+  first.reset();
+  CHECK(soon([&] { return server.closed == 1; }));
+  CHECK(WebSocketClient(server.port()).open());
+}
