@@ -25,8 +25,6 @@ constexpr int plain_size = 4, enriched_size = 8;
 constexpr int enriched_spare = 2;        // nodes beyond the basis functions that an enriched support must have
 constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nearer to the sheet a point lies on it
 constexpr double largest_growth = 2.5;   // of a sphere at a point, 1.25^4
-constexpr double face_height = 0.02;     // in radii: nearer to a sheet a point stands on its face
-constexpr double eye_lift = 0.05;        // in radii: so far off the face a point looks over its bulge
 
 /// Everything about the support of one point, node by node.
 struct Scratch {
@@ -172,6 +170,7 @@ CutSight::CutSight(const Sight& sight, const std::vector<Vector3>& centres, cons
     branch_.resize(sight_.rule == SightRule::enriched ? centres.size() : 0);
   }
   known_radii_.assign(centres.size(), 0);
+  eyes_.assign(centres.begin(), centres.end());
   update_radii(centres, radii);
 }
 
@@ -182,8 +181,11 @@ void CutSight::update_radii(const std::vector<Vector3>& centres, const std::vect
     if (radius > 0) // a node without a sphere does not count
       smallest_radius_ = std::min(smallest_radius_, radius);
   for (std::size_t j = 0; j < centres.size(); ++j) {
-    if (sight_.incision->near(centres[j], radii[j]))
+    if (sight_.incision->near(centres[j], radii[j])) {
       concern_[j] |= touches_sheet;
+      if (radii[j] > known_radii_[j])
+        eyes_[j] = topology::eye_at(*sight_.incision, centres[j], radii[j]);
+    }
     if (!front_spacing_.empty() && radii[j] > known_radii_[j])
       if (const auto frame = sight_.incision->front_frame(centres[j], longest_reach_ + largest_growth * radii[j])) {
         front_distance_[j] = frame->distance;
@@ -211,30 +213,20 @@ Vector3 CutSight::off_the_sheet(const Vector3& x) const {
   return x;
 }
 
-bool CutSight::hides(const Vector3& x, const Vector3& y, double radius) const {
-  const topology::Incision& incision = *sight_.incision;
-  if (!incision.blocks(x, y))
-    return false;
-  // Only points at a face can be hidden by its bulge: the eyes are lifted off it and look again.
-  const double at_face = face_height * radius;
-  if (!incision.near(x, at_face) && !incision.near(y, at_face))
-    return true;
-  const Vector3 from = topology::lift_off(incision, x, at_face, eye_lift * radius);
-  const Vector3 to = topology::lift_off(incision, y, at_face, eye_lift * radius);
-  return incision.blocks(from, to);
-}
-
 bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Support& support, bool grown, bool second,
                         int spare, double worst_condition, Enrich enrich, ShapeFunctions& out) const {
   if (support.count == 0)
     return false;
   const topology::Incision& incision = *sight_.incision;
   const bool bends = sight_.rule != SightRule::visibility && !front_spacing_.empty();
-  double smallest_q = support.q[0];
-  for (int k = 1; k < support.count; ++k)
+  double smallest_q = support.q[0], largest_q = support.q[0];
+  for (int k = 1; k < support.count; ++k) {
     smallest_q = std::min(smallest_q, support.q[k]);
+    largest_q = std::max(largest_q, support.q[k]);
+  }
   const double largest_radius = 1 / std::sqrt(smallest_q);
   const bool may_hide = incision.near(x, largest_radius);
+  const topology::Eye eye = may_hide ? topology::eye_at(incision, x, 1 / std::sqrt(largest_q)) : topology::Eye(x);
   const bool may_enrich = bends && sight_.rule == SightRule::enriched && enrich == Enrich::where_near && !second;
   std::optional<FrontFrame> front;
   const Clock::time_point looked = Clock::now();
@@ -252,11 +244,11 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
     const double q = support.q[k];
     Vector3 direction = -d; // gradient of the way, times its length
     double way = 0;         // 0: straight
-    if (may_hide && (grown || (concern_[id] & touches_sheet) != 0) && hides(x, x + d, 1 / std::sqrt(q))) {
+    if (may_hide && (grown || (concern_[id] & touches_sheet) != 0) && incision.hides(eye, eyes_[id])) {
       const double radius = 1 / std::sqrt(q);
       if (!front || front->distance + front_distance_[id] >= radius)
         continue;
-      const auto detour = incision.detour(x, x + d, radius);
+      const auto detour = incision.detour(eye, eyes_[id], radius);
       if (!detour || detour->length >= radius)
         continue;
       way = detour->length;

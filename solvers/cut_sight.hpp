@@ -51,11 +51,10 @@ class CutSight {
  private:
   enum : std::uint8_t { touches_sheet = 1, near_front = 2 };
   Sight sight_;
-  /// Whether the cut hides y from x. Points on one face of a curved sheet see each other over its bulge.
-  [[nodiscard]] bool hides(const Vector3& x, const Vector3& y, double radius) const;
 
   std::vector<std::uint8_t> concern_;  // per node
   std::vector<double> known_radii_;    // m, per node
+  std::vector<topology::Eye> eyes_;    // per node
   std::vector<double> front_distance_; // m, per node; infinite when far
   std::vector<Branch> branch_;         // per node; zero when far from the front
   std::vector<double> front_spacing_;  // m, per segment of the front

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <numeric>
+#include <unordered_map>
 
 namespace spherecut::solvers {
 
@@ -97,7 +98,7 @@ class Galerkin final : public ElasticBody {
   MatrixX contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const override {
     MatrixX displacements(3 * std::ssize(nodes), std::ssize(fields));
     for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
-      const DisplacementMean mean = contact_mean(nodes[c]);
+      const DisplacementMean& mean = contact_mean(nodes[c]);
       for (Eigen::Index f = 0; f < displacements.cols(); ++f)
         displacements.col(f).segment<3>(3 * c) = mean.of(fields[f].coefficients);
     }
@@ -170,9 +171,15 @@ class Galerkin final : public ElasticBody {
     for (std::size_t k = 0; k < mean.nodes.size(); ++k)
       right.template segment<3>(3 * mean.nodes[k]) += mean.weights[k] * force;
   }
-  [[nodiscard]] DisplacementMean contact_mean(int node) const {
-    return patches_ ? patches_->mean(node, spheres_, problem_.prescribed_region)
-                    : value_at(spheres_, problem_.nodes.positions[node]);
+  /// Kept: every step of a run asks for the same ones.
+  [[nodiscard]] const DisplacementMean& contact_mean(int node) const {
+    auto known = contact_means_.find(node);
+    if (known == contact_means_.end())
+      known = contact_means_
+                  .emplace(node, patches_ ? patches_->mean(node, spheres_, problem_.prescribed_region)
+                                          : value_at(spheres_, problem_.nodes.positions[node]))
+                  .first;
+    return known->second;
   }
   [[nodiscard]] VectorX constraint_loads(const VectorX& prescribed) const {
     VectorX right = VectorX::Zero(report_.unknowns);
@@ -201,7 +208,8 @@ class Galerkin final : public ElasticBody {
 
   BackgroundCells cells_;
   std::unique_ptr<SurfacePatches> patches_;
-  std::vector<DisplacementMean> held_;           // one per prescribed entry
+  mutable std::unordered_map<int, DisplacementMean> contact_means_; // by node, as they are asked for
+  std::vector<DisplacementMean> held_;                              // one per prescribed entry
   std::vector<char> dropped_;                    // nodes whose unknowns are taken out; empty when there are none
   std::vector<Anchor> anchors_;                  // hold pieces that nothing else holds
   std::vector<int> order_;                       // node of every elimination rank

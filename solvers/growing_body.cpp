@@ -187,7 +187,7 @@ std::vector<Field> GrowingBody::responses_to(const MatrixX& forces) const {
 std::vector<Field> GrowingBody::force_responses(const std::vector<int>& candidates) const {
   MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), 3 * std::ssize(candidates));
   for (std::size_t c = 0; c < candidates.size(); ++c) {
-    const DisplacementMean mean = cut_->mean(id_[candidates[c]]);
+    const DisplacementMean& mean = cut_->mean(id_[candidates[c]]);
     for (int axis = 0; axis < 3; ++axis)
       add_force(mean, Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
   }

@@ -64,12 +64,15 @@ VectorX GrowingCut::State::tractions() const {
   return right;
 }
 
-DisplacementMean GrowingCut::State::mean(int node) const {
+const DisplacementMean& GrowingCut::State::mean(int node) const {
   if (removed[node] != 0)
     throw InputError(fmt::format("node {} has been removed by the cut", node));
   if (shares == nullptr)
     shares = std::make_unique<Shares>(problem, removed);
-  return shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region);
+  auto known = means.find(node);
+  if (known == means.end())
+    known = means.emplace(node, shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region)).first;
+  return known->second;
 }
 
 /// Builds everything from the problem as it stands. Removed nodes leave the arrays first: nothing refers to them yet
@@ -104,6 +107,7 @@ void GrowingCut::State::condense_all() {
 
   spheres = make_spheres();
   shares.reset();
+  means.clear();
   held = stiffness.held;
   for (DisplacementMean& mean : held)
     for (int& node : mean.nodes)
@@ -514,6 +518,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.removed = std::move(removed);
   s.spheres = std::move(fresh_spheres);
   s.shares = std::move(shares);
+  s.means.clear();
   s.find_loads();
   report.boxes = static_cast<int>(exchanged.size());
   report.cells_seconds = cell_watch.seconds();
@@ -604,7 +609,7 @@ const Spheres& GrowingCut::spheres() const {
 const std::vector<DisplacementMean>& GrowingCut::held() const {
   return state_->held;
 }
-DisplacementMean GrowingCut::mean(int node) const {
+const DisplacementMean& GrowingCut::mean(int node) const {
   return state_->mean(node);
 }
 const AssemblyReport& GrowingCut::report() const {

@@ -88,7 +88,7 @@ class GrowingCut {
   // included.
   [[nodiscard]] const Spheres& spheres() const;
   [[nodiscard]] const std::vector<DisplacementMean>& held() const;         // one per entry of problem().prescribed
-  [[nodiscard]] DisplacementMean mean(int node) const;                     // where a force on this node acts
+  [[nodiscard]] const DisplacementMean& mean(int node) const;              // where a force on this node acts
   [[nodiscard]] const AssemblyReport& report() const;                      // of the last condensation
   [[nodiscard]] bool is_anchored(int node) const;                          // by a spring that holds a severed piece
   [[nodiscard]] const VectorX& external_loads() const;                     // N, prescribed displacements left out

@@ -13,6 +13,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 namespace spherecut::solvers {
 
@@ -56,10 +57,11 @@ struct GrowingCut::State {
   VectorX loads;                          // 3N as they stand
   MatrixX reduced_first;                  // by slots
   mutable std::unique_ptr<Shares> shares; // null: not needed so far
-  AssemblyReport report;                  // of the condensation
-  std::vector<Anchor> anchors;            // by ids
-  SparseMatrix elastic;                   // stiffness at condensation without held means, in its elimination order
-  std::vector<int> elastic_order;         // node of every rank there
+  mutable std::unordered_map<int, DisplacementMean> means; // by node, as they are asked for
+  AssemblyReport report;                                   // of the condensation
+  std::vector<Anchor> anchors;                             // by ids
+  SparseMatrix elastic;           // stiffness at condensation without held means, in its elimination order
+  std::vector<int> elastic_order; // node of every rank there
   std::vector<DisplacementMean> contact;
   MatrixX compliance;
   VectorX base;
@@ -166,7 +168,8 @@ struct GrowingCut::State {
   /// Of tractions on the surface and the lips.
   [[nodiscard]] VectorX tractions() const;
 
-  [[nodiscard]] DisplacementMean mean(int node) const;
+  /// Kept until the cut grows: every step of a run asks for the same ones.
+  [[nodiscard]] const DisplacementMean& mean(int node) const;
 
   /// Candidates that the cut has removed are none any more.
   void find_contact() {

@@ -54,6 +54,7 @@ struct BladeSettings {
   double friction = 0;          // Pa, shear of the flanks
   double flank = 0;             // m behind the edge as far as they touch
   double step = 0;              // s, 0: derived
+  double advance = 0;           // fine spacings the blade goes before the body follows its cut
   std::vector<BladePoint> path; // in order of time
   int line = 0;                 // of the scenario file
 };

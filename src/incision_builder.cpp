@@ -106,6 +106,13 @@ topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, 
   }
 }
 
+bool IncisionBuilder::put_off(const topology::BladePose& pose, const topology::RestMap& to_rest) {
+  if (is_outside(pose, to_rest))
+    return false;
+  missed_.push_back(pose);
+  return true;
+}
+
 void IncisionBuilder::update_fields() {
   if (incision_ != nullptr)
     fields_->update(incision_);

@@ -280,6 +280,12 @@ constexpr std::array keys = {
                 from(0, 1)},
     ScenarioKey{"blade.step", number, "s", "",
                 "Time step; left out: such that the edge moves by about one spacing of the front in a step.", above(0)},
+    ScenarioKey{
+        "blade.advance", number, "", "0.0",
+        "Fine spacings that the edge goes before wound and body follow its cut; 0: they do in every step. What is "
+        "put off is cut by the way that the edge took, at the latest when it leaves the body or the run ends. "
+        "Not with material.toughness.",
+        from(0, 1)},
     ScenarioKey{"blade.path", array_of_tables, "", "required",
                 "Poses of the blade, between which it moves evenly; at least two. It cuts whatever its edge sweeps."},
     ScenarioKey{"blade.path[].time", number, "s", "required", "Time, rising from pose to pose.", from(0)},

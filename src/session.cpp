@@ -112,7 +112,7 @@ StepResult Session::step(const StepSample& sample) {
     model_.field = std::move(*without_blade_);
     without_blade_.reset();
   }
-  const bool solved = sample.blade && blade_force_ == nullptr && cut(sample, *result.cut);
+  const bool solved = incisions_ != nullptr && blade_force_ == nullptr && move_blade(sample, *result.cut);
   if (sample.blade)
     last_blade_ = sample.blade;
   // Without any load the organ keeps its rest shape until the tool is on it.

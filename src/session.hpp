@@ -70,8 +70,8 @@ class Session {
   [[nodiscard]] const solvers::Discretisation* body() const { return model_.body.get(); }
   /// Solution of the last step.
   [[nodiscard]] const solvers::Field& field() const { return model_.field; }
-  /// On: steps find contact and force alone and leave out what only output needs, node_states() and the residual; the
-  /// rotation of the tissue is then not watched.
+  /// On: steps find contact and force alone and leave out what only output needs, node_states(), the residual, the
+  /// opening volume and the hash of the wound; the rotation of the tissue is then not watched.
   void set_force_only(bool on) { force_only_ = on; }
 
   /// Off: every cut builds its system from scratch, on the nodes that an update would have; what updates are measured
@@ -116,6 +116,7 @@ class Session {
   void condense(const std::vector<int>& candidates, BodyModel& model);
   void solve(const StepSample& sample, BodyModel& model);
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
+  bool move_blade(const StepSample& sample, CutReport& report);
   bool cut(const StepSample& sample, CutReport& report);
   void build_cut(const StepSample& sample, const topology::RestMap& to_rest, BodyModel& next, CutReport& report);
   [[nodiscard]] std::vector<topology::BladePose> blade_ahead(const StepSample& sample) const;
@@ -149,6 +150,7 @@ class Session {
   std::optional<topology::Wound> shown_wound_;  // the same as a surface; empty: there is no proposal
   std::optional<solvers::Field> without_blade_; // field of model_ without blade; empty: that is model_.field
   std::optional<topology::SurfaceContact> last_contact_;
+  double put_off_ = 0;                            // m the edge has gone since the body last followed its cut
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
   bool blade_lifted_ = false;                     // its next pose places it
   bool hand_led_ = false;                         // the blade goes where it likes, not along the scenario's path

@@ -17,6 +17,14 @@ constexpr double gap_reach = 1;           // fine spacings from a sheet: a place
 constexpr double way_spacings = 3;        // fine spacings: so far ahead of the blade a cut is prepared for
 constexpr double same_place = 1e-6;       // of the fine spacing: nearer to its path a blade is on it
 
+/// Farthest way of a point of the edge between two poses, m.
+double travel(const std::vector<Vector3>& edge, const topology::BladePose& a, const topology::BladePose& b) {
+  double largest = 0;
+  for (const Vector3& x : edge)
+    largest = std::max(largest, (b.orientation * x + b.position - a.orientation * x - a.position).norm());
+  return largest;
+}
+
 } // namespace
 
 // Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
@@ -46,21 +54,16 @@ Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
 // Poses on the next way of the blade, about way_spacings long: those of its path, or straight on where something else
 // leads it.
 std::vector<topology::BladePose> Session::blade_ahead(const StepSample& sample) const {
-  const auto travel = [&](const topology::BladePose& a, const topology::BladePose& b) {
-    double largest = 0;
-    for (const Vector3& x : scenario_.blade->edge)
-      largest = std::max(largest, (b.orientation * x + b.position - a.orientation * x - a.position).norm());
-    return largest;
-  };
+  const std::vector<Vector3>& edge = scenario_.blade->edge;
   const double fine = zone_.spacing.fine;
   const topology::BladePose& here = *sample.blade;
   std::vector<topology::BladePose> poses;
   const auto scripted = blade_pose(*scenario_.blade, sample.time);
-  if (scripted && travel(*scripted, here) < same_place * fine) {
+  if (scripted && travel(edge, *scripted, here) < same_place * fine) {
     double way = 0;
     for (const StepSample& step : steps_)
       if (step.blade && step.time > sample.time && way < way_spacings * fine) {
-        way += travel(poses.empty() ? here : poses.back(), *step.blade);
+        way += travel(edge, poses.empty() ? here : poses.back(), *step.blade);
         poses.push_back(*step.blade);
       }
   } else if (last_blade_) {
@@ -121,7 +124,8 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
 void Session::lift_blade() {
   if (!scenario_.blade)
     return;
-  last_blade_.reset();
+  if (put_off_ == 0)
+    last_blade_.reset();
   blade_lifted_ = true;
   hand_led_ = true;
   if (blade_force_ == nullptr)
@@ -131,6 +135,32 @@ void Session::lift_blade() {
     incisions_->go_back(*mark_);
   mark_.reset();
   shown_wound_.reset();
+}
+
+// Moves the blade, or keeps its motion for later: until it has gone blade.advance, the body need not follow. What is
+// left is cut when the blade leaves the body, is lifted or gone, or the run ends.
+bool Session::move_blade(const StepSample& sample, CutReport& report) {
+  if (put_off_ > 0 && (!sample.blade || blade_lifted_)) { // a lifted blade is placed anew in the step after this one
+    StepSample left = sample;
+    left.blade = std::exchange(last_blade_, std::nullopt);
+    put_off_ = 0;
+    const bool lifted = std::exchange(blade_lifted_, false);
+    const bool solved = cut(left, report);
+    blade_lifted_ = lifted;
+    return solved;
+  }
+  if (!sample.blade)
+    return false;
+  if (scenario_.blade->advance > 0 && last_blade_ && !blade_lifted_ && sample.time < steps_.back().time) {
+    put_off_ += travel(scenario_.blade->edge, *last_blade_, *sample.blade);
+    topology::RestMap to_rest;
+    if (model_.state)
+      to_rest = [this](const Vector3& x) { return rest_position(x); };
+    if (put_off_ < scenario_.blade->advance * zone_.spacing.fine && incisions_->put_off(*sample.blade, to_rest))
+      return false;
+  }
+  put_off_ = 0;
+  return cut(sample, report);
 }
 
 // Moves the blade; true when that cut something and the body with the new cut is built and solved. A refusal leaves
@@ -237,12 +267,14 @@ void Session::report_cut(CutReport& report) const {
   if (model_.state) {
     for (const double opening : normal_openings(model_))
       report.opening = std::max(report.opening, opening);
-    report.opening_volume = opening_volume(wound, model_);
+    if (!force_only_)
+      report.opening_volume = opening_volume(wound, model_);
     for (const char closed : model_.state->lips.closed)
       report.closed_pairs += closed;
     report.lips_converged = model_.state->lips.converged;
   }
-  report.surface_hash = topology::surface_hash(wound.surface);
+  if (!force_only_)
+    report.surface_hash = topology::surface_hash(wound.surface);
 }
 
 } // namespace spherecut::app

@@ -320,35 +320,68 @@ FrontFrame Incision::front_frame_at(int segment, double share) const {
   return frame;
 }
 
-std::optional<Detour> Incision::detour(const Vector3& x, const Vector3& y, double reach) const {
+bool Incision::hides(const Eye& x, const Eye& y) const {
+  if (!data_->blocks(x.at, y.at))
+    return false;
+  // Only points at a face can be hidden by its bulge.
+  return (!x.on_face() && !y.on_face()) || data_->blocks(x.lifted, y.lifted);
+}
+
+std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach) const {
   const Data& data = *data_;
-  Detour shortest;
-  bool found = false;
-  const Eigen::Vector3f at_x = single(x - data.front_tree.origin()), at_y = single(y - data.front_tree.origin());
-  shortest.length = data.front_tree.least(
-      std::nextafter(reach, std::numeric_limits<double>::infinity()),
-      [&](const BoxTree::Boxes& boxes) -> BoxTree::Four {
-        return boxes.squared_distance(at_x).sqrt() + boxes.squared_distance(at_y).sqrt();
-      },
-      [&](int place, double best) {
-        const auto& [from, to, sheet] = data.front[data.front_tree.order()[place]];
-        // Unfolded about the segment's line x and y lie on either side of it; the way crosses it on a straight line.
-        const double length = (to - from).norm();
-        const Vector3 direction = (to - from) / length;
-        const double along_x = direction.dot(x - from), along_y = direction.dot(y - from);
-        const double off_x = (x - from - along_x * direction).norm(), off_y = (y - from - along_y * direction).norm();
-        const double crossing = off_x + off_y > 0 ? (along_x * off_y + along_y * off_x) / (off_x + off_y) : along_x;
-        const Vector3 over = from + std::clamp(crossing, 0.0, length) * direction;
-        const double way = (x - over).norm() + (over - y).norm();
-        if (way >= best || !data.sees_front(x, over) || !data.sees_front(y, over))
-          return best;
-        shortest.over = over;
-        found = true;
-        return way;
-      });
-  if (!found)
-    return std::nullopt;
-  return shortest;
+  // A cut made in small steps is rough: from a point on its face the front hides behind bumps much lower than the
+  // sheet is wide. Lifted off the face it looks at a place a little ahead of the front, where both sides meet; by so
+  // little that no leg leaves the ellipsoid of the ways up to `reach` by more than the eyes are lifted.
+  constexpr double most_ahead = 0.15;
+  const auto sees = [&](const Eye& eye, const Vector3& over, const Vector3& ahead) {
+    return data.sees_front(eye.at, over) || (eye.on_face() && !data.blocks(eye.lifted, over + ahead));
+  };
+  const auto is_clear = [&](int segment, double share, const Vector3& over, double way) {
+    const FrontPiece& piece = data.pieces[segment];
+    const Vector3 ahead =
+        std::min(most_ahead * reach, 0.5 * (reach - way)) * ((1 - share) * piece.from.ahead + share * piece.to.ahead);
+    return sees(x, over, ahead) && sees(y, over, ahead);
+  };
+  const Eigen::Vector3f at_x = single(x.at - data.front_tree.origin()), at_y = single(y.at - data.front_tree.origin());
+  const auto bound = [&](const BoxTree::Boxes& boxes) -> BoxTree::Four {
+    return boxes.squared_distance(at_x).sqrt() + boxes.squared_distance(at_y).sqrt();
+  };
+  const auto shortest = [&](const auto& accept) {
+    Detour detour;
+    bool found = false;
+    const double beyond = std::nextafter(reach, std::numeric_limits<double>::infinity());
+    detour.length = data.front_tree.least(beyond, bound, [&](int place, double best) {
+      const int segment = data.front_tree.order()[place];
+      const auto& [from, to, sheet] = data.front[segment];
+      // Unfolded about the segment's line x and y lie on either side of it; the way crosses it on a straight line.
+      const double length = (to - from).norm();
+      const Vector3 direction = (to - from) / length;
+      const Vector3 to_x = x.at - from, to_y = y.at - from;
+      const double along_x = direction.dot(to_x), along_y = direction.dot(to_y);
+      const double off_x = (to_x - along_x * direction).norm(), off_y = (to_y - along_y * direction).norm();
+      const double crossing = off_x + off_y > 0 ? (along_x * off_y + along_y * off_x) / (off_x + off_y) : along_x;
+      const double share = std::clamp(crossing / length, 0.0, 1.0);
+      const Vector3 over = from + share * (to - from);
+      const double way = (x.at - over).norm() + (over - y.at).norm();
+      if (way >= best || !accept(segment, share, over, way))
+        return best;
+      detour.over = over;
+      found = true;
+      return way;
+    });
+    return found ? std::optional(detour) : std::nullopt;
+  };
+  // Mostly the shortest way of all is clear: then no other need be looked at.
+  int segment = -1;
+  double share = 0;
+  auto any = shortest([&](int s, double at, const Vector3& /*over*/, double /*way*/) {
+    segment = s;
+    share = at;
+    return true;
+  });
+  if (!any || is_clear(segment, share, any->over, any->length))
+    return any;
+  return shortest(is_clear);
 }
 
 } // namespace spherecut::topology

@@ -35,6 +35,15 @@ struct SheetPoint {
   bool on_border = false; // the nearest point lies on the border of its sheet
 };
 
+/// An end of a sight line. One on a face of a cut looks over the bulges of the face from `lifted` as well
+/// (lip_lift.hpp).
+struct Eye {
+  Vector3 at, lifted; // m; the same away from the faces
+  Eye(const Vector3& x) : at(x), lifted(x) {}
+  Eye(const Vector3& x, const Vector3& off) : at(x), lifted(off) {}
+  [[nodiscard]] bool on_face() const { return lifted != at; }
+};
+
 /// Shortest way from one point to another around the front.
 struct Detour {
   double length = 0;              // m, |x - over| + |over - y|
@@ -78,9 +87,12 @@ class Incision {
   /// Frame at the point from + share (to - from) of a segment of the front, share in [0, 1]; its distance is 0.
   [[nodiscard]] FrontFrame front_frame_at(int segment, double share) const;
 
+  /// Whether the sheets hide two eyes from each other.
+  [[nodiscard]] bool hides(const Eye& x, const Eye& y) const;
+
   /// Shortest detour around the front no longer than `reach` m, both of whose legs are clear; nullopt when there is
   /// none. Meant for x and y that do not see each other.
-  [[nodiscard]] std::optional<Detour> detour(const Vector3& x, const Vector3& y, double reach) const;
+  [[nodiscard]] std::optional<Detour> detour(const Eye& x, const Eye& y, double reach) const;
 
  private:
   struct Data;

@@ -18,4 +18,9 @@ Vector3 lift_off(const Incision& incision, const Vector3& x, double reach, doubl
   return x;
 }
 
+Eye eye_at(const Incision& incision, const Vector3& x, double radius) {
+  constexpr double at_face = 0.02, lift = 0.05;
+  return {x, lift_off(incision, x, at_face * radius, lift * radius)};
+}
+
 } // namespace spherecut::topology

@@ -11,4 +11,8 @@ namespace spherecut::topology {
 /// 1.3 times that distance. Faces stay hidden from each other.
 Vector3 lift_off(const Incision& incision, const Vector3& x, double reach, double height);
 
+/// The eye at the point x of a sphere of `radius` m, or at its centre: lifted by 0.05 of the radius when it is within
+/// 0.02 of it of a sheet.
+Eye eye_at(const Incision& incision, const Vector3& x, double radius);
+
 } // namespace spherecut::topology

@@ -111,6 +111,9 @@ TEST_CASE("Toughness makes a blade that is resisted; without it there is none") 
   CHECK(scenario.blade->friction == 30);
   CHECK(scenario.blade->flank == 0.004);
   CHECK_THAT(complaint(tough("-1") + edge + two_poses), Contains("material.toughness") && Contains("0 < value"));
+  CHECK_THAT(complaint(tough("50") + edge + "advance = 0.5\n" + two_poses),
+             Contains("blade.advance = 0.5") && Contains("allowed: one of them"));
+  CHECK(read(cut_block + edge + "advance = 0.5\n" + two_poses).blade->advance == 0.5);
   CHECK_THAT(complaint(tough("50") + "[method]\nname = \"published\"\n" + edge + two_poses),
              Contains("material.toughness") && Contains("galerkin or collocation"));
 }

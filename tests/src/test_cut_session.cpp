@@ -71,6 +71,28 @@ constexpr double block_volume = 0.06 * 0.06 * 0.03;
 
 } // namespace
 
+TEST_CASE("A cut that is put off is the same cut in fewer increments") {
+  // In from above on a way that turns, out again, and in beside it.
+  const std::string way = blade({"[-0.004, 0, 0.034]", "[-0.004, 0, 0.022]", "[0.002, 0.001, 0.020]",
+                                 "[0.003, 0, 0.036]", "[0.012, 0, 0.036]", "[0.012, 0, 0.021]"},
+                                0.009, "0.1");
+  Session plain = session_of(cut_block + way);
+  Session waiting = session_of(cut_block + replaced(way, "step = 0.1", "step = 0.1\nadvance = 0.8"));
+  const auto increments = [](const std::vector<StepResult>& results) {
+    return std::count_if(results.begin(), results.end(), [](const StepResult& r) { return r.cut->triangles > 0; });
+  };
+  const std::vector<StepResult> every = run(plain), some = run(waiting);
+  REQUIRE(every.size() == some.size());
+  CHECK(increments(some) >= 4);
+  CHECK(2 * increments(some) <= increments(every));
+  // The body is at rest, so that poses are the same whenever they are carried there.
+  CHECK(waiting.incision()->area() == Approx(plain.incision()->area()).epsilon(1e-3));
+  CHECK(waiting.incision()->front_length() == Approx(plain.incision()->front_length()).epsilon(1e-3));
+  CHECK(waiting.incision()->sheets().size() == plain.incision()->sheets().size());
+  for (std::size_t i = 0; i < every.size(); ++i)
+    CHECK(some[i].cut->area <= every[i].cut->area * (1 + 1e-3));
+}
+
 TEST_CASE("A pressurised disc opens, by about as much as in an infinite body, and keeps the volume of the block") {
   Session session = session_of(replaced(cut_block, "fine_spacing = 0.005", "fine_spacing = 0.0035") + disc_precut +
                                "pressure = 100\n");

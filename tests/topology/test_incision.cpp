@@ -2,6 +2,7 @@
 
 #include "tests/support/allocation_counter.hpp"
 #include "topology/errors.hpp"
+#include "topology/lip_lift.hpp"
 #include "topology/proximity.hpp"
 
 #include <Eigen/Geometry>
@@ -367,9 +368,33 @@ TEST_CASE("The detour is the shortest clear way over the front", "[incision]") {
   }
   CHECK(found > 100);
   // Lip partners near the centre: twice the radius of the polygon's side.
-  const auto around = incision.detour(centre + Vector3(0, 0, 1e-6), centre - Vector3(0, 0, 1e-6), 1);
+  const auto around = incision.detour(Vector3(centre + Vector3(0, 0, 1e-6)), Vector3(centre - Vector3(0, 0, 1e-6)), 1);
   REQUIRE(around);
   CHECK(around->length == Approx(2 * 0.3 * std::cos(M_PI / 36)).epsilon(1e-6));
+}
+
+TEST_CASE("From the face of a rough cut there is a detour over the front") {
+  // What a blade leaves that is drawn in small steps while the tissue moves: bumps of 0.4 % of the width.
+  const auto rough = [](double height) {
+    return grid_sheet(40, 40, [&](double s, double t) {
+      const bool bump = (std::lround(40 * s) * 7 + std::lround(40 * t) * 3) % 5 < 2;
+      return Vector3(0.2 + 0.4 * s, 0.2 + 0.6 * t, 0.5 + (bump ? height : 0));
+    });
+  };
+  const Incision smooth({rough(0)}, unit_box()), bumpy({rough(0.0016)}, unit_box());
+  Random random(9);
+  for (int i = 0; i < 200; ++i) {
+    const Vector3 place(uniform(random, 0.45, 0.58), uniform(random, 0.3, 0.7), 0.5);
+    const auto on = bumpy.closest(place, 0.01);
+    REQUIRE(on);
+    const Vector3 x = on->point + 1e-5 * on->normal, y = on->point - 1e-5 * on->normal;
+    REQUIRE(bumpy.blocks(x, y));
+    const auto around = bumpy.detour(eye_at(bumpy, x, 0.4), eye_at(bumpy, y, 0.4), 0.4);
+    const auto flat = smooth.detour(Vector3(place + Vector3(0, 0, 1e-5)), Vector3(place - Vector3(0, 0, 1e-5)), 0.4);
+    REQUIRE(flat);
+    REQUIRE(around);
+    CHECK(around->length == Approx(flat->length).epsilon(0.02).margin(0.003));
+  }
 }
 
 TEST_CASE("A detour whose legs another sheet blocks is not taken", "[incision]") {
