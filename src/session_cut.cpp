@@ -151,7 +151,7 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
   }
   if (!sample.blade)
     return false;
-  if (scenario_.blade->advance > 0 && last_blade_ && !blade_lifted_ && sample.time < steps_.back().time) {
+  if (scenario_.blade->advance > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
     put_off_ += travel(scenario_.blade->edge, *last_blade_, *sample.blade);
     topology::RestMap to_rest;
     if (model_.state)
