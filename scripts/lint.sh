@@ -1,10 +1,22 @@
 #!/usr/bin/env bash
-# Formatting, clang-tidy, shell syntax and types of the page over all tracked sources. Usage: scripts/lint.sh BUILD_FOLDER
+# Formatting, clang-tidy, shell syntax and types of the page over all tracked sources.
+# Usage: scripts/lint.sh BUILD_FOLDER [--deep]
+# --deep runs clang's path-sensitive analyzer on every unit, which doubles the time; without it, it looks only where a
+# .clang-tidy asks for it.
 # clang-tidy leaves out units that include CGAL, OpenVDB or FCL: their headers take minutes and a gigabyte each.
 # What a unit said is kept under a hash of all it depends on, so that a repeat checks only what changed.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
-build=${1:?usage: scripts/lint.sh BUILD_FOLDER}
+build=${1:?usage: scripts/lint.sh BUILD_FOLDER [--deep]}
+case ${2:-} in
+'') checks= ;;
+--deep) checks=clang-analyzer-core*,clang-analyzer-cplusplus* ;;
+*)
+  printf "lint: unknown option '%s'; allowed: --deep\n" "$2" >&2
+  exit 2
+  ;;
+esac
+export checks
 [ -f "$build/compile_commands.json" ] || {
   printf 'lint: %s/compile_commands.json is missing; run ./dev build first\n' "$build" >&2
   exit 2
@@ -62,14 +74,14 @@ while IFS=$'\t' read -r unit closure; do
   fi
   checked=$((checked + 1))
   # shellcheck disable=SC2086
-  key=$({ printf '%s\n' "$tool"; cat .clang-tidy cmake/*.cmake $closure 2>/dev/null || true; } | sha256sum | cut -c 1-32)
+  key=$({ printf '%s\n' "$tool" "$checks"; cat .clang-tidy src/*/.clang-tidy cmake/*.cmake $closure 2>/dev/null || true; } | sha256sum | cut -c 1-32)
   [ -e "$cache/$key" ] || pending+=("$key $unit")
 done < <(dependencies)
 printf 'lint: clang-tidy on %d units, %d of them changed\n' "$checked" "${#pending[@]}"
 
 check_unit() { # CACHE BUILD KEY UNIT
   local said
-  if said=$(clang-tidy-14 --quiet -p "$2" "$4" 2>/dev/null); then
+  if said=$(clang-tidy-14 --quiet ${checks:+"--checks=$checks"} -p "$2" "$4" 2>/dev/null); then
     : >"$1/$3"
   else
     printf '%s\n' "$said"
