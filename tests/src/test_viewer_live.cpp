@@ -439,6 +439,12 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     REQUIRE(first.until([&] { return first.recording["on"] == false; }));
     const std::string name = first.recording["name"];
     CHECK(std::filesystem::file_size(served.folder().path() / "recordings" / name) > 1000);
+    // The same file runs again off line, bit by bit.
+    const ProgramResult again =
+        run_spherecut({"haptics", "--replay", (served.folder().path() / "recordings" / name).string(), "--out",
+                       (served.folder().path() / "again").string()});
+    INFO(again.out << again.err);
+    CHECK(again.status == 0);
     first.say({{"type", "replay"}, {"name", name}});
     REQUIRE(first.until([&] { return first.replay["on"] == true; }));
     REQUIRE(first.until([&] { return force_of(first) > 0.01 && (first.value<std::uint32_t>(44) & 4U) != 0; }));
@@ -447,4 +453,27 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
   }
   CHECK(first.sound);
   CHECK(second.sound);
+}
+
+TEST_CASE("Serving what cannot be served is refused in words, and Ctrl-C ends it cleanly") {
+  const TemporaryFolder folder;
+  const std::string scenario = write_file(folder.path() / "live.toml", live_block).string();
+  WebServerOptions options;
+  options.port = 0;
+  const WebServer taken(options, {});
+  const auto refused = [](const std::vector<std::string>& arguments, const std::string& word) {
+    const ProgramResult result = run_spherecut(arguments);
+    CAPTURE(result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Catch::Contains(word));
+  };
+  refused({"serve", scenario, "--port", std::to_string(taken.port())}, "in use");
+  refused({"serve", scenario, "--port", "0", "--address", "nowhere"}, "not an IP address");
+  refused({"serve", (folder.path() / "missing.toml").string(), "--port", "0"}, "missing.toml");
+  refused({"serve", scenario, "--port", "0", "--page", (folder.path() / "none").string()}, "no such folder");
+  const ProgramResult ended =
+      run_shell("timeout --preserve-status -s INT 2 " + spherecut_command({"serve", scenario, "--port", "0", "--out",
+                                                                           (folder.path() / "recordings").string()}));
+  CHECK(ended.status == 0);
+  CHECK_THAT(ended.out, Catch::Contains("serving at http://127.0.0.1:") && Catch::Contains("ended"));
 }
