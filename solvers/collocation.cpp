@@ -97,6 +97,13 @@ class Collocation final : public ElasticBody {
   Method method() const override { return Method::collocation; }
   [[nodiscard]] CellBalance cell_balance() const;
   Field solve() const override { return solve_for(loads_, 1, prescribed_values(problem_)); }
+  double load_work(const Field& field) const override {
+    const VectorX displacements = nodal_displacements(field);
+    double work = 0;
+    for (std::size_t i = 0; i < loads_.size(); ++i)
+      work += loads_[i].dot(displacements.segment<3>(3 * static_cast<Eigen::Index>(i)));
+    return field.load_factor * work;
+  }
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
   std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;
   Field prescribed_response(const std::vector<Vector3>& values) const override {

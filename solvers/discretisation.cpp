@@ -70,6 +70,10 @@ double Discretisation::sphere_radius(int) const {
   throw InputError(fmt::format("method {} has no spheres here", to_string(method())));
 }
 
+double Discretisation::load_work(const Field&) const {
+  throw InputError(fmt::format("method {} has no forces in newtons that could do work", to_string(method())));
+}
+
 std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options) {
   switch (options.method) {
   case Method::collocation:

@@ -172,6 +172,11 @@ class Discretisation {
   /// Radius of a node's sphere, m.
   [[nodiscard]] virtual double sphere_radius(int node) const;
 
+  /// Work that the loads of the problem, all of them at the field's load factor, do on the displacements of a field, J:
+  /// initial strain counts as the load that it stands for. Throws InputError where the method has no forces in newtons
+  /// (`published`).
+  [[nodiscard]] virtual double load_work(const Field& field) const;
+
   /// Force that the constraint of each prescribed entry exerts on the body, N.
   [[nodiscard]] virtual std::vector<Vector3> constraint_forces(const Field& field) const = 0;
 

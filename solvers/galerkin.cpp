@@ -71,6 +71,8 @@ class Galerkin final : public ElasticBody {
     return field_of(solve_refined(loads_, prescribed), 1, prescribed);
   }
 
+  double load_work(const Field& field) const override { return field.load_factor * loads_.dot(field.coefficients); }
+
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
     MatrixX right = MatrixX::Zero(report_.unknowns, 3 * static_cast<Eigen::Index>(candidates.size()));
     for (std::size_t c = 0; c < candidates.size(); ++c)

@@ -172,6 +172,10 @@ Field GrowingBody::solve() const {
   return field;
 }
 
+double GrowingBody::load_work(const Field& field) const {
+  return field.load_factor * cut_->external_loads().dot(expanded(field.coefficients).col(0));
+}
+
 std::vector<Field> GrowingBody::responses_to(const MatrixX& forces) const {
   const MatrixX solution = compacted(cut_->respond(forces));
   const VectorX no_displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(problem_.prescribed.size()));

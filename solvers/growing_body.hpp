@@ -32,6 +32,7 @@ class GrowingBody final : public Discretisation {
   [[nodiscard]] const GrowingCut& system() const { return *cut_; }
 
   [[nodiscard]] Field solve() const override;
+  [[nodiscard]] double load_work(const Field& field) const override;
   [[nodiscard]] std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
   [[nodiscard]] std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;
   [[nodiscard]] MatrixX pattern_displacements(const std::vector<ForcePattern>& patterns,

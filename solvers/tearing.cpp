@@ -39,7 +39,9 @@ double spacing_near(const Problem& problem, const Vector3& x) {
 
 /// By the integral over the usual tube, or a smaller one; false when neither fits.
 bool intensities_at(const Discretisation& body, const Field& field, FrontState& state) {
-  for (const InteractionOptions& tube : {InteractionOptions{}, InteractionOptions{.outer = 2, .half_length = 0.5}}) {
+  for (const InteractionOptions& tube :
+       {InteractionOptions{}, InteractionOptions{.outer = 2, .half_length = 0.5},
+        InteractionOptions{.inner = 0.3, .outer = 1.2, .half_length = 0.5}}) { // in flaps two spacings thick
     try {
       state.intensities = interaction_integral(body, field, state.frame, tube);
       return true;
@@ -114,6 +116,41 @@ std::vector<FrontState> averaged(const Material& material, const std::vector<Fro
     state.angle = kink_angle(state.intensities);
   }
   return result;
+}
+
+std::vector<FrontState> directed(std::vector<FrontState> states, TearDirection rule,
+                                 const std::function<double(const Vector3&)>& toughness, double probe) {
+  if (!(probe > 0) || !std::isfinite(probe))
+    throw InputError(fmt::format("tearing: the toughness is looked at {} m ahead; that must be positive", probe));
+  constexpr int samples = 160;
+  constexpr double widest = 80 * std::numbers::pi / 180;
+  for (FrontState& state : states) {
+    const auto met = [&](double angle) {
+      return toughness(state.frame.point +
+                       probe * (std::cos(angle) * state.frame.ahead + std::sin(angle) * state.frame.normal));
+    };
+    const double one = std::max(0.0, state.intensities[0]), two = state.intensities[1];
+    const auto drive = [&](double angle) {
+      const double half = std::cos(angle / 2);
+      const double opening = half * (one * half * half - 1.5 * two * std::sin(angle));
+      return opening > 0 ? opening * opening / met(angle) : 0;
+    };
+    double best = kink_angle(state.intensities), most = drive(best);
+    if (rule == TearDirection::weakest)
+      for (int k = 0; k <= samples; ++k)
+        if (const double angle = widest * (2.0 * k / samples - 1), there = drive(angle); there > most * (1 + 1e-6)) {
+          best = angle;
+          most = there;
+        }
+    state.angle = best;
+    state.toughness = met(best);
+    if (!(state.toughness > 0))
+      throw InputError(fmt::format("tearing: the toughness near ({:.6g}, {:.6g}, {:.6g}) m is {} J/m2; it must be "
+                                   "positive",
+                                   state.frame.point.x(), state.frame.point.y(), state.frame.point.z(),
+                                   state.toughness));
+  }
+  return states;
 }
 
 std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest,

@@ -39,6 +39,19 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
 /// grow ragged.
 std::vector<FrontState> averaged(const Material& material, const std::vector<FrontState>& states, double length);
 
+/// Where a front turns to.
+enum class TearDirection {
+  weakest,     // largest release by hoop stress over the toughness that it meets there
+  hoop_stress, // largest hoop stress, whatever the toughness: the same where that is uniform
+};
+
+/// The states turned to where the tissue gives way: with TearDirection::weakest the angle within 80 degrees at which
+/// K_h(t)^2 / G_c is largest, K_h = cos(t/2) (K_I cos^2(t/2) - 3/2 K_II sin t) the opening intensity of a short kink
+/// [Cotterell and Rice 1980] and G_c the toughness `probe` m ahead in that direction. Their toughness becomes that
+/// which they meet there. Throws InputError when `probe` or a toughness is not positive.
+std::vector<FrontState> directed(std::vector<FrontState> states, TearDirection rule,
+                                 const std::function<double(const Vector3&)>& toughness, double probe);
+
 /// How the front moves in one step of quasi-static growth: where G >= G_c by up to `longest` m, in proportion to
 /// (G / G_c - 1) over its largest, never less than a tenth of it where G >= G_c; elsewhere not. Directions and lengths
 /// between the places are averages over about `smoothing` m. The states must not be empty.

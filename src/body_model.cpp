@@ -212,8 +212,19 @@ void condense(const std::vector<int>& candidates, BodyModel& model) {
   }
 }
 
-void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario,
-                   BodyModel& model) {
+namespace {
+
+/// What a later solve and the haptic loop ask of a patch that is held: where it is bonded to the tool, and where that
+/// is.
+void bond(const std::vector<Vector3>& displacements, const topology::ToolPose& pose, solvers::ContactState& state) {
+  state.bond = displacements;
+  state.pose = pose;
+}
+
+} // namespace
+
+void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
+                   const std::vector<Vector3>* grasped) {
   const solvers::ContactOptions options{
       .condition = scenario.contact.condition, .maximum_iterations = most_iterations, .gap_tolerance = lip_tolerance};
   const bool in_reach = tool != nullptr && !model.patch.nodes.empty();
@@ -221,7 +232,11 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
   if (!model.lips) { // lips that stay apart by themselves need no contact
     solvers::CutContactState state;
     if (in_reach)
-      state.tool = solvers::press(model.patch, tool->shape, *pose, options, previous ? &previous->tool : nullptr);
+      state.tool = grasped != nullptr
+                       ? solvers::prescribe(model.patch, *grasped)
+                       : solvers::press(model.patch, tool->shape, *pose, options, previous ? &previous->tool : nullptr);
+    if (in_reach && grasped != nullptr)
+      bond(*grasped, *pose, state.tool);
     model.field = in_reach ? solvers::deform(model.patch, state.tool) : model.base;
     const std::vector<double> openings = normal_openings(model);
     const bool apart =
@@ -234,8 +249,13 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
   }
   solvers::CutContactState state;
   if (in_reach) {
-    const bool same_lips = previous != nullptr && previous->lips.closed.size() == model.pairs.size();
-    state = solvers::press(model.patch, *model.lips, tool->shape, *pose, options, same_lips ? previous : nullptr);
+    const bool same_lips =
+        grasped == nullptr && previous != nullptr && previous->lips.closed.size() == model.pairs.size();
+    state = grasped != nullptr
+                ? solvers::prescribe(model.patch, *model.lips, *grasped, lip_tolerance)
+                : solvers::press(model.patch, *model.lips, tool->shape, *pose, options, same_lips ? previous : nullptr);
+    if (grasped != nullptr)
+      bond(*grasped, *pose, state.tool);
     model.field = solvers::deform(model.patch, *model.lips, state);
   } else {
     state.lips = solvers::close_lips(*model.lips, model.lips->base_opening, lip_tolerance,

@@ -69,9 +69,10 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
 void condense(const std::vector<int>& candidates, BodyModel& model);
 
 /// Solves for tool and lips in contact; `tool` null: the tool is far, and candidates there are none. Starts from the
-/// model's state where it has one.
-void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario,
-                   BodyModel& model);
+/// model's state where it has one. With `grasped`, one displacement (m) a node of the patch, the tool does not press:
+/// it holds the patch there.
+void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
+                   const std::vector<Vector3>* grasped = nullptr);
 
 /// Largest unbalanced force over the largest force.
 double residual(const BodyModel& model);

@@ -34,18 +34,18 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
       fields_(std::make_unique<topology::CutFields>(edge)) {
   for (const PrecutSettings& precut : scenario.precuts) {
     try { // one at a time, so that an unusable sheet is told with its line
-      precuts_.push_back(sheet_of(precut, edge));
-      incision_ = std::make_shared<const topology::Incision>(precuts_, domain_, revision_);
-      wound_->grow(precuts_);
+      add_own(sheet_of(precut, edge));
+      incision_ = std::make_shared<const topology::Incision>(own_, domain_, revision_);
+      wound_->grow(own_);
     } catch (const InputError& error) {
       throw InputError(
-          fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, precuts_.size(), error.what()));
+          fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, own_.size(), error.what()));
     }
   }
+  options_.edge = edge;
   if (!scenario.blade)
     return;
   blade_ = topology::Blade{scenario.blade->edge, scenario.blade->edge_radius};
-  options_.edge = edge;
   try {
     sweep_.emplace(*blade_, domain_, options_);
   } catch (const InputError& error) {
@@ -54,12 +54,28 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
 }
 
 std::vector<topology::SurfaceMesh> IncisionBuilder::sheets() const {
-  std::vector<topology::SurfaceMesh> all = precuts_;
-  if (sweep_) {
-    const std::vector<topology::SurfaceMesh> swept = sweep_->sheets();
-    all.insert(all.end(), swept.begin(), swept.end());
-  }
+  const std::vector<topology::SurfaceMesh> swept = sweep_ ? sweep_->sheets() : std::vector<topology::SurfaceMesh>{};
+  std::vector<topology::SurfaceMesh> all;
+  all.reserve(order_.size());
+  for (const int k : order_)
+    all.push_back(k >= 0 ? own_[static_cast<std::size_t>(k)] : swept[static_cast<std::size_t>(-1 - k)]);
   return all;
+}
+
+void IncisionBuilder::add_own(topology::SurfaceMesh sheet) {
+  order_.push_back(static_cast<int>(own_.size()));
+  own_.push_back(std::move(sheet));
+}
+
+// Sheets that the blade has begun come after those that were there.
+void IncisionBuilder::find_swept() {
+  while (swept_ < std::ssize(sweep_->sheets()))
+    order_.push_back(-1 - swept_++);
+}
+
+void IncisionBuilder::use(const std::vector<topology::SurfaceMesh>& sheets) {
+  incision_ = std::make_shared<const topology::Incision>(sheets, domain_, ++revision_);
+  wound_->grow(sheets);
 }
 
 // Whether the whole edge is farther from the body than the sweep reaches.
@@ -77,11 +93,8 @@ bool IncisionBuilder::is_outside(const topology::BladePose& pose, const topology
 }
 
 topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, const topology::RestMap& to_rest) {
-  sheets_before_ = sheets();
-  incision_before_ = incision_;
-  sweep_before_ = sweep_;
-  missed_before_ = missed_;
-  missed_before_.push_back(pose);
+  before_ = mark();
+  before_.missed.push_back(pose);
   try {
     if (!missed_.empty() && is_outside(missed_.back(), to_rest)) {
       sweep_->lift();
@@ -96,9 +109,8 @@ topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, 
     last.triangles += swept.triangles;
     if (last.triangles == 0)
       return last;
-    const std::vector<topology::SurfaceMesh> grown = sheets();
-    incision_ = std::make_shared<const topology::Incision>(grown, domain_, ++revision_);
-    wound_->grow(grown);
+    find_swept();
+    use(sheets());
     return last;
   } catch (...) {
     take_back();
@@ -124,24 +136,53 @@ void IncisionBuilder::place(const topology::BladePose& pose, const topology::Res
   sweep_->move_to(pose, to_rest);
 }
 
+void IncisionBuilder::tear(const std::vector<topology::SurfaceMesh>& grown) {
+  before_ = mark();
+  try {
+    if (grown.size() != order_.size())
+      throw InputError(fmt::format("a tear of {} sheets in a cut of {}", grown.size(), order_.size()));
+    for (std::size_t s = 0; s < order_.size(); ++s) {
+      if (order_[s] >= 0)
+        own_[static_cast<std::size_t>(order_[s])] = grown[s];
+      else
+        sweep_->extend(-1 - order_[s], grown[s]);
+    }
+    use(grown);
+  } catch (...) {
+    take_back();
+    throw;
+  }
+}
+
+void IncisionBuilder::seed(topology::SurfaceMesh sheet) {
+  before_ = mark();
+  try {
+    add_own(std::move(sheet));
+    use(sheets());
+  } catch (...) {
+    take_back();
+    throw;
+  }
+}
+
 void IncisionBuilder::go_back(const Mark& mark) {
-  sheets_before_ = mark.sheets;
-  incision_before_ = mark.incision;
-  sweep_before_ = mark.sweep;
-  missed_before_ = mark.missed;
+  before_ = mark;
   take_back();
 }
 
 void IncisionBuilder::take_back() {
-  const bool grew = incision_ != incision_before_;
-  incision_ = incision_before_;
-  *sweep_ = *sweep_before_;
-  missed_ = missed_before_;
+  const bool grew = incision_ != before_.incision;
+  incision_ = before_.incision;
+  own_ = before_.own;
+  order_ = before_.order;
+  swept_ = before_.swept;
+  sweep_ = before_.sweep;
+  missed_ = before_.missed;
   if (!grew)
     return;
   auto wound = std::make_unique<topology::IncrementalWound>(domain_->surface());
-  if (!sheets_before_.empty())
-    wound->grow(sheets_before_);
+  if (!before_.sheets.empty())
+    wound->grow(before_.sheets);
   wound_ = std::move(wound);
   if (incision_ != nullptr)
     fields_->update(incision_);

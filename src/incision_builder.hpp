@@ -1,4 +1,4 @@
-// The growing cut of a run: sheets of precuts and blade, the incision they make, its level sets, and the wound.
+// The growing cut of a run: sheets of precuts, blade and tears, the incision they make, its level sets, and the wound.
 #pragma once
 
 #include "src/scenario.hpp"
@@ -31,14 +31,22 @@ class IncisionBuilder {
   /// Places the blade; its next motion starts there.
   void place(const topology::BladePose& pose, const topology::RestMap& to_rest);
 
+  /// The sheets of the incision, each continued by a tear: vertices and triangles keep their places. The blade's next
+  /// strip starts a sheet of its own. Throws InputError as Incision and the wound do; all is then as it was.
+  void tear(const std::vector<topology::SurfaceMesh>& grown);
+  /// One sheet more, a tear where there was no cut. Throws as tear().
+  void seed(topology::SurfaceMesh sheet);
+
   /// The cut as it is, to go back to from further motions.
   struct Mark {
-    std::vector<topology::SurfaceMesh> sheets;
+    std::vector<topology::SurfaceMesh> sheets, own;
+    std::vector<int> order;
+    int swept = 0;
     std::shared_ptr<const topology::Incision> incision;
     std::optional<topology::BladeSweep> sweep;
     std::vector<topology::BladePose> missed;
   };
-  [[nodiscard]] Mark mark() const { return {sheets(), incision_, sweep_, missed_}; }
+  [[nodiscard]] Mark mark() const { return {sheets(), own_, order_, swept_, incision_, sweep_, missed_}; }
   void go_back(const Mark& mark);
 
   /// Brings the level sets to the incision. Throws InputError when they need too much memory.
@@ -54,23 +62,24 @@ class IncisionBuilder {
 
  private:
   [[nodiscard]] std::vector<topology::SurfaceMesh> sheets() const;
+  void add_own(topology::SurfaceMesh sheet);
+  void find_swept();
+  void use(const std::vector<topology::SurfaceMesh>& sheets);
   [[nodiscard]] bool is_outside(const topology::BladePose& pose, const topology::RestMap& to_rest) const;
 
   std::shared_ptr<const topology::Domain> domain_;
   std::optional<topology::Blade> blade_;
   topology::SweepOptions options_;
-  std::vector<topology::SurfaceMesh> precuts_;
+  std::vector<topology::SurfaceMesh> own_; // precuts, then seeds of tears
+  std::vector<int> order_;                 // of the incision's sheets: k >= 0 for own_[k], -1 - k for sheet k of sweep_
+  int swept_ = 0;                          // sheets of sweep_ in it
   std::optional<topology::BladeSweep> sweep_;
   std::unique_ptr<topology::IncrementalWound> wound_;
   std::unique_ptr<topology::CutFields> fields_;
   std::shared_ptr<const topology::Incision> incision_;
   int revision_ = 0;
   std::vector<topology::BladePose> missed_; // since the place of sweep_
-  // Before the last motion:
-  std::vector<topology::SurfaceMesh> sheets_before_;
-  std::shared_ptr<const topology::Incision> incision_before_;
-  std::optional<topology::BladeSweep> sweep_before_;
-  std::vector<topology::BladePose> missed_before_; // and the pose of that motion
+  Mark before_;                             // before the last motion; missed: and the pose of that motion
 };
 
 } // namespace spherecut::app

@@ -52,7 +52,7 @@ double derived_front_spacing(const Scenario& scenario, double extent) {
 FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain) {
   const NodeSettings& nodes = scenario.nodes;
   const double extent = domain.bounds().extent().maxCoeff();
-  const bool cuts = scenario.blade || !scenario.precuts.empty();
+  const bool cuts = scenario.blade || !scenario.precuts.empty() || scenario.tearing.enabled;
   std::string origin = "nodes.fine_spacing";
   FineZone zone;
   zone.spacing.fine = nodes.fine_spacing;
@@ -67,6 +67,8 @@ FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain) {
   }
   if (zone.spacing.fine <= 0) {
     zone.spacing.fine = derived_front_spacing(scenario, extent);
+    if (!std::isfinite(zone.spacing.fine)) // tears start anywhere
+      zone.spacing.fine = extent / across_organ;
     origin = "the spacing derived from the cuts";
   }
   zone.spacing.coarse =

@@ -50,6 +50,14 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     if (found.refused_cuts > 0)
       text += fmt::format("  {} increments refused, see cuts.csv\n", found.refused_cuts);
   }
+  if (session.tears()) {
+    const EnergyLedger& ledger = found.tear.ledger;
+    text += fmt::format("torn {:.4g} cm2 in {} increments{}{}; work {:.3g} mJ: elastic {:.3g}, new surface {:.3g}, "
+                        "dissipated {:.3g}, left open {:.2g}\n",
+                        1e4 * found.tear.area, found.tear_increments, found.torn_unstably ? ", unstable" : "",
+                        found.severed_by_tear ? ", parted the organ" : "", 1e3 * (ledger.tool + ledger.loads),
+                        1e3 * ledger.elastic, 1e3 * ledger.surface, 1e3 * ledger.dissipation, 1e3 * ledger.imbalance());
+  }
   for (const std::string& remark : output.remarks())
     text += fmt::format("warning: {}\n", remark);
   text += fmt::format("results in {}:", out.string());

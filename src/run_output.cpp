@@ -1,6 +1,7 @@
 #include "src/run_output.hpp"
 
 #include "src/summary.hpp"
+#include "src/tear_output.hpp"
 #include "topology/errors.hpp"
 #include "topology/piece_audit.hpp"
 
@@ -100,6 +101,8 @@ RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : fol
     open(forces_, "forces.csv", force_columns);
   if (session.cuts())
     open(cuts_, "cuts.csv", cut_columns());
+  if (session.tears())
+    open(tears_, "tears.csv", tear_columns());
 }
 
 void RunOutput::add(const Session& session, const StepResult& step) {
@@ -114,6 +117,14 @@ void RunOutput::add(const Session& session, const StepResult& step) {
     findings_.largest_opening = std::max(findings_.largest_opening, step.cut->opening);
     findings_.increments += step.cut->triangles > 0 ? 1 : 0;
     findings_.refused_cuts += step.cut->refused ? 1 : 0;
+  }
+  if (step.tear) {
+    tears_->write(tear_rows(step.time, *step.tear));
+    findings_.tear = *step.tear;
+    findings_.tear_increments += static_cast<int>(step.tear->increments.size()) - 1;
+    findings_.torn_unstably = findings_.torn_unstably || step.tear->unstable;
+    findings_.severed_by_tear = findings_.severed_by_tear || step.tear->severed;
+    findings_.seeds += step.tear->seeded ? 1 : 0;
   }
   if (const int every = session.scenario().output.vtp_every;
       every > 0 && (findings_.steps % static_cast<std::size_t>(every) == 0 || findings_.steps + 1 == findings_.planned))
@@ -241,6 +252,17 @@ void RunOutput::draw_figures(const Session& session) {
         reports.push_back(*step.cut);
       }
       for (const auto& [name, figure] : cut_figures(times, reports))
+        draw(figure, name);
+    }
+    if (session.tears()) {
+      std::vector<double> times;
+      std::vector<TearReport> reports;
+      for (const StepResult& step : history_)
+        if (step.tear) {
+          times.push_back(step.time);
+          reports.push_back(*step.tear);
+        }
+      for (const auto& [name, figure] : tear_figures(times, reports))
         draw(figure, name);
     }
   } catch (const InputError& error) {

@@ -1,4 +1,5 @@
-// What a run leaves behind: forces.csv and cuts.csv row by row, VTP frames in a PVD series, figures, summary.json.
+// What a run leaves behind: forces.csv, cuts.csv and tears.csv row by row, VTP frames in a PVD series, figures,
+// summary.json.
 #pragma once
 
 #include "src/cut_output.hpp"
@@ -22,6 +23,10 @@ struct RunFindings {
   CutReport cut;                                      // of the last step
   double largest_opening = 0;                         // m
   int increments = 0, refused_cuts = 0;
+  TearReport tear;         // of the last step, its account of the whole run
+  int tear_increments = 0; // of the whole run, as the next three
+  bool torn_unstably = false, severed_by_tear = false;
+  int seeds = 0;
   /// Second opinions on the pieces: whenever their number has changed, and at the end.
   struct PieceCheck {
     double time = 0;                   // s
@@ -36,8 +41,8 @@ struct RunFindings {
 
 class RunOutput {
  public:
-  /// Opens forces.csv, and cuts.csv when the scenario cuts, in a folder of claim_results_folder(). Throws InputError
-  /// when a file cannot be written; so do the others.
+  /// Opens forces.csv, cuts.csv when the scenario cuts, and tears.csv when it tears, in a folder of
+  /// claim_results_folder(). Throws InputError when a file cannot be written; so do the others.
   RunOutput(std::filesystem::path folder, const Session& session);
 
   /// Adds the row, and the frame when one is due, of the step that the session has just done.
@@ -63,7 +68,7 @@ class RunOutput {
   void keep_profile(const Session& session, const StepResult& step);
 
   std::filesystem::path folder_;
-  std::optional<OutputFile> forces_, cuts_; // with a tool, with a cut
+  std::optional<OutputFile> forces_, cuts_, tears_; // with a tool, with a cut, with tearing
   RunFindings findings_;
   std::unique_ptr<topology::LevelSet> level_set_; // of the organ, from the first check of pieces on
   std::vector<SeriesEntry> series_;

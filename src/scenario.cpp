@@ -1,6 +1,7 @@
 #include "src/scenario.hpp"
 
 #include "src/cut_reader.hpp"
+#include "src/tear_reader.hpp"
 #include "topology/errors.hpp"
 
 #include <fmt/format.h>
@@ -79,7 +80,7 @@ NodeSettings nodes(const Section& section, Offences& offences) {
 
 topology::ToolShape tool_shape(const Section& section, Offences& offences) {
   const std::string shape = section.text("shape");
-  if (shape == "sphere_tip")
+  if (shape == "sphere_tip" || shape == "grasper")
     return topology::SphereTip{section.number("radius")};
   if (shape == "flat_punch")
     return topology::FlatPunch{section.number("radius"), section.number("length")};
@@ -125,8 +126,28 @@ Approach approach(const Section& section, const ToolSettings& tool, Offences& of
   return approach;
 }
 
+/// When a grasper holds, checked against its path.
+GraspSettings grasp(const Section& section, const std::vector<PathPoint>& path, Offences& offences) {
+  GraspSettings grasp;
+  if (path.empty())
+    return grasp;
+  const double start = path.front().time, end = path.back().time;
+  grasp.grasp = section.optional_number("grasp").value_or(start);
+  if (const auto release = section.optional_number("release"))
+    grasp.release = *release;
+  if (grasp.grasp < start || grasp.grasp > end)
+    offences.add(section.line("grasp"),
+                 fmt::format("tool.grasp = {:g} s: not on its path; allowed: {:g} to {:g} s", grasp.grasp, start, end));
+  if (grasp.release <= grasp.grasp)
+    offences.add(section.line("release"), fmt::format("tool.release = {:g} s: not after it takes hold; allowed: above "
+                                                      "{:g} s",
+                                                      grasp.release, grasp.grasp));
+  return grasp;
+}
+
 ToolSettings tool(const Section& section, Offences& offences) {
   ToolSettings tool;
+  tool.line = static_cast<int>(section.line());
   tool.shape = tool_shape(section, offences);
   if (!std::holds_alternative<topology::Laparoscope>(tool.shape))
     tool.axis = direction(section, "tool.axis", "axis", offences);
@@ -137,6 +158,11 @@ ToolSettings tool(const Section& section, Offences& offences) {
                              section.has("approach") ? "both" : "neither", section.has("approach") ? "and" : "nor"));
     return tool;
   }
+  const bool grasper = section.text("shape") == "grasper";
+  if (grasper && section.has("approach")) {
+    offences.add(section.line("approach"), "tool.approach: a grasper presses on nothing; allowed: tool.path");
+    return tool;
+  }
   double duration = 0;
   if (section.has("approach")) {
     tool.motion = approach(section.table("approach"), tool, offences);
@@ -145,6 +171,8 @@ ToolSettings tool(const Section& section, Offences& offences) {
     tool.motion = tool_path(section, offences);
     const auto& path = std::get<std::vector<PathPoint>>(tool.motion);
     duration = path.empty() ? 0 : path.back().time - path.front().time;
+    if (grasper)
+      tool.grasp = grasp(section, path, offences);
   }
   if (duration > 0 && tool.step > 0 && (tool.step > duration || duration / tool.step > static_cast<double>(most_steps)))
     offences.add(section.line("step"),
@@ -202,13 +230,13 @@ namespace {
 void check_blade_force(const Scenario& scenario, const Section& root, Offences& offences) {
   const Section section = root.table("blade");
   const BladeSettings& blade = *scenario.blade;
-  const bool resists = scenario.toughness > 0;
+  const bool resists = scenario.toughness > 0 && !scenario.tearing.enabled;
   for (const char* key : {"sharpness", "friction"})
     if (!resists && section.has(key))
       offences.add(section.line(key),
-                   fmt::format("blade.{} is given, but nothing resists the blade: material.toughness "
-                               "is left out; allowed: both or neither",
-                               key));
+                   fmt::format("blade.{} is given, but nothing resists the blade: {}", key,
+                               scenario.tearing.enabled ? "with tearing it cuts freely; allowed: one of the two"
+                                                        : "material.toughness is left out; allowed: both or neither"));
   if (resists && blade.advance > 0)
     offences.add(
         section.line("advance"),
@@ -226,6 +254,24 @@ void check_blade_force(const Scenario& scenario, const Section& root, Offences& 
                              scenario.toughness));
 }
 
+/// What tearing needs.
+void check_tearing(const Scenario& scenario, const Section& root, Offences& offences) {
+  const Section section = root.table("tearing");
+  if (!scenario.layers.empty() && scenario.toughness == 0)
+    offences.add(root.table("material").line("layer"), "material.layer without material.toughness, which holds "
+                                                       "elsewhere; allowed: both or neither");
+  if (!scenario.tearing.enabled)
+    return;
+  if (scenario.toughness == 0)
+    offences.add(section.line(), "tearing without material.toughness; allowed: with a toughness above 0 J/m2");
+  if (scenario.method.method == solvers::Method::published)
+    offences.add(section.line(), "tearing weighs energies, which method.name = \"published\" does not have; allowed: "
+                                 "with galerkin or collocation");
+  if (scenario.precuts.empty() && !scenario.blade && scenario.tearing.strength == 0)
+    offences.add(section.line(), "tearing: there is no precut and no blade, and without tearing.strength no tear "
+                                 "starts by itself; allowed: one of them or more");
+}
+
 Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::path& file) {
   const Section& root = document.root();
   Offences offences(file.string());
@@ -237,6 +283,10 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   const Section material = root.table("material");
   scenario.material = {material.number("young_modulus"), material.number("poisson_ratio"), material.number("density")};
   scenario.toughness = material.optional_number("toughness").value_or(0);
+  for (const Section& section : material.tables("layer"))
+    scenario.layers.push_back(toughness_layer(section, scenario.layers.size() + 1, offences));
+  if (root.has("tearing"))
+    scenario.tearing = tearing(root.table("tearing"));
   for (const Section& section : root.tables("fixed"))
     scenario.fixed.push_back(fixed_region(section, scenario.fixed.size() + 1, offences));
   if (scenario.fixed.empty())
@@ -264,7 +314,8 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
     scenario.blade = blade(root.table("blade"), offences);
   if (scenario.blade)
     check_blade_force(scenario, root, offences);
-  if (!scenario.tool && !scenario.blade && scenario.precuts.empty())
+  check_tearing(scenario, root, offences);
+  if (!scenario.tool && !scenario.blade && scenario.precuts.empty() && !scenario.tearing.enabled)
     offences.add(1, "there is no tool, no blade and no precut: nothing to compute; allowed: one of them or more");
   scenario.haptics = haptics(root.table("haptics"), file, offences);
   const Section output = root.table("output");

@@ -5,10 +5,12 @@
 #include "solvers/discretisation.hpp"
 #include "src/cut_settings.hpp"
 #include "src/haptics/haptic_settings.hpp"
+#include "src/tear_settings.hpp"
 #include "topology/tool.hpp"
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <variant>
@@ -77,10 +79,18 @@ struct PathPoint {
   Vector3 position = Vector3::Zero();
 };
 
+/// A tool that takes hold of the surface within its radius; it touches nothing before and after.
+struct GraspSettings {
+  double grasp = 0;                                         // s
+  double release = std::numeric_limits<double>::infinity(); // s
+};
+
 struct ToolSettings {
-  topology::ToolShape shape;
-  Vector3 axis = Vector3::UnitZ(); // unit; a laparoscope takes its axis from its port
-  double step = 0;                 // s, 0: derived
+  topology::ToolShape shape;          // of a grasper: a ball of its radius
+  std::optional<GraspSettings> grasp; // a grasper's
+  int line = 0;                       // of the scenario file
+  Vector3 axis = Vector3::UnitZ();    // unit; a laparoscope takes its axis from its port
+  double step = 0;                    // s, 0: derived
   std::variant<Approach, std::vector<PathPoint>> motion;
 };
 
@@ -102,6 +112,8 @@ struct Scenario {
   OrganSettings organ;
   solvers::Material material;
   double toughness = 0; // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
+  std::vector<ToughnessLayer> layers;
+  TearSettings tearing;
   std::vector<FixedRegion> fixed;
   NodeSettings nodes;
   solvers::DiscretisationOptions method;

@@ -58,8 +58,31 @@ constexpr std::array keys = {
     ScenarioKey{"material.density", number, "kg/m3", "1060.0", "Mass density, used by gravity alone.", above(0, 1e5)},
     ScenarioKey{"material.toughness", number, "J/m2", "",
                 "Energy that new cut takes, G_c: the blade deforms the tissue until that energy is there, and feels a "
-                "force. Liver: 76 to 225. Left out: the blade cuts whatever its edge sweeps, without resistance.",
+                "force. Liver: 76 to 225. Left out: the blade cuts whatever its edge sweeps, without resistance. With "
+                "[tearing] "
+                "the energy at which a cut runs on by itself, and the blade cuts freely.",
                 above(0, 1e6)},
+    ScenarioKey{"material.layer", array_of_tables, "", "",
+                "Parts of the tissue with a toughness of their own, for tearing: layers, a weak plane. Where several "
+                "hold a place the last one counts. Left out: none."},
+    ScenarioKey{"material.layer[].region", choice, "", "required", "Kind of region.", {}, "box, slab"},
+    ScenarioKey{"material.layer[].toughness", number, "J/m2", "required", "Energy that new tear takes there.",
+                above(0, 1e6)},
+    ScenarioKey{
+        "material.layer[].lower", vector, "m", "required", "Corner of smallest coordinates.", {}, "", "region = box"},
+    ScenarioKey{
+        "material.layer[].upper", vector, "m", "required", "Corner of largest coordinates.", {}, "", "region = box"},
+    ScenarioKey{
+        "material.layer[].point", vector, "m", "required", "Point of its middle plane.", {}, "", "region = slab"},
+    ScenarioKey{"material.layer[].normal",
+                vector,
+                "",
+                "required",
+                "Normal of its middle plane, any length.",
+                {},
+                "",
+                "region = slab"},
+    ScenarioKey{"material.layer[].thickness", number, "m", "required", "Thickness.", above(0, 10), "", "region = slab"},
     ScenarioKey{
         "material.pretension", strain, "", "[0, 0, 0]",
         "Strain by which the tissue is stretched in its given shape, so that a cut gapes: xx, yy, zz, and, when "
@@ -125,15 +148,23 @@ constexpr std::array keys = {
 
     ScenarioKey{"tool", table, "", "",
                 "The rigid tool and its way; left out: none, then there is a blade or a precut."},
-    ScenarioKey{"tool.shape",
-                choice,
-                "",
-                "required",
-                "Ball, flat cylindrical punch, or instrument (shaft and ball) that pivots on a port.",
-                {},
-                "sphere_tip, flat_punch, laparoscope"},
-    ScenarioKey{"tool.radius", number, "m", "required", "Radius of the ball or of the flat end.", above(0, 1), "",
-                "shape = sphere_tip, flat_punch"},
+    ScenarioKey{
+        "tool.shape",
+        choice,
+        "",
+        "required",
+        "Ball, flat cylindrical punch, instrument (shaft and ball) that pivots on a port, or grasper: takes hold "
+        "of the surface within its radius and moves it as it moves itself.",
+        {},
+        "sphere_tip, flat_punch, laparoscope, grasper"},
+    ScenarioKey{"tool.radius", number, "m", "required", "Radius of the ball, of the flat end or of the grasped patch.",
+                above(0, 1), "", "shape = sphere_tip, flat_punch, grasper"},
+    ScenarioKey{"tool.grasp", number, "s", "",
+                "Time at which it takes hold: the tool is then within its radius of the surface. Left out: the start "
+                "of its path.",
+                from(0), "", "shape = grasper"},
+    ScenarioKey{"tool.release", number, "s", "", "Time at which it lets go; left out: never.", from(0), "",
+                "shape = grasper"},
     ScenarioKey{"tool.length", number, "m", "0.05", "Length of the punch.", above(0, 10), "", "shape = flat_punch"},
     ScenarioKey{"tool.tip_radius", number, "m", "0.004", "Radius of the tip.", above(0, 1), "", "shape = laparoscope"},
     ScenarioKey{"tool.shaft_radius", number, "m", "0.0025", "Radius of the shaft, at most the tip's.", above(0, 1), "",
@@ -155,7 +186,7 @@ constexpr std::array keys = {
                 "Direction from the tip into the tool, away from the organ.",
                 {},
                 "",
-                "shape = sphere_tip, flat_punch"},
+                "shape = sphere_tip, flat_punch, grasper"},
     ScenarioKey{"tool.step", number, "s", "", "Time step; left out: 1/20 of the duration.", above(0)},
     ScenarioKey{"tool.approach", table, "", "",
                 "A straight press: the tool starts outside, touches, and goes on to a depth. This or path."},
@@ -296,6 +327,34 @@ constexpr std::array keys = {
         "about z.",
         from(-360, 360)},
 
+    ScenarioKey{"tearing", table, "", "",
+                "Cuts that run on by themselves where the energy they release reaches material.toughness "
+                "(docs/tearing.md). A blade then cuts without resistance. Left out: none does."},
+    ScenarioKey{"tearing.enabled", boolean, "", "true", "False: as if the table were left out."},
+    ScenarioKey{"tearing.step", number, "", "0.5",
+                "Longest way of the front in one increment, in node spacings at the front.", from(0.1, 2)},
+    ScenarioKey{"tearing.direction",
+                choice,
+                "",
+                "\"weakest\"",
+                "Where a front turns to: largest release by hoop stress over the toughness that it meets there, or "
+                "largest hoop stress alone. The same where the toughness is uniform.",
+                {},
+                "weakest, hoop_stress"},
+    ScenarioKey{"tearing.strength", number, "Pa", "",
+                "Largest principal stress, averaged over tearing.length, at which a tear starts where there is no cut. "
+                "Left out: tears start at cuts alone.",
+                above(0, 1e12)},
+    ScenarioKey{
+        "tearing.length", number, "m", "",
+        "Radius of the ball over which that stress is averaged; left out: 2 E G_c / (pi (1 - nu^2) strength^2).",
+        above(0, 1)},
+    ScenarioKey{"tearing.most_increments", integer, "", "40",
+                "Increments of the tears in one step of the run; what is left over goes on in the next.",
+                from(1, 10000)},
+    ScenarioKey{"tearing.most_area", number, "m2", "",
+                "Nothing tears any more beyond this torn area; left out: no limit.", above(0)},
+
     ScenarioKey{"haptics", table, "", "",
                 "The force loop of `spherecut haptics`; left out: all defaults. Other commands do not read it."},
     ScenarioKey{"haptics.rate", number, "1/s", "1000.0", "Ticks of the haptic loop per second.", from(50, 10000)},
@@ -351,60 +410,6 @@ constexpr std::array keys = {
     ScenarioKey{"output.figures", boolean, "", "true", "Draw PNG figures at the end."},
 };
 
-std::string_view name_of(KeyKind kind) {
-  switch (kind) {
-  case table:
-    return "table";
-  case array_of_tables:
-    return "array of tables";
-  case number:
-    return "number";
-  case integer:
-    return "integer";
-  case boolean:
-    return "boolean";
-  case text:
-  case choice:
-    return "string";
-  case vector:
-    return "[x, y, z]";
-  case points:
-    return "array of [x, y, z]";
-  case strain:
-    return "three or six numbers";
-  case axes:
-    return "array of strings";
-  }
-  return "";
-}
-
-bool is_table(const ScenarioKey& key) {
-  return key.kind == table || key.kind == array_of_tables;
-}
-
-// The table that a key stands in: "tool.path[]" for "tool.path[].time", "" at top level.
-std::string_view parent_of(std::string_view path) {
-  const auto dot = path.rfind('.');
-  return dot == std::string_view::npos ? std::string_view{} : path.substr(0, dot);
-}
-
-std::string_view leaf_of(std::string_view path) {
-  const auto dot = path.rfind('.');
-  return dot == std::string_view::npos ? path : path.substr(dot + 1);
-}
-
-std::string heading(const ScenarioKey& key) {
-  return key.kind == table ? fmt::format("[{}]", key.path) : fmt::format("[[{}]]", key.path);
-}
-
-std::string type_and_unit(const ScenarioKey& key) {
-  return key.unit.empty() ? std::string(name_of(key.kind)) : fmt::format("{}, {}", name_of(key.kind), key.unit);
-}
-
-std::string fallback_text(const ScenarioKey& key) {
-  return key.fallback.empty() ? "see meaning" : std::string(key.fallback);
-}
-
 } // namespace
 
 bool KeyRange::holds(double value) const {
@@ -435,56 +440,6 @@ std::string allowed_values(const ScenarioKey& key) {
   if (std::isfinite(key.range.upper))
     text += fmt::format(" {} {:g}", key.range.upper_open ? "<" : "<=", key.range.upper);
   return text;
-}
-
-std::string scenario_help() {
-  std::string out = "A scenario is a TOML file in SI units: metres, newtons, pascals, seconds, kilograms.\n";
-  const auto list = [&](std::string_view parent) {
-    for (const ScenarioKey& key : keys) {
-      if (is_table(key) || parent_of(key.path) != parent)
-        continue;
-      out += fmt::format("  {:<18} {}", leaf_of(key.path), type_and_unit(key));
-      if (const std::string allowed = allowed_values(key); !allowed.empty())
-        out += fmt::format("; {}", allowed);
-      if (!key.fallback.empty())
-        out += key.fallback == "required" ? "; required" : fmt::format("; default {}", key.fallback);
-      if (!key.when.empty())
-        out += fmt::format("; with {}", key.when);
-      out += fmt::format("\n  {:<18}   {}\n", "", key.meaning);
-    }
-  };
-  list("");
-  for (const ScenarioKey& key : keys)
-    if (is_table(key)) {
-      out += fmt::format("\n{}  {}{}\n", heading(key), key.meaning, key.fallback == "required" ? " Required." : "");
-      list(key.kind == array_of_tables ? fmt::format("{}[]", key.path) : std::string(key.path));
-    }
-  return out;
-}
-
-std::string scenario_reference() {
-  std::string out;
-  const auto list = [&](std::string_view parent) {
-    out += "| key | type, unit | allowed | default | meaning |\n|---|---|---|---|---|\n";
-    for (const ScenarioKey& key : keys) {
-      if (is_table(key) || parent_of(key.path) != parent)
-        continue;
-      std::string meaning(key.meaning);
-      if (!key.when.empty())
-        meaning += fmt::format(" With `{}`.", key.when);
-      out += fmt::format("| `{}` | {} | {} | {} | {} |\n", leaf_of(key.path), type_and_unit(key), allowed_values(key),
-                         fallback_text(key), meaning);
-    }
-  };
-  out += "### Top level\n\n";
-  list("");
-  for (const ScenarioKey& key : keys)
-    if (is_table(key)) {
-      out += fmt::format("\n### `{}`\n\n{}{}\n\n", heading(key), key.meaning,
-                         key.fallback == "required" ? " Required." : "");
-      list(key.kind == array_of_tables ? fmt::format("{}[]", key.path) : std::string(key.path));
-    }
-  return out;
 }
 
 } // namespace spherecut::app

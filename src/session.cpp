@@ -37,7 +37,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
   std::vector<ToolSample> motion;
   if (scenario_.tool) {
     motion = tool_motion(*scenario_.tool, query_, *organ_.domain);
-    touch_ = first_touch(*scenario_.tool, motion, query_);
+    touch_ = scenario_.tool->grasp ? find_grasp(motion) : first_touch(*scenario_.tool, motion, query_);
   }
   steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
   if (scenario_.method.method == solvers::Method::published)
@@ -52,6 +52,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     check_pieces(steps_.front().time);
   }
   make_blade_force();
+  toughness_ = toughness_field(scenario_.toughness, scenario_.layers);
   if (!touch_ && !cuts())
     return;
   if (touch_)
@@ -65,20 +66,26 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
 void Session::lay_out_zone() {
   if (zone_contact_)
     zone_.spacing.centres = {zone_contact_->point};
-  zone_.spacing.segments.clear();
   if (scenario_.blade)
-    zone_.spacing.segments = blade_tracks(*scenario_.blade, *organ_.domain, 2 * zone_.spacing.fine);
-  if (!scenario_.precuts.empty()) {
-    const auto fronts = solvers::front_segments(*model_.incision, zone_.spacing.fine);
-    zone_.spacing.segments.insert(zone_.spacing.segments.end(), fronts.begin(), fronts.end());
-  }
+    tracks_ = blade_tracks(*scenario_.blade, *organ_.domain, 2 * zone_.spacing.fine);
+  zone_.spacing.segments = model_.incision != nullptr ? fine_segments(*model_.incision) : tracks_;
   if (scenario_.nodes.count > 0)
     zone_.spacing =
         solvers::spacing_for_count(*organ_.domain, zone_.spacing, scenario_.nodes.count, sprinkle_options(model_));
 }
 
+// The way of the blade and the front of the cut.
+std::vector<std::array<Vector3, 2>> Session::fine_segments(const topology::Incision& incision) const {
+  std::vector<std::array<Vector3, 2>> segments = tracks_;
+  const auto fronts = solvers::front_segments(incision, zone_.spacing.fine);
+  segments.insert(segments.end(), fronts.begin(), fronts.end());
+  return segments;
+}
+
 topology::SurfaceContact Session::find_contact(const topology::ToolPose& pose) const {
   const topology::ToolShape& shape = scenario_.tool->shape;
+  if (scenario_.tool->grasp)
+    return query_.first_touch(shape, pose);
   const bool near = last_contact_ && last_contact_->depth > -topology::tip_radius(shape);
   return near ? query_.walk(shape, pose, *last_contact_) : query_.first_touch(shape, pose);
 }
@@ -112,11 +119,12 @@ StepResult Session::step(const StepSample& sample) {
     model_.field = std::move(*without_blade_);
     without_blade_.reset();
   }
+  const bool released = handle_grasper(sample);
   const bool solved = incisions_ != nullptr && blade_force_ == nullptr && move_blade(sample, *result.cut);
   if (sample.blade)
     last_blade_ = sample.blade;
   // Without any load the organ keeps its rest shape until the tool is on it.
-  const bool touched = touch_ && result.contact.depth > 0;
+  const bool touched = touch_ && (scenario_.tool->grasp ? grasps() : result.contact.depth > 0);
   const bool loaded =
       (touch_ || cuts()) && (touched || model_.body != nullptr || scenario_.gravity || !scenario_.pretension.isZero() ||
                              model_.incision != nullptr || blade_enters(sample));
@@ -132,6 +140,8 @@ StepResult Session::step(const StepSample& sample) {
     }
     if (blade_force_ != nullptr && sample.blade)
       press_blade(sample, *result.cut);
+    if (tears())
+      tear(sample, released || solved, result);
     evaluate(result);
   }
   if (result.cut)
@@ -146,7 +156,7 @@ void Session::prepare(const StepSample& sample) {
   if (sample.tool)
     last_contact_ = find_contact(*sample.tool);
   build(model_);
-  if (touch_ && model_.patch.nodes.empty())
+  if (touch_ && !scenario_.tool->grasp && model_.patch.nodes.empty())
     condense(candidates(model_), model_);
 }
 
@@ -160,7 +170,7 @@ void Session::coarsen(double factor) {
 
 // A bonded contact stays with its nodes, so its zone stays too.
 bool Session::must_follow(const topology::SurfaceContact& contact) const {
-  if (scenario_.contact.condition == solvers::ContactCondition::bonded || contact.depth <= 0)
+  if (scenario_.contact.condition == solvers::ContactCondition::bonded || scenario_.tool->grasp || contact.depth <= 0)
     return false;
   const double away = (contact.point - zone_contact_->point).norm();
   return away > scenario_.contact.follow_fraction * zone_.spacing.radius;
@@ -206,6 +216,8 @@ void Session::sprinkle(const solvers::NodeCloud* previous, BodyModel& model) {
 
 // Surface nodes near the contact on its side of the organ, without those that are held.
 std::vector<int> Session::candidates(const BodyModel& model) const {
+  if (scenario_.tool->grasp)
+    return grasped_nodes(model);
   const solvers::NodeCloud& nodes = model.sprinkling.nodes;
   std::vector<char> held(nodes.positions.size(), 0);
   for (const solvers::Prescribed& entry : fixed_nodes(scenario_, *organ_.domain, nodes))
@@ -228,6 +240,8 @@ std::vector<int> Session::candidates(const BodyModel& model) const {
 bool Session::tool_in_reach() const {
   if (!touch_ || !last_contact_)
     return false;
+  if (scenario_.tool->grasp)
+    return grasps();
   double moved = 0;
   for (Eigen::Index i = 0; i + 2 < node_displacements_.size(); i += 3)
     moved = std::max(moved, node_displacements_.segment<3>(i).norm());
@@ -259,6 +273,12 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
     condense(candidates(model), model);
   const ToolSettings* tool = scenario_.tool ? &*scenario_.tool : nullptr;
   const topology::ToolPose* pose = sample.tool ? &*sample.tool : nullptr;
+  if (grasps()) {
+    const StageTimer timer(profile_.press);
+    const std::vector<Vector3> held = grasped_displacements(*pose, model);
+    solve_contact(tool, pose, scenario_, model, &held);
+    return;
+  }
   for (int growth = 0; growth <= patch_growths; ++growth) {
     {
       const StageTimer timer(profile_.press);

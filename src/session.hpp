@@ -8,6 +8,10 @@
 #include "src/incision_builder.hpp"
 #include "src/node_zone.hpp"
 #include "src/schedule.hpp"
+#include "src/tear_report.hpp"
+
+#include "solvers/tearing.hpp"
+#include "topology/front_growth.hpp"
 
 #include <functional>
 
@@ -30,6 +34,7 @@ struct StepResult {
   double force_jump = 0;          // |force after - before| / |force before| at the re-sprinkle
   double seconds = 0;             // wall clock of the step
   std::optional<CutReport> cut;   // in a scenario that cuts
+  std::optional<TearReport> tear; // in one that tears, from the first solution on
 };
 
 /// Wall clock of each stage, s, summed over the run.
@@ -47,11 +52,15 @@ class Session {
   [[nodiscard]] const std::vector<StepSample>& steps() const { return steps_; }
   /// False: there is no tool, or it never touches the organ, and every step is free of its force.
   [[nodiscard]] bool touches() const { return touch_.has_value(); }
-  /// Whether there is a blade or a precut.
-  [[nodiscard]] bool cuts() const { return scenario_.blade || !scenario_.precuts.empty(); }
+  /// Whether there is a blade or a precut, or tissue that tears.
+  [[nodiscard]] bool cuts() const { return scenario_.blade || !scenario_.precuts.empty() || tears(); }
+  [[nodiscard]] bool tears() const { return scenario_.tearing.enabled; }
+  /// Whether a grasper holds the tissue: its patch is bonded to it.
+  [[nodiscard]] bool grasps() const { return grasp_.has_value(); }
 
-  /// Goes on to a step of steps(), in their order: cuts, moves the tool, solves. A cut that is refused leaves
-  /// everything as it was, and says why in the result and once in warnings(). Throws NumericalError.
+  /// Goes on to a step of steps(), in their order: cuts, moves the tool, solves, tears. A cut or an increment of a tear
+  /// that is refused leaves everything as it was, and says why in the result and once in warnings(). Throws
+  /// NumericalError, and InputError when a grasper cannot reach the tissue.
   StepResult step(const StepSample& sample);
 
   /// Builds the body and condenses it onto the tool's candidates before the first touch, so that the first step in
@@ -73,6 +82,12 @@ class Session {
   /// On: steps find contact and force alone and leave out what only output needs, node_states(), the residual, the
   /// opening volume and the hash of the wound; the rotation of the tissue is then not watched.
   void set_force_only(bool on) { force_only_ = on; }
+
+  /// Whether a grasper is closed, from the next step on: a hand's in place of the times of the scenario; empty: by those.
+  void set_grip(std::optional<bool> closed) { grip_ = closed; }
+
+  /// On: a tear makes one increment a step at most, and goes on in the next: a loop in real time gets its solutions.
+  void set_tear_gradually(bool on) { tear_gradually_ = on; }
 
   /// Off: every cut builds its system from scratch, on the nodes that an update would have; what updates are measured
   /// by.
@@ -101,6 +116,7 @@ class Session {
 
  private:
   void lay_out_zone();
+  [[nodiscard]] std::vector<std::array<Vector3, 2>> fine_segments(const topology::Incision& incision) const;
   void make_precuts();
   [[nodiscard]] topology::SurfaceContact find_contact(const topology::ToolPose& pose) const;
   [[nodiscard]] topology::SurfaceContact centre_of(const topology::SurfaceContact& contact,
@@ -128,10 +144,38 @@ class Session {
   [[nodiscard]] std::optional<BodyModel> propose_cut(const std::vector<topology::BladePose>& poses,
                                                      const StepSample& sample, CutReport& report);
   void check_pieces(double time);
+  [[nodiscard]] FirstTouch find_grasp(const std::vector<ToolSample>& motion) const;
+  [[nodiscard]] std::vector<int> grasped_nodes(const BodyModel& model) const;
+  [[nodiscard]] bool grasped_piece_is_free() const;
+  bool handle_grasper(const StepSample& sample);
+  [[nodiscard]] std::vector<Vector3> grasped_displacements(const topology::ToolPose& pose,
+                                                           const BodyModel& model) const;
+  void tear(const StepSample& sample, bool released, StepResult& result);
+  void book_loading(const StepSample& sample, bool dissipates);
+  [[nodiscard]] std::vector<solvers::FrontState> front_states() const;
+  [[nodiscard]] std::optional<topology::SurfaceMesh> seed_of_tear() const;
+  [[nodiscard]] topology::FrontGrowth grow_tear(const std::vector<solvers::FrontState>& states, double longest) const;
+  bool take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report);
   void report_cut(CutReport& report) const;
   void evaluate(StepResult& result);
   void evaluate_nodes(StepResult& result);
   void warn(const std::string& key, const std::string& text);
+
+  /// Tissue in a grasper's jaws.
+  struct Grasp {
+    Vector3 place = Vector3::Zero(), normal = Vector3::UnitZ(); // m, on the surface at rest; outward there
+    std::vector<Vector3> rest, displacement;                    // m, of the patch when it took hold
+    topology::ToolPose pose;                                    // when it took hold
+  };
+  /// What the last step has left for the next one's account.
+  struct TearAccount {
+    EnergyLedger ledger;
+    Energies last;
+    Vector3 force = Vector3::Zero();        // N, on the tool
+    std::optional<topology::ToolPose> pose; // of the tool
+    double area = 0;                        // m2 torn
+    double decay = 0;                       // 1/m, of the release rate with the way of the front, as last seen
+  };
 
   Scenario scenario_;
   std::function<void(const std::string&)> say_;
@@ -140,7 +184,8 @@ class Session {
   topology::ContactQuery query_;
   std::optional<FirstTouch> touch_;
   FineZone zone_;
-  double coarseness_ = 1; // of the spacings in zone_
+  double coarseness_ = 1;                      // of the spacings in zone_
+  std::vector<std::array<Vector3, 2>> tracks_; // of the blade, where fine nodes belong
   std::vector<StepSample> steps_;
   std::optional<topology::SurfaceContact> zone_contact_; // centre of the fine zone; empty: no tool touches
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
@@ -156,6 +201,12 @@ class Session {
   bool hand_led_ = false;                         // the blade goes where it likes, not along the scenario's path
   std::vector<solvers::PointState> node_states_;
   VectorX node_displacements_; // m, 3 a node, in the last step
+  std::optional<Grasp> grasp_;
+  std::optional<bool> grip_; // a hand's; empty: by the times of the scenario
+  bool lost_grip_ = false;   // the piece in the grasper has come off
+  std::optional<TearAccount> tears_;
+  std::function<double(const Vector3&)> toughness_; // J/m2, in the tissue at rest
+  bool tear_gradually_ = false;
   bool force_only_ = false;
   bool updating_ = true;
   std::vector<std::string> warnings_;

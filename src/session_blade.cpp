@@ -10,7 +10,7 @@
 namespace spherecut::app {
 
 void Session::make_blade_force() {
-  if (!scenario_.blade || scenario_.toughness == 0)
+  if (!scenario_.blade || scenario_.toughness == 0 || tears())
     return;
   blade_force_ =
       std::make_unique<BladeForce>(scenario_, organ_.domain, zone_.spacing.fine, [this](const BodyModel& model) {

@@ -201,7 +201,8 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
   try {
     BodyModel next;
     next.incision = incisions_->incision();
-    require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
+    if (!grasps()) // a grasper remembers what it holds
+      require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
     check_pieces(sample.time);
     if (hand_led_)
       zone_.spacing.segments = solvers::front_segments(*next.incision, zone_.spacing.fine);

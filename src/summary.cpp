@@ -117,6 +117,24 @@ Json cut(const Session& session, const RunFindings& findings) {
           {"surface_hash", hash_text(last.surface_hash)}};
 }
 
+Json tear(const RunFindings& findings) {
+  const EnergyLedger& ledger = findings.tear.ledger;
+  const double spent = ledger.surface + ledger.dissipation;
+  return {{"increments", findings.tear_increments},
+          {"seeds", findings.seeds},
+          {"area_m2", findings.tear.area},
+          {"unstable", findings.torn_unstably},
+          {"severed", findings.severed_by_tear},
+          {"tool_J", ledger.tool},
+          {"loads_J", ledger.loads},
+          {"elastic_J", ledger.elastic},
+          {"surface_J", ledger.surface},
+          {"dissipation_J", ledger.dissipation},
+          {"imbalance_J", ledger.imbalance()},
+          {"energy_balance", spent > 0 ? Json(std::abs(ledger.imbalance()) / spent) : Json(nullptr)},
+          {"last_reason", findings.tear.reason}};
+}
+
 Json timings(const SessionProfile& profile) {
   return {{"organ", profile.organ},       {"topology", profile.topology},     {"level_sets", profile.level_sets},
           {"sprinkle", profile.sprinkle}, {"discretise", profile.discretise}, {"condense", profile.condense},
@@ -141,6 +159,7 @@ std::string summary_json(const Session& session, const RunOutput& output, RunSta
   summary["steps"] = {{"done", findings.steps}, {"planned", findings.planned}};
   summary["peak_force"] = findings.touched ? peak(findings.peak) : Json(nullptr);
   summary["cut"] = session.cuts() ? cut(session, findings) : Json(nullptr);
+  summary["tear"] = session.tears() ? tear(findings) : Json(nullptr);
   summary["nodes"] = nodes(session);
   summary["solver"] = solver(session, findings);
   summary["timings_s"] = timings(session.profile());

@@ -78,6 +78,8 @@ std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::Co
   if (path.back().time - motion.back().time > 1e-6 * step)
     motion.push_back({path.back().time, pose_of(tool, path.back().position)});
 
+  if (tool.grasp)
+    return motion;
   const topology::ToolPose& pose = motion.front().pose;
   const auto contact = organ.first_touch(tool.shape, pose);
   if (contact.depth > touch_tolerance || domain.signed_distance(pose.point) < -touch_tolerance)

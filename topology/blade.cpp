@@ -473,6 +473,24 @@ void BladeSweep::lift() {
   state_->leads.clear();
 }
 
+void BladeSweep::extend(int sheet, const SurfaceMesh& grown) {
+  State& state = *state_;
+  if (sheet < 0 || sheet >= std::ssize(state.order))
+    throw InputError(fmt::format("blade sweep: sheet {} does not exist; there are {}", sheet, state.order.size()));
+  const int own = state.order[static_cast<std::size_t>(sheet)];
+  const SurfaceMesh& now = state.sheets.sheets()[static_cast<std::size_t>(own)];
+  const std::size_t vertices = now.vertices.size(), triangles = now.triangles.size();
+  if (grown.vertices.size() < vertices || grown.triangles.size() < triangles)
+    throw InputError(fmt::format("blade sweep: sheet {} of {} triangles cannot become one of {}", sheet, triangles,
+                                 grown.triangles.size()));
+  for (std::size_t v = vertices; v < grown.vertices.size(); ++v)
+    state.sheets.add_vertex(own, grown.vertices[v]);
+  for (std::size_t t = triangles; t < grown.triangles.size(); ++t)
+    state.sheets.add_triangle(own, grown.triangles[t]);
+  state.leads.assign(state.leads.size(), {});
+  ++state.revision;
+}
+
 std::vector<SurfaceMesh> BladeSweep::sheets() const {
   return state_->given_sheets();
 }

@@ -74,6 +74,11 @@ class BladeSweep {
   /// The next motion starts afresh from wherever it places the blade (the blade was lifted).
   void lift();
 
+  /// Sheet `sheet` of sheets() has grown otherwise, by a tear: `grown` is that sheet continued, vertices and triangles
+  /// in their places. The next strip starts a sheet of its own, from where the edge is. Throws InputError when there is
+  /// no such sheet or it has not grown.
+  void extend(int sheet, const SurfaceMesh& grown);
+
   [[nodiscard]] std::vector<SurfaceMesh> sheets() const;
   /// Number of motions that added something.
   [[nodiscard]] int revision() const;

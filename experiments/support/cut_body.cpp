@@ -14,7 +14,13 @@ CutBody cut_body(const CutBodyCase& cut) {
   shape.coarse = cut.coarse;
   shape.slope = cut.slope;
   shape.segments = solvers::front_segments(*body.problem.incision, 0.1 * cut.domain->bounds().extent().norm());
-  options.spacing = solvers::spacing_for_count(*cut.domain, shape, cut.nodes, options);
+  if (cut.fine > 0) {
+    shape.fine = cut.fine;
+    shape.coarse = cut.coarse * cut.fine;
+    options.spacing = shape;
+  } else {
+    options.spacing = solvers::spacing_for_count(*cut.domain, shape, cut.nodes, options);
+  }
   body.fine = options.spacing.finest();
   body.problem.nodes = solvers::sprinkle(*cut.domain, options).nodes;
   return body;

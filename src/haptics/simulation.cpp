@@ -55,6 +55,7 @@ void DegradationRule::rebuilt(double seconds) {
 HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const std::string&)> say)
     : session_(std::move(scenario), std::move(say)) {
   session_.set_force_only(true);
+  session_.set_tear_gradually(true);
   static_cast<void>(path());
   parked_ = parked_tool();
 }
@@ -112,7 +113,8 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   }
   result_ = session_.step(sample(device));
   const BodyModel& model = session_.model();
-  const solvers::ContactCondition condition = session_.scenario().contact.condition;
+  const solvers::ContactCondition condition =
+      session_.grasps() ? solvers::ContactCondition::bonded : session_.scenario().contact.condition;
   if (model.patch.nodes.empty() || !model.state) {
     clear(snapshot);
     snapshot.pose = result_.pose;

@@ -116,6 +116,18 @@ TEST_CASE("Quick penny growth: onset, pressure, roundness and energy") {
   require_quick_run_passes("penny_growth");
 }
 
+TEST_CASE("Quick double cantilever that tears: load, straight front, energy") {
+  require_quick_run_passes("beam_tearing");
+}
+
+TEST_CASE("Quick spacing independence: onset and path of a tear on three spacings") {
+  require_quick_run_passes("spacing_independence");
+}
+
+TEST_CASE("Quick flap: a grasper tears a flap of liver on") {
+  require_quick_run_passes("flap");
+}
+
 TEST_CASE("Quick double cantilever: compliance") {
   require_quick_run_passes("precut_beam");
 }

@@ -1,5 +1,7 @@
 #include "solvers/tearing.hpp"
 
+#include "solvers/tear_seed.hpp"
+#include "tests/support/bodies.hpp"
 #include "topology/errors.hpp"
 
 #include <catch2/catch.hpp>
@@ -73,4 +75,61 @@ TEST_CASE("A front moves where the release reaches the toughness, most where it 
   CHECK(exact(states[0].frame).norm() == Approx(0.1));
   CHECK_THROWS_AS(tear_motion({}, 0.1, 1), InputError);
   CHECK_THROWS_AS(tear_motion(states, 0, 1), InputError);
+}
+
+TEST_CASE("A front turns along a weak plane, and by hoop stress where the toughness is uniform", "[tearing]") {
+  const double weak_angle = 0.5, probe = 0.1;
+  FrontState state = state_at(0, 4);
+  state.intensities = {1, 0.3, 0};
+  state.angle = kink_angle(state.intensities);
+  const auto uniform = [](const Vector3&) { return 2.0; };
+  CHECK(directed({state}, TearDirection::weakest, uniform, probe)[0].angle == Approx(state.angle).margin(0.011));
+  CHECK(directed({state}, TearDirection::hoop_stress, uniform, probe)[0].angle == Approx(state.angle));
+  const auto layered = [&](const Vector3& x) { // weak about the ray at weak_angle
+    return std::abs(std::atan2(x.z(), x.x()) - weak_angle) < 0.03 ? 0.2 : 2.0;
+  };
+  const FrontState turned = directed({state}, TearDirection::weakest, layered, probe)[0];
+  CHECK(turned.angle == Approx(weak_angle).margin(0.035));
+  CHECK(turned.toughness == 0.2);
+  const FrontState kept = directed({state}, TearDirection::hoop_stress, layered, probe)[0];
+  CHECK(kept.angle == Approx(state.angle));
+  CHECK(kept.toughness == 2);
+  CHECK_THROWS_AS(directed({state}, TearDirection::weakest, uniform, 0), InputError);
+}
+
+TEST_CASE("The averaged stress of a hanging bar is that at the middle of the ball, on any nodes", "[tearing]") {
+  const Material material{1000, 0, 1};
+  for (const double h : {0.25, 0.125}) {
+    Problem problem = tests::held_box({0, 0, 0}, {0.5, 0.5, 1}, h, 0.1, material);
+    problem.loads.body_force = [](const Vector3&) { return Vector3(0, 0, -20); };
+    problem.prescribed.clear(); // hung from above
+    for (int i = 0; i < problem.nodes.size(); ++i)
+      if (problem.nodes.positions[i].z() > 1 - 1e-9)
+        problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+    problem.prescribed_region = [](const Vector3& x, const Vector3& n) { return x.z() > 1 - 1e-9 && n.z() > 0.5; };
+    const auto body = discretise(problem, {});
+    const Field field = body->solve();
+    const Vector3 middle(0.25, 0.25, 0.5);
+    for (const double radius : {0.05, 0.2}) {
+      const PrincipalStress stress = averaged_stress(*body, field, middle, radius);
+      CHECK(stress.stress == Approx(20 * 0.5).epsilon(0.02));
+      CHECK(std::abs(stress.direction.z()) > 0.999);
+    }
+    const WeakPlace place =
+        weakest_place(*body, field, 0.1, 15, [&](int i) { return problem.nodes.positions[i].z() < 0.9; });
+    REQUIRE(place.node >= 0);
+    CHECK(problem.nodes.positions[place.node].z() > 0.7);
+    CHECK(weakest_place(*body, field, 0.1, 25, [](int) { return true; }).node < 0);
+    CHECK(body->load_work(field) == Approx(20.0 * 20 * 0.25 / (3 * 1000)).epsilon(0.03)); // (rho g)^2 V L^2 / (3 E)
+    CHECK_THROWS_AS(averaged_stress(*body, field, middle, 0), InputError);
+  }
+}
+
+TEST_CASE("A seed of a tear releases at the strength what its surface takes", "[tearing]") {
+  const Material material{5000, 0.45, 0};
+  const double toughness = 3, strength = 2000, a = seed_radius(material, toughness, strength);
+  const double modulus = 5000 / (1 - 0.45 * 0.45);
+  const double released = 8 * strength * strength * a * a * a / (3 * modulus); // [Sneddon 1946]
+  CHECK(released == Approx(toughness * std::numbers::pi * a * a));
+  CHECK(averaging_length(material, toughness, strength) < a);
 }

@@ -1,0 +1,66 @@
+// Problem:   scenarios/liver_flap.toml: a flap cut from the dome of a liver is lifted by a grasper and tears on.
+// Reference: none but the account of energies; G is at most the toughness where the tear has come to rest.
+// Command:   spherecut experiment run flap --out DIR
+#include "experiments/registered.hpp"
+
+#include "flap_scenario.hpp"
+#include "src/cut_output.hpp"
+#include "src/tear_output.hpp"
+
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::experiments {
+
+std::vector<Check> run_flap(const ExperimentContext& context) {
+  app::Scenario scenario = app::read_scenario_text("liver_flap.toml", liver_flap);
+  if (context.quick) {
+    std::get<app::LiverOrgan>(scenario.organ.shape).triangles = 5000;
+    scenario.nodes.fine_spacing = 0.007;
+    scenario.nodes.coarse_spacing = 0.03;
+    scenario.tool->step = 0.5;
+    scenario.tearing.step = 1;
+    scenario.tearing.most_increments = 4;
+  }
+  app::Session session(scenario, context.say);
+  app::Table table({"time", "pull_N", "area_m2", "torn_m2", "increments", "work_J", "elastic_J", "surface_J",
+                    "dissipation_J", "imbalance_J"});
+  app::Figure figure{"Lifting a flap: pull", "way of the grasper / mm", "pull / N", false, false, {}};
+  app::Series pull{"pull", {}, {}, app::SeriesStyle::lines_and_points};
+  std::vector<double> times;
+  std::vector<app::TearReport> reports;
+  app::StepResult last;
+  for (const app::StepSample& sample : session.steps()) {
+    last = session.step(sample);
+    const app::EnergyLedger& e = last.tear->ledger;
+    table.add({fmt::format("{:.3f}", last.time), fmt::format("{:.5f}", last.force.norm()),
+               fmt::format("{:.5g}", last.cut->area), fmt::format("{:.5g}", last.tear->area),
+               fmt::format("{}", last.tear->increments.size() - 1), fmt::format("{:.5g}", e.tool + e.loads),
+               fmt::format("{:.5g}", e.elastic), fmt::format("{:.5g}", e.surface), fmt::format("{:.5g}", e.dissipation),
+               fmt::format("{:.3g}", e.imbalance())});
+    pull.x.push_back(1e3 * (sample.tool->point - session.steps().front().tool->point).norm());
+    pull.y.push_back(last.force.norm());
+    times.push_back(last.time);
+    reports.push_back(*last.tear);
+    context.say(fmt::format("t = {:.2f} s: {:.3g} N, {:.3g} cm2 torn in {} increments: {}", last.time,
+                            last.force.norm(), 1e4 * last.tear->area, last.tear->increments.size() - 1,
+                            last.tear->reason));
+  }
+  figure.series = {pull};
+  table.write(context.out / "flap.csv");
+  app::write_png(figure, context.out / "pull.png");
+  for (const auto& [name, drawn] : app::tear_figures(times, reports))
+    app::write_png(drawn, context.out / name);
+  app::write_wound(context.out / "flap.vtp", session);
+  app::write_incision(context.out / "incision.vtp", *session.incision());
+  const app::EnergyLedger& ledger = last.tear->ledger;
+  const double spent = ledger.surface + ledger.dissipation;
+  std::vector<Check> checks{
+      {"flap_torn_cm2", 1e4 * last.tear->area, ">=", context.quick ? 0.5 : 2.0},
+      {"flap_energy_balance", spent > 0 ? std::abs(ledger.imbalance()) / spent : 1, "<=", context.quick ? 0.3 : 0.15},
+      {"flap_dissipation_share", ledger.dissipation / spent, ">=", 0},
+      {"flap_pieces", static_cast<double>(last.cut->pieces), "<=", 1}};
+  return checks;
+}
+
+} // namespace spherecut::experiments
