@@ -16,7 +16,8 @@ import { Part, type Scalars, type Topology, type Vec3 } from './protocol';
 import { castRay, frontEdges, type Hit, lipDistance, lipEdges, trianglesOf, vertexNormals } from './surface';
 
 const tissueColour = new Color('#9a4b45');
-const wallColour = new Color('#e0705f');
+const wallColour = new Color('#d6474c');
+const wallGlow = 0.12; // of their own: walls that face each other get little light
 const lipColour = new Color('#ffe3c2');
 const frontColour = new Color('#ffd24d');
 const tableSize = 256;
@@ -56,7 +57,7 @@ export class Body {
     colours.setUsage(DynamicDrawUsage);
     this.positions = positions;
     this.colours = colours;
-    const skin = (triangles: Uint32Array, colour: Color, shininess: number): Skin => {
+    const skin = (triangles: Uint32Array, colour: Color, shininess: number, glow: number): Skin => {
       const geometry = new BufferGeometry();
       const normals = new BufferAttribute(new Float32Array(3 * topology.vertexCount), 3);
       normals.setUsage(DynamicDrawUsage);
@@ -66,6 +67,7 @@ export class Body {
       geometry.setIndex(new BufferAttribute(triangles, 1));
       const material = new MeshPhongMaterial({
         color: colour,
+        emissive: colour.clone().multiplyScalar(glow),
         specular: new Color('#1c1716'),
         shininess,
         side: FrontSide,
@@ -78,8 +80,8 @@ export class Body {
       this.group.add(mesh);
       return { mesh, triangles, normals };
     };
-    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), tissueColour, 26);
-    this.wall = skin(trianglesOf(topology, (part) => part !== Part.organ), wallColour, 8);
+    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), tissueColour, 26, 0);
+    this.wall = skin(trianglesOf(topology, (part) => part !== Part.organ), wallColour, 8, wallGlow);
     const lines = (edges: Uint32Array, colour: Color): void => {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', positions);
@@ -117,12 +119,13 @@ export class Body {
       }
       this.colours.needsUpdate = true;
     }
-    for (const [skin, own] of [[this.organ, tissueColour], [this.wall, wallColour]] as const) {
+    for (const [skin, own, glow] of [[this.organ, tissueColour, 0], [this.wall, wallColour, wallGlow]] as const) {
       const material = skin.mesh.material;
       if (material.vertexColors !== coloured) material.needsUpdate = true;
       material.vertexColors = coloured;
       if (coloured) material.color.set(0xffffff);
       else material.color.copy(own);
+      material.emissive.copy(own).multiplyScalar(coloured ? 0 : glow);
     }
   }
 

@@ -413,8 +413,7 @@ export class Page {
   }
 
   park(): void {
-    this.stylus.release();
-    this.connection.send({ type: 'park' });
+    this.stylus.putAway();
   }
 
   home(): void {

@@ -46,6 +46,8 @@ export class Stylus {
   private heading = new Vector3(1, 0, 0); // of the blade
   private gripped = false;
   private wantsPress = false;
+  private wantsPark = false;
+  private park = new Vector3();
   private centre = new Vector3();
   private radius = 0.1;
   private sent = { position: new Vector3(Infinity, 0, 0), turn: new Turn(0, 0, 0, 0) };
@@ -75,7 +77,8 @@ export class Stylus {
     this.setMode(session.mode);
     this.withdrawAtOnce();
     const park = session.park[session.mode];
-    this.height.copy(park ? new Vector3(...park) : new Vector3(0, 0, this.radius).add(this.centre));
+    this.park.copy(park ? new Vector3(...park) : new Vector3(0, 0, this.radius).add(this.centre));
+    this.height.copy(this.park);
     this.place = this.aim = null;
   }
 
@@ -124,6 +127,12 @@ export class Stylus {
     this.onPress(false);
   }
 
+  /** To the place away from the organ, once out of the tissue. */
+  putAway(): void {
+    this.release();
+    this.wantsPark = true;
+  }
+
   /** Changes the depth pressed to, by metres. */
   deepen(by: number): void {
     this.setDepth(this.depths[this.mode] + by);
@@ -145,6 +154,12 @@ export class Stylus {
     if (!this.holding) return;
     let hand: Vector3;
     if (this.stage === 'hovering') {
+      if (this.wantsPark) {
+        this.wantsPark = false;
+        this.aim = null;
+        this.height.copy(this.park);
+        this.send({ type: 'park' });
+      }
       if (!this.aim) return;
       hand = this.hover(seconds, this.aim);
     } else {

@@ -16,12 +16,14 @@ async function photograph(tab: Tab, name: string): Promise<void> {
   await tab.evaluate(() => globalThis.spherecut!.view.sharpen(1));
 }
 
-const served = await serve(build, join(source, 'scenarios/liver_live.toml'));
+// Nodes stay as fine as they are however long a cut takes.
+const served = await serve(build, join(source, 'scenarios/liver_live.toml'), (text) => text.replace(/^budget = .*$/m, 'budget = 60.0'));
 const browser = await launch();
 try {
   const { tab, context } = await openPage(browser, served.address, { width: 1280, height: 800 });
   await ready(tab);
   const keep = async (name: string): Promise<void> => {
+    await tab.evaluate(() => document.getElementById('messages')!.replaceChildren());
     await tab.waitForTimeout(700);
     await photograph(tab, name);
     console.log(name, JSON.stringify(await look(tab)));
@@ -41,24 +43,31 @@ try {
   for (let i = 0; i < 6; ++i) await tab.keyboard.press('.', { delay: 150 });
   await hover(tab, -0.06, 0.004);
   await stroke(tab, [[-0.06, 0.004], [-0.035, 0.004], [-0.01, 0.001], [0.012, -0.002]], 2.5);
-  await until(tab, 'the cut is through', () => globalThis.spherecut!.frame!.cutArea > 5e-4, 60);
-  await tab.waitForTimeout(6000);
+  await until(tab, 'there is a cut', () => globalThis.spherecut!.frame!.cutArea > 1e-4, 120);
+  // Until the solver has caught up with the hand.
+  for (let area = -1, seen = await look(tab); seen.cutArea > area; seen = await look(tab)) {
+    area = seen.cutArea;
+    await tab.waitForTimeout(12_000);
+  }
   await keep('cutting');
   await tab.mouse.up();
   await tab.keyboard.press('k');
+  await until(tab, 'the blade is away', () => globalThis.spherecut!.frame!.depth < -0.03);
   await tab.waitForTimeout(3000);
-  await tab.mouse.move(600, 600);
   await tab.evaluate(() => {
     const orbit = globalThis.spherecut!.view.orbit;
     orbit.turn(0, 0.35);
     orbit.zoom(1.9);
-    orbit.pan(0.1, -0.17);
+    orbit.pan(0.06, -0.13);
     globalThis.spherecut!.view.change();
   });
   await keep('wound');
   await tab.keyboard.press('n');
-  await tab.evaluate(() => globalThis.spherecut!.pickAtTip());
-  await tab.waitForTimeout(1500);
+  await hover(tab, -0.03, -0.004);
+  await tab.keyboard.press('p');
+  await until(tab, 'the supports of a node', () => /sees/.test(document.getElementById('support-state')!.textContent!));
+  await tab.keyboard.press('k');
+  await tab.waitForTimeout(2500);
   await keep('nodes');
   for (const key of ['n', 'o']) await tab.keyboard.press(key);
   await tab.selectOption('#slice', 'cut');
@@ -69,10 +78,15 @@ try {
   await context.close();
   const phone = await openPage(browser, served.address, { width: 390, height: 760, touch: true });
   await ready(phone.tab);
+  await phone.tab.getByText('Probe', { exact: true }).tap();
+  await phone.tab.waitForTimeout(2000);
   await phone.tab.tap('#view', { position: { x: 170, y: 300 } });
   await phone.tab.tap('#press-hold');
   await phone.tab.waitForTimeout(3500);
   await photograph(phone.tab, 'phone');
+} catch (error) {
+  console.error(served.said());
+  throw error;
 } finally {
   await browser.close();
   await served.stop();
