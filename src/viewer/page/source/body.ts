@@ -16,8 +16,8 @@ import { Part, type Scalars, type Topology, type Vec3 } from './protocol';
 import { castRay, frontEdges, type Hit, lipDistance, lipEdges, trianglesOf, vertexNormals } from './surface';
 
 const tissueColour = new Color('#9a4b45');
-const wallColour = new Color('#d6474c');
-const wallGlow = 0.12; // of their own: walls that face each other get little light
+const wallColour = new Color('#84191f');
+const wallGlow = 0.15; // of their own: walls that face each other get little light
 const lipColour = new Color('#ffe3c2');
 const frontColour = new Color('#ffd24d');
 const tableSize = 256;

@@ -100,6 +100,9 @@ export class Page {
         return this.begin(message);
       case 'holder':
         this.holder = message.id;
+        // Whoever comes to a free tool takes it; later it is taken by the button alone.
+        if (this.wantsTool && message.id === null) this.connection.send({ type: 'take' });
+        this.wantsTool = false;
         return this.showRole();
       case 'mode':
         this.stylus.setMode(message.mode);
@@ -141,7 +144,6 @@ export class Page {
     this.session = session;
     this.latency.clear();
     this.chart.clear();
-    this.pending = this.pending.filter((frame) => frame.epoch === session.epoch);
     this.scalars = this.nodes = this.support = this.slice = this.stages = null;
     byId('link').textContent = 'live';
     this.view.tool.setSession(session);
@@ -173,10 +175,6 @@ export class Page {
   }
 
   private showRole(): void {
-    if (this.holder === null && this.id >= 0 && this.wantsTool) {
-      this.wantsTool = false;
-      this.connection.send({ type: 'take' });
-    }
     this.stylus.holding = this.holding;
     this.panels.setHolding(this.holding);
     byId('role').textContent =

@@ -12,7 +12,6 @@ const [build = '.', source = '.'] = process.argv.slice(2);
 let served: Served;
 let browser: Browser;
 let first: Opened;
-let records = false; // the server makes recordings
 let pressed: Seen;
 
 before(async () => {
@@ -44,9 +43,7 @@ test('The page loads without a complaint and takes the tool', async () => {
 test('A press is felt, and the readout is the force of the frame', async () => {
   const { tab } = first;
   await tab.click('#record');
-  await until(tab, 'it records or says why not', () =>
-    document.getElementById('record')!.getAttribute('aria-pressed') === 'true' || document.querySelector('#messages [data-level=error]') !== null);
-  records = (await tab.getAttribute('#record', 'aria-pressed')) === 'true';
+  await until(tab, 'it records', () => document.getElementById('record')!.getAttribute('aria-pressed') === 'true');
   await hover(tab, -0.02, -0.01);
   await tab.mouse.down();
   await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
@@ -58,9 +55,8 @@ test('A press is felt, and the readout is the force of the frame', async () => {
   await until(tab, 'it has withdrawn', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
 });
 
-test('The readout is the force in the recording of the server at that tick', async (context) => {
+test('The readout is the force in the recording of the server at that tick', async () => {
   const { tab } = first;
-  if (!records) return context.skip('this server makes no recordings');
   await tab.click('#record');
   await until(tab, 'it has recorded', () => !(document.getElementById('download') as HTMLButtonElement).disabled);
   const [download] = await Promise.all([tab.waitForEvent('download'), tab.click('#download')]);
@@ -72,9 +68,8 @@ test('The readout is the force in the recording of the server at that tick', asy
   assert.ok(Math.abs(Math.hypot(...tick.force) - pressed.readout) < 6e-4, 'the force on the page is not that of the recording');
 });
 
-test('A recording is replayed, and the force comes back', async (context) => {
+test('A recording is replayed, and the force comes back', async () => {
   const { tab } = first;
-  if (!records) return context.skip('this server makes no recordings');
   await tab.click('#replay');
   await until(tab, 'the press is felt again', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03, 30);
   await tab.click('#replay');
@@ -87,7 +82,7 @@ test('A cut across the liver opens: the lips part in the geometry and in the pic
   await chooseMode(tab, '2', 'blade');
   await hover(tab, -0.055, 0.004);
   await stroke(tab, [[-0.055, 0.004], [0.01, 0.0]], 1.5);
-  await until(tab, 'the cut opens', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4, 60);
+  await until(tab, 'the cut opens', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4, 120);
   await tab.mouse.up();
   await tab.keyboard.press('k');
   await until(tab, 'the lips are drawn', () => {
@@ -169,8 +164,7 @@ test('Everything goes by keyboard', async () => {
   await tab.keyboard.down('.');
   await tab.waitForTimeout(600);
   await tab.keyboard.up('.');
-  await tab.waitForTimeout(600);
-  assert.ok((await look(tab)).depth > before.depth + 0.001, 'not deeper');
+  await tab.waitForFunction((depth) => globalThis.spherecut!.frame!.depth > depth + 0.001, before.depth, { timeout: 40_000 });
   await tab.keyboard.press('Escape');
   await until(tab, 'it withdraws', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
   await tab.keyboard.press('?');

@@ -44,7 +44,7 @@ export async function openPage(
 }
 
 /** Waits until `condition` holds in the page; says `what` when it does not in time. */
-export async function until(tab: Tab, what: string, condition: () => boolean, seconds = 20): Promise<void> {
+export async function until(tab: Tab, what: string, condition: () => boolean, seconds = 40): Promise<void> {
   try {
     await tab.waitForFunction(condition, undefined, { timeout: 1000 * seconds, polling: 50 });
   } catch (error) {
