@@ -199,6 +199,8 @@ HapticSettings haptics(const Section& section, const std::filesystem::path& scen
   else if (haptics.device == HeldDevice::recording)
     offences.add(section.line("device"), "haptics.device = \"recording\": which one is missing; allowed: beside "
                                          "haptics.recording = \"FILE\"");
+  const Section bridge = section.table("bridge");
+  haptics.bridge = {bridge.text("address"), static_cast<int>(bridge.integer("port")), bridge.number("timeout")};
   const Section limits = section.table("limits");
   haptics.limits = {limits.number("gain"),
                     limits.number("force"),

@@ -189,6 +189,11 @@ std::string text_of(const HapticFindings& f) {
                         f.error.ticks, f.error.rms, f.error.peak > 0 ? 100 * f.error.rms / f.error.peak : 0.0,
                         f.error.peak, f.error.largest);
   text += fmt::format("energy at the port: {:.3g} J put in by the hand, lowest {:.3g} J\n", f.energy, f.lowest_energy);
+  if (f.bridge)
+    text += fmt::format("bridge: {} poses of {} clients, {} of them fell silent; {} packets too old, {} garbage, {} of "
+                        "others; {} forces unsent\n",
+                        f.bridge->poses, f.bridge->clients, f.bridge->lost, f.bridge->old, f.bridge->garbage,
+                        f.bridge->others, f.bridge->unsent);
   text += fmt::format("time: ticks {:.3g} s, solves {:.3g} s, {} frames {:.3g} s, of {:.3g} s; {:.3g} s to prepare",
                       f.loop.haptic_cpu_seconds, f.loop.solve_seconds, f.loop.frames, f.loop.viewer_seconds,
                       f.loop.seconds, f.loop.prepare_seconds);
@@ -229,6 +234,10 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
         {"ticks", f.loop.haptic_cpu_seconds},
         {"solves", f.loop.solve_seconds},
         {"frames", f.loop.viewer_seconds}}}};
+  if (f.bridge)
+    json["bridge"] = {{"poses", f.bridge->poses},  {"clients", f.bridge->clients}, {"silent", f.bridge->lost},
+                      {"old", f.bridge->old},      {"garbage", f.bridge->garbage}, {"others", f.bridge->others},
+                      {"unsent", f.bridge->unsent}};
   replace_file(folder / "haptic.json", json.dump(2) + "\n");
 }
 

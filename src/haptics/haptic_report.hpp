@@ -1,6 +1,7 @@
 // Numbers of a haptic session, and the files that keep them.
 #pragma once
 
+#include "src/haptics/bridge_device.hpp"
 #include "src/haptics/realtime_loop.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
@@ -41,6 +42,7 @@ struct HapticFindings {
   double energy = 0, lowest_energy = 0; // J, at the port
   std::uint64_t failed = 0, resprinkled = 0, increments = 0, outside = 0, unconverged = 0, limited = 0;
   int highest_degradation = 0;
+  std::optional<BridgeCounters> bridge; // with that device
 };
 HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace spherecut::app {
@@ -40,6 +41,14 @@ enum class HeldDevice {
   script,    // follows the scenario's path whatever the force
   hand,      // mass, spring and damper on that path
   recording, // follows what a device did in a recorded session
+  bridge,    // whatever a client behind a socket holds
+};
+
+/// Where clients with real hardware find the loop (docs/haptic_bridge.md).
+struct BridgeSettings {
+  std::string address = "127.0.0.1"; // of this machine, IPv4, that the socket is bound to
+  int port = 27510;                  // 0: one that is free
+  double timeout = 0.1;              // s without a pose after which a client has gone
 };
 
 struct HapticSettings {
@@ -51,6 +60,7 @@ struct HapticSettings {
   double viewer_rate = 60; // frames per second at most
   HeldDevice device = HeldDevice::hand;
   std::filesystem::path recording; // of the device of that name
+  BridgeSettings bridge;
   DeviceLimits limits;
   HandSettings hand;
 };

@@ -63,6 +63,8 @@ std::unique_ptr<Device> make_device(const HapticSettings& settings, const Haptic
     return std::make_unique<ScriptedPath>(simulation.path(), settings.rate);
   case HeldDevice::recording:
     return std::make_unique<RecordedMotion>(read_recording(settings.recording), settings.rate);
+  case HeldDevice::bridge:
+    return std::make_unique<BridgeDevice>(settings.bridge, simulation.path().front(), settings.rate);
   case HeldDevice::hand:
     break;
   }
@@ -82,7 +84,10 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   const Scenario scenario = read_scenario(command.scenario);
   const HapticSettings& settings = scenario.haptics;
   HapticSimulation simulation(scenario);
+  if (command.in_virtual_time && settings.device == HeldDevice::bridge)
+    throw InputError("haptics.device = \"bridge\" cannot follow virtual time; allowed: without --virtual");
   const std::unique_ptr<Device> device = make_device(settings, simulation);
+  const auto* bridge = dynamic_cast<const BridgeDevice*>(device.get());
   claim_results_folder(command.out);
   Recorder recorder(command.out, simulation);
   RealtimeReport report;
@@ -97,6 +102,8 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
     report.stopped = records.ticks.size() < ticks;
   } else {
     say(fmt::format("{:g} s at {:g} ticks/s, model {}", command.duration, settings.rate, to_string(settings.model)));
+    if (bridge != nullptr)
+      say(fmt::format("bridge at {} port {}", settings.bridge.address, bridge->port()));
     RealtimeOptions options;
     options.stop = [&] { return watch.interrupted(); };
     recorder.listen(options);
@@ -104,6 +111,8 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   }
   recorder.finish(report.lost);
   HapticFindings findings = findings_of(settings, records, report);
+  if (bridge != nullptr)
+    findings.bridge = bridge->counters();
   std::vector<SolvedForce> solved;
   if (command.solved_stride > 0 && scenario.tool && !report.stopped) {
     say("solving off line for the error of the force model");

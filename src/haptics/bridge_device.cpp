@@ -1,0 +1,163 @@
+#include "src/haptics/bridge_device.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <arpa/inet.h>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <random>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace spherecut::app {
+namespace {
+
+constexpr int queue_bytes = 64 * 1024;      // of the system's queue: old poses are worth nothing
+constexpr std::size_t largest_packet = 128; // longer ones are cut off there, and garbage
+
+std::uint64_t next_token(std::uint64_t token) noexcept { // splitmix64
+  token += 0x9e3779b97f4a7c15U;
+  token = (token ^ (token >> 30U)) * 0xbf58476d1ce4e5b9U;
+  token = (token ^ (token >> 27U)) * 0x94d049bb133111ebU;
+  token ^= token >> 31U;
+  return token == 0 ? 1 : token;
+}
+
+} // namespace
+
+struct BridgeDevice::Socket {
+  int descriptor = -1;
+  sockaddr_in client{}; // that holds the tool
+  std::array<std::array<std::byte, largest_packet>, most_packets> bytes{};
+  std::array<sockaddr_in, most_packets> from{};
+  std::array<iovec, most_packets> parts{};
+  std::array<mmsghdr, most_packets> messages{};
+};
+
+BridgeDevice::BridgeDevice(const BridgeSettings& settings, const PathPose& waiting, double rate)
+    : socket_(std::make_unique<Socket>()), rate_(rate), timeout_(settings.timeout),
+      silence_(static_cast<std::uint64_t>(std::max(1.0, std::ceil(settings.timeout * rate)))) {
+  const auto fail = [&](const std::string& what) {
+    if (socket_->descriptor >= 0)
+      ::close(socket_->descriptor);
+    throw InputError(fmt::format("haptic bridge at {} port {}: {}", settings.address, settings.port, what));
+  };
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(settings.port));
+  if (inet_pton(AF_INET, settings.address.c_str(), &address.sin_addr) != 1)
+    fail("not an address; allowed: four numbers as in 127.0.0.1");
+  socket_->descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (socket_->descriptor < 0)
+    fail(std::strerror(errno));
+  ::setsockopt(socket_->descriptor, SOL_SOCKET, SO_RCVBUF, &queue_bytes, sizeof queue_bytes);
+  // The socket calls take any address as a sockaddr.
+  if (::bind(socket_->descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    fail(std::strerror(errno));
+  socklen_t size = sizeof address;
+  if (::getsockname(socket_->descriptor, reinterpret_cast<sockaddr*>(&address), &size) != 0)
+    fail(std::strerror(errno));
+  port_ = ntohs(address.sin_port);
+  for (std::size_t i = 0; i < most_packets; ++i) {
+    socket_->parts[i] = {socket_->bytes[i].data(), largest_packet};
+    socket_->messages[i].msg_hdr.msg_name = &socket_->from[i];
+    socket_->messages[i].msg_hdr.msg_iov = &socket_->parts[i];
+    socket_->messages[i].msg_hdr.msg_iovlen = 1;
+  }
+  std::random_device noise;
+  token_ = (static_cast<std::uint64_t>(noise()) << 32U) ^ noise();
+  state_.position = waiting.position;
+  state_.orientation = waiting.orientation;
+  state_.connected = false;
+}
+
+BridgeDevice::~BridgeDevice() {
+  ::close(socket_->descriptor);
+}
+
+void BridgeDevice::release() noexcept {
+  held_ = false;
+  state_.connected = false;
+  state_.buttons = 0;
+}
+
+void BridgeDevice::take(std::size_t packet) noexcept {
+  const mmsghdr& message = socket_->messages[packet];
+  const sockaddr_in& from = socket_->from[packet];
+  BridgeRequest request;
+  const std::size_t size = (message.msg_hdr.msg_flags & MSG_TRUNC) != 0 ? largest_packet : message.msg_len;
+  if (!read_packet(std::span<const std::byte>(socket_->bytes[packet].data(), size), request)) {
+    ++counters_.garbage;
+    return;
+  }
+  const bool holder =
+      held_ && from.sin_addr.s_addr == socket_->client.sin_addr.s_addr && from.sin_port == socket_->client.sin_port;
+  if (request.kind == BridgePacket::hello) {
+    if (held_ && !holder) {
+      ++counters_.others;
+      return;
+    }
+    if (!held_) {
+      ++counters_.clients;
+      held_ = true;
+      posed_ = false;
+      socket_->client = from;
+      token_ = next_token(token_);
+      heard_ = state_.tick;
+    }
+    return;
+  }
+  if (!holder || request.token != token_) {
+    ++counters_.others;
+    return;
+  }
+  if (request.kind == BridgePacket::goodbye) {
+    release();
+    return;
+  }
+  if (posed_ && request.sequence <= sequence_) {
+    ++counters_.old;
+    return;
+  }
+  ++counters_.poses;
+  posed_ = true;
+  sequence_ = request.sequence;
+  heard_ = state_.tick;
+  state_.position = request.position;
+  state_.orientation = request.orientation;
+  state_.mode = request.mode;
+  state_.buttons = request.buttons;
+  state_.connected = true;
+}
+
+DeviceState BridgeDevice::read(std::uint64_t tick) noexcept {
+  state_.tick = tick;
+  state_.time = static_cast<double>(tick) / rate_;
+  for (mmsghdr& message : socket_->messages)
+    message.msg_hdr.msg_namelen = sizeof(sockaddr_in);
+  const int count = ::recvmmsg(socket_->descriptor, socket_->messages.data(), most_packets, MSG_DONTWAIT, nullptr);
+  for (int i = 0; i < count; ++i)
+    take(static_cast<std::size_t>(i));
+  if (held_ && tick - heard_ >= silence_) {
+    ++counters_.lost;
+    release();
+  }
+  return state_;
+}
+
+void BridgeDevice::apply(const Vector3& force) noexcept {
+  if (!held_)
+    return;
+  std::array<std::byte, bridge_body> bytes{};
+  const std::size_t size =
+      write_packet(BridgeReply{token_, state_.tick, posed_ ? sequence_ : 0, force, state_.position, timeout_}, bytes);
+  if (::sendto(socket_->descriptor, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL,
+               reinterpret_cast<const sockaddr*>(&socket_->client), sizeof socket_->client) < 0)
+    ++counters_.unsent;
+}
+
+} // namespace spherecut::app

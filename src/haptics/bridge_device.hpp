@@ -1,0 +1,62 @@
+// A device behind a UDP socket: whoever owns the hardware runs a small client that sends its pose and gets the force
+// (docs/haptic_bridge.md).
+//
+// Chosen here: the haptic thread itself asks the socket, which never waits, and takes most_packets a tick at most. A
+// flood costs those and no more; what does not fit into the system's small queue is lost there. A thread of its own for
+// the socket would add its wake-up to every force.
+#pragma once
+
+#include "src/haptics/bridge_protocol.hpp"
+#include "src/haptics/device.hpp"
+
+#include <memory>
+
+namespace spherecut::app {
+
+/// What has come in.
+struct BridgeCounters {
+  std::uint64_t poses = 0;   // of the client that held the tool, taken
+  std::uint64_t old = 0;     // of that client, with a sequence that was not newer
+  std::uint64_t garbage = 0; // not a packet
+  std::uint64_t others = 0;  // of someone who did not hold the tool, or with a wrong token
+  std::uint64_t clients = 0; // that have held the tool
+  std::uint64_t lost = 0;    // clients that fell silent
+  std::uint64_t unsent = 0;  // forces that the system did not take
+};
+
+class BridgeDevice : public Device {
+ public:
+  static constexpr int most_packets = 16; // taken at a tick
+
+  /// Binds the socket. `waiting`: where the tool is until a client moves it. Throws InputError naming address, port and
+  /// the system's reason.
+  BridgeDevice(const BridgeSettings& settings, const PathPose& waiting, double rate);
+  ~BridgeDevice() override;
+  BridgeDevice(const BridgeDevice&) = delete;
+  BridgeDevice& operator=(const BridgeDevice&) = delete;
+
+  /// The newest pose of the client that holds the tool. Not connected: nobody does; the tool stays where it was.
+  DeviceState read(std::uint64_t tick) noexcept override;
+  /// Sends the force to that client.
+  void apply(const Vector3& force) noexcept override;
+
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  /// From the haptic thread, or after it has ended.
+  [[nodiscard]] const BridgeCounters& counters() const { return counters_; }
+
+ private:
+  struct Socket; // and what the system fills in, made once
+  void take(std::size_t packet) noexcept;
+  void release() noexcept;
+
+  std::unique_ptr<Socket> socket_;
+  double rate_, timeout_;
+  std::uint64_t silence_; // ticks after which a client is gone
+  std::uint16_t port_ = 0;
+  DeviceState state_;
+  bool held_ = false, posed_ = false; // by a client; which has sent a pose
+  std::uint64_t token_ = 0, sequence_ = 0, heard_ = 0;
+  BridgeCounters counters_;
+};
+
+} // namespace spherecut::app
