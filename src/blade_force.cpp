@@ -14,6 +14,8 @@ constexpr double least_increment = 0.2; // of the node spacing: no later cut is 
 constexpr double longer_proposal = 1.5; // how much farther the blade is when a longer cut is proposed instead
 constexpr double depth_factor = 2;      // of its depth in the body: how far a piece of the edge may push
 constexpr int entry_steps = 12;         // halvings towards the place where the edge entered
+constexpr double probe_share = 0.05;    // of the half width: a step along the way for the stiffness
+constexpr double due_reach = 3;         // node spacings ahead in which the next cut is looked for
 constexpr int stroke_parts = 4;         // over which the forces are taken to change evenly
 constexpr double lip_tolerance = 1e-6;  // m
 
@@ -349,6 +351,55 @@ solvers::Field BladeForce::field(const BodyModel& body) const {
 
 BladeReport BladeForce::report() const {
   return state_ ? report_of(*state_) : BladeReport{.ledger = ledger_};
+}
+
+// Stiffness and the force at which the next cut is due come from the blade moved on along the way of its edge.
+BladeGrip BladeForce::grip(const BodyModel& now) const {
+  BladeGrip grip;
+  grip.work = ledger_.work;
+  grip.surface = ledger_.surface;
+  if (!state_)
+    return grip;
+  const BladeReport here = report_of(*state_);
+  Vector3 way = Vector3::Zero();
+  for (const solvers::EdgeContact& contact : meeting_.patch.contacts)
+    way += contact.length * contact.push;
+  if (!(way.norm() > 0)) // pieces that are driven apart
+    return grip;
+  grip.along = here.edge_force > 0 ? Vector3(-state_->edge_force / here.edge_force) : way.normalized();
+  grip.contacts = static_cast<int>(meeting_.pieces.size());
+  grip.force = state_->blade_force;
+  grip.edge = here.edge_force;
+  grip.drag = state_->blade_force - state_->edge_force;
+  grip.stored = state_->stored;
+  grip.release = here.release;
+  const double friction = meeting_.patch.dragged ? 1 : 0;
+  const auto onward = [&](const Meeting& meeting, const VectorX& from, double distance) {
+    VectorX to = from;
+    for (Eigen::Index c = 0; c < to.size(); ++c)
+      to[c] += distance * meeting.patch.contacts[static_cast<std::size_t>(c)].push.dot(grip.along);
+    return to;
+  };
+  const double probe = probe_share * half_width_;
+  const auto edge_after = [&](double distance) {
+    return solvers::push_blade(meeting_.patch, onward(meeting_, state_->advance, distance), friction).edge_force;
+  };
+  grip.stiffness = std::max(0.0, (-edge_after(probe).dot(grip.along) - grip.edge) / probe);
+  if (proposal_ && !proposal_->meeting.pieces.empty()) {
+    const double reach = due_reach * spacing_;
+    const VectorX coming = advances(proposal_->meeting, proposal_->body, at_);
+    if (const auto share =
+            solvers::cutting_share(meeting_.patch, {state_->advance, onward(meeting_, state_->advance, reach)},
+                                   proposal_->meeting.patch, {coming, onward(proposal_->meeting, coming, reach)},
+                                   needed() * (proposal_->meeting.area - meeting_.area), friction))
+      grip.due = std::max(grip.edge, -edge_after(*share * reach).dot(grip.along));
+  } else if (now.incision != nullptr && !first_cut(*state_)) {
+    double length = 0;
+    for (const solvers::EdgeContact& contact : meeting_.patch.contacts)
+      length += contact.length;
+    grip.due = std::max(grip.edge, needed() * length);
+  }
+  return grip;
 }
 
 BladeReport BladeForce::report_of(const solvers::BladeState& state) const {

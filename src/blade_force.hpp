@@ -7,6 +7,7 @@
 #pragma once
 
 #include "solvers/blade_contact.hpp"
+#include "src/blade_grip.hpp"
 #include "src/body_model.hpp"
 #include "topology/blade.hpp"
 
@@ -68,6 +69,8 @@ class BladeForce {
   /// Field of the body under the blade; `body.field` where it does not press.
   [[nodiscard]] solvers::Field field(const BodyModel& body) const;
   [[nodiscard]] BladeReport report() const;
+  /// How the force goes on from here, on the body `now` that it was left in.
+  [[nodiscard]] BladeGrip grip(const BodyModel& now) const;
 
  private:
   struct EdgePiece {

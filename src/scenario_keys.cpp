@@ -407,7 +407,9 @@ constexpr std::array keys = {
     ScenarioKey{"haptics.limits.force", number, "N", "3.3", "Largest force.", above(0, 1000)},
     ScenarioKey{"haptics.limits.slew", number, "N/s", "500.0", "Fastest change of the force.", above(0, 1e6)},
     ScenarioKey{"haptics.limits.stiffness", number, "N/m", "1000.0",
-                "Stiffest contact that the device renders steadily, as stated. Nothing reads it yet.", above(0, 1e6)},
+                "Stiffest contact that the device renders steadily; with the controller on, a stiffer one is rendered "
+                "as stiff as that.",
+                above(0, 1e6)},
     ScenarioKey{"haptics.limits.damping", number, "N s/m", "5.0", "Most damping that the controller adds.",
                 from(0, 1000)},
     ScenarioKey{"haptics.limits.resolution", number, "m", "5.5e-5", "Step of the position sensor.", from(0, 0.01)},

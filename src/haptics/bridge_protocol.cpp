@@ -88,7 +88,7 @@ bool read_packet(std::span<const std::byte> bytes, BridgeRequest& request) noexc
   request.buttons = in.get<std::uint16_t>();
   const double length = request.orientation.norm();
   if (!(request.position.cwiseAbs().maxCoeff() <= bridge_farthest) || !request.position.allFinite() ||
-      !(std::abs(length - 1) < 1e-3))
+      !(std::abs(length - 1) < 1e-3) || request.mode > bridge_last_mode)
     return false;
   request.orientation.coeffs() /= length;
   return true;

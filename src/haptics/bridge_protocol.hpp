@@ -15,6 +15,7 @@ namespace spherecut::app {
 inline constexpr std::uint16_t bridge_version = 1;
 inline constexpr std::size_t bridge_head = 16, bridge_body = 88; // bytes: hello and goodbye; pose and force
 inline constexpr double bridge_farthest = 10;                    // m, of a coordinate of a pose
+inline constexpr std::uint16_t bridge_last_mode = 3;             // HandMode::grasper
 
 enum class BridgePacket : std::uint16_t { hello = 1, pose = 2, goodbye = 3, force = 4 };
 

@@ -13,6 +13,7 @@ ContactSnapshot::ContactSnapshot()
 void clear(ContactSnapshot& snapshot) {
   snapshot.count = 0;
   snapshot.force.setZero();
+  snapshot.blade = {};
   snapshot.asymmetry = 0;
   snapshot.reach = 0;
   snapshot.rest_sum = 0;
@@ -33,6 +34,7 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
     chosen.resize(most_candidates);
     std::sort(chosen.begin(), chosen.end());
   }
+  snapshot.blade = {};
   snapshot.count = static_cast<int>(chosen.size());
   snapshot.contact = contact;
   snapshot.condition = condition;

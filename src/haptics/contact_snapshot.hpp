@@ -3,6 +3,7 @@
 #pragma once
 
 #include "solvers/contact_solver.hpp"
+#include "src/blade_grip.hpp"
 #include "topology/contact.hpp"
 
 #include <cstdint>
@@ -41,6 +42,8 @@ struct ContactSnapshot {
   double asymmetry = 0;                    // |C - C^T| / |C + C^T| of the compliance before it was made symmetric
   double rest_sum = 0, compliance_sum = 0; // of all entries: equal sums mean the same candidates, the same body
   double reach = 0;                        // m, of the candidates about the contact's point
+
+  BladeGrip blade; // of a blade that the tissue resists, in the hand; `pose.point` is then that of its frame
 
   bool resprinkled = false;   // the nodes have followed the tool since the last snapshot
   int cut_triangles = 0;      // added to the cut since the last snapshot

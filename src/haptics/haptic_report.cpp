@@ -52,13 +52,16 @@ void write_ticks(const std::filesystem::path& file, const LoopRecords& records,
 void write_solves(const std::filesystem::path& file, const std::vector<SolveRecord>& solves) {
   OutputFile out(file);
   std::string text = "sequence,pose_tick,arrival_tick,degradation,failed,resprinkled,cut_triangles,nodes,candidates,"
-                     "active,asymmetry,force_N,seconds\n";
+                     "active,asymmetry,force_N,cut_area_m2,blade_N,edge_N,release_J_m2,edge_pieces,work_J,surface_J,"
+                     "seconds\n";
   for (const SolveRecord& solve : solves)
     text += fmt::format(
-        "{},{},{},{},{:d},{:d},{},{},{},{},{:.3g},{:.6g},{:.6g}\n", solve.event.sequence, solve.event.pose_tick,
+        "{},{},{},{},{:d},{:d},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{:.6g}\n",
+        solve.event.sequence, solve.event.pose_tick,
         solve.event.arrival_tick == SolveEvent::never ? "" : fmt::format("{}", solve.event.arrival_tick),
         solve.event.degradation, solve.failed, solve.resprinkled, solve.cut_triangles, solve.nodes, solve.candidates,
-        solve.active, solve.asymmetry, solve.force.norm(), solve.seconds);
+        solve.active, solve.asymmetry, solve.force.norm(), solve.cut_area, solve.blade_force.norm(), solve.blade_edge,
+        solve.blade_release, solve.blade_contacts, solve.blade_work, solve.blade_surface, solve.seconds);
   out.write(text);
   out.close();
 }
@@ -149,11 +152,18 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
     findings.outside += tick.outside ? 1 : 0;
     findings.unconverged += tick.converged ? 0 : 1;
     findings.limited += tick.limited ? 1 : 0;
+    findings.softened += tick.softened < 1 ? 1 : 0;
   }
   for (const SolveRecord& record : records.solves) {
     findings.failed += record.failed ? 1 : 0;
     findings.resprinkled += record.resprinkled ? 1 : 0;
     findings.increments += record.cut_triangles > 0 ? 1 : 0;
+    findings.blade_peak = std::max(findings.blade_peak, record.blade_force.norm());
+    if (!record.failed) {
+      findings.blade_work = record.blade_work;
+      findings.blade_surface = record.blade_surface;
+      findings.cut_area = record.cut_area;
+    }
     findings.highest_degradation = std::max(findings.highest_degradation, record.event.degradation);
     if (!record.failed)
       solve.push_back(record.seconds);
@@ -181,8 +191,11 @@ std::string text_of(const HapticFindings& f) {
   text += fmt::format("force: peak {:.4g} N; largest step in a tick {:.3g} N (at hand-overs {:.3g}, onset {:.3g}, cut "
                       "increments {:.3g} N)\n",
                       f.peak, f.steps.any, f.steps.hand_over, f.steps.onset, f.steps.cut);
-  text += fmt::format("  {} ticks limited, {} with the contact beyond the patch, {} not converged\n", f.limited,
-                      f.outside, f.unconverged);
+  text += fmt::format("  {} ticks limited, {} softened, {} with the contact beyond the patch, {} not converged\n",
+                      f.limited, f.softened, f.outside, f.unconverged);
+  if (f.blade_work > 0)
+    text += fmt::format("blade: peak {:.4g} N; {:.3g} mJ, {:.3g} mJ of it on new surface; cut of {:.4g} cm2\n",
+                        f.blade_peak, 1e3 * f.blade_work, 1e3 * f.blade_surface, 1e4 * f.cut_area);
   if (f.error.ticks > 0)
     text += fmt::format("  against the solved force at {} ticks: RMS {:.3g} N = {:.2f} % of the peak {:.4g} N, largest "
                         "{:.3g} N\n",
@@ -225,7 +238,10 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
       {"model_error_N",
        {{"rms", f.error.rms}, {"largest", f.error.largest}, {"solved_peak", f.error.peak}, {"ticks", f.error.ticks}}},
       {"port_energy_J", {{"end", f.energy}, {"lowest", f.lowest_energy}}},
+      {"blade", {{"peak_N", f.blade_peak}, {"work_J", f.blade_work}, {"surface_J", f.blade_surface}}},
+      {"cut_area_m2", f.cut_area},
       {"ticks_limited", f.limited},
+      {"ticks_softened", f.softened},
       {"ticks_outside", f.outside},
       {"ticks_unconverged", f.unconverged},
       {"seconds",

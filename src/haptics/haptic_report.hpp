@@ -41,6 +41,10 @@ struct HapticFindings {
   double peak = 0;                      // N, on the hand
   double energy = 0, lowest_energy = 0; // J, at the port
   std::uint64_t failed = 0, resprinkled = 0, increments = 0, outside = 0, unconverged = 0, limited = 0;
+  std::uint64_t softened = 0;               // ticks
+  double blade_peak = 0;                    // N, of the solves
+  double blade_work = 0, blade_surface = 0; // J
+  double cut_area = 0;                      // m2
   int highest_degradation = 0;
   std::optional<BridgeCounters> bridge; // with that device
 };

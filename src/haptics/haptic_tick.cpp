@@ -6,11 +6,17 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double rim = 0.8; // of the candidates' reach: a contact beyond it takes the patch along
+constexpr double softening = 50; // per second, at most, by which the rendered share of the force falls
+constexpr double hardening = 2;  // the same as it rises
+constexpr double rim = 0.8;      // of the candidates' reach: a contact beyond it takes the patch along
 
-// A blade's force is that of the last solve, held: what it cuts next is not known before it is solved.
+// A grasper's force is that of the last solve, held.
 bool holds_force(const DeviceState& device) {
-  return device.mode >= static_cast<std::uint16_t>(HandMode::blade);
+  return device.mode >= static_cast<std::uint16_t>(HandMode::grasper);
+}
+
+bool follows_surface(const DeviceState& device) {
+  return device.mode < static_cast<std::uint16_t>(HandMode::blade);
 }
 
 } // namespace
@@ -36,7 +42,7 @@ void HapticTick::start(const DeviceState& device) {
 }
 
 void HapticTick::locate(const DeviceState& device) noexcept {
-  if (organ_ == nullptr || located_ == device.tick + 1 || holds_force(device))
+  if (organ_ == nullptr || located_ == device.tick + 1 || !follows_surface(device))
     return;
   const topology::ToolPose pose = tool_pose(tool_, device);
   contact_ = organ_->walk(tool_, pose, contact_);
@@ -61,7 +67,8 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
     return held;
   }
   topology::ToolPose pose = tool_pose(tool_, device);
-  if (organ_ != nullptr && snapshot_ != nullptr && snapshot_->count > 0 && contact_.depth > 0) {
+  if (follows_surface(device) && organ_ != nullptr && snapshot_ != nullptr && snapshot_->count > 0 &&
+      contact_.depth > 0) {
     Vector3 away = contact_.point - snapshot_->contact.point;
     away -= away.dot(contact_.normal) * contact_.normal;
     const double distance = away.norm();
@@ -73,8 +80,18 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
   return model_->at(pose, device.time);
 }
 
+// With the controller on, a contact stiffer than the device renders steadily is rendered as stiff as that: by a share
+// of its force, which falls faster than it rises.
+void HapticTick::soften(const ModelForce& model) noexcept {
+  if (!settings_.passivity || !(model.force.squaredNorm() > 0))
+    return;
+  const double stiffness = settings_.limits.gain * model.stiffness;
+  const double share = stiffness > settings_.limits.stiffness ? settings_.limits.stiffness / stiffness : 1;
+  softened_ += std::clamp(share - softened_, -softening / settings_.rate, hardening / settings_.rate);
+}
+
 void HapticTick::arrive(const ContactSnapshot& snapshot) noexcept {
-  arrived_ = !model_->solved(snapshot) || snapshot.mode >= static_cast<std::uint16_t>(HandMode::blade) || arrived_;
+  arrived_ = !model_->solved(snapshot) || snapshot.mode >= static_cast<std::uint16_t>(HandMode::grasper) || arrived_;
   fresh_ = true;
   snapshot_ = &snapshot;
 }
@@ -98,10 +115,13 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   last_model_ = result.model.force;
   result.tissue = result.model.force + difference_;
   const DeviceLimits& limits = settings_.limits;
+  soften(result.model);
+  result.softened = softened_;
+  const double gain = softened_ * limits.gain;
   std::optional<double> stored = result.model.stored;
   if (stored)
-    *stored *= limits.gain;
-  Vector3 force = passivity_.control(device.position, limits.gain * result.tissue, stored);
+    *stored *= gain;
+  Vector3 force = passivity_.control(device.position, gain * result.tissue, stored);
   if (!device.connected)
     force.setZero();
   if (const double size = force.norm(); size > limits.force) {

@@ -20,6 +20,7 @@ struct TickResult {
   topology::SurfaceContact contact; // deepest point on the surface at rest
   std::uint64_t sequence = 0;       // of the snapshot in use
   double energy = 0;                // J, put in by the hand so far
+  double softened = 1;              // share of the force that is rendered, for the device's stiffness
   bool limited = false;             // by saturation or slew
   bool outside = false;             // the contact has left the candidates of the snapshot
 };
@@ -29,8 +30,8 @@ struct TickResult {
 ///
 /// At a new snapshot the force goes on from where the old one would have had it, by its last two ticks: the difference
 /// is added and fades linearly within HapticSettings::hand_over. When the contact leaves the candidates, the patch is
-/// taken along with the tool: the model is asked as if the tool were still at their rim. Of a blade or grasper the
-/// force is that of the last solve; just after the hand has changed what it holds there is none. A device that does not
+/// taken along with the tool: the model is asked as if the tool were still at their rim. Of a grasper the force is
+/// that of the last solve; just after the hand has changed what it holds there is none. A device that does not
 /// answer brings the force to zero at the slew limit.
 class HapticTick {
  public:
@@ -47,6 +48,7 @@ class HapticTick {
  private:
   [[nodiscard]] ModelForce ask(const DeviceState& device, bool& outside) noexcept;
   void locate(const DeviceState& device) noexcept;
+  void soften(const ModelForce& model) noexcept;
 
   HapticSettings settings_;
   const topology::ToolShape& tool_;
@@ -61,6 +63,7 @@ class HapticTick {
   Vector3 last_model_ = Vector3::Zero(), model_before_ = Vector3::Zero(); // N, of the last two ticks
   Vector3 difference_ = Vector3::Zero();                                  // N, still to fade
   Vector3 fading_ = Vector3::Zero();                                      // N, per tick
+  double softened_ = 1;
   Vector3 sent_ = Vector3::Zero();
 };
 

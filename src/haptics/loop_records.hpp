@@ -17,6 +17,7 @@ struct TickRecord {
   std::uint64_t sequence = 0;       // of the snapshot in use
   bool arrived = false;             // it came at this tick
   bool limited = false, outside = false, converged = true;
+  double softened = 1; // share of the force that was rendered, for the device's stiffness
   int active = 0, rounds = 0;
   double latency = 0; // s, from when the tick was due to when it began; 0 in virtual time
   double compute = 0; // s of the thread's processor time; 0 in virtual time
@@ -38,10 +39,15 @@ struct SolveRecord {
   std::string reason; // of the failure
   bool resprinkled = false;
   int cut_triangles = 0, nodes = 0, candidates = 0, active = 0;
-  std::uint64_t topology = 0;      // of cut surface and nodes, as ContactSnapshot::topology
-  double asymmetry = 0;            // of the compliance
-  Vector3 force = Vector3::Zero(); // N, of the solve
-  double seconds = 0;              // wall clock
+  std::uint64_t topology = 0;               // of cut surface and nodes, as ContactSnapshot::topology
+  double asymmetry = 0;                     // of the compliance
+  Vector3 blade_force = Vector3::Zero();    // N, on a blade that the tissue resists, in the hand or beside it
+  double blade_edge = 0, blade_release = 0; // N, of its edge alone; J/m2, of that on the front
+  double blade_work = 0, blade_surface = 0; // J since the start: all, and on new surface
+  int blade_contacts = 0;                   // pieces of the edge that press
+  double cut_area = 0;                      // m2
+  Vector3 force = Vector3::Zero();          // N, of the solve
+  double seconds = 0;                       // wall clock
 };
 
 struct LoopRecords {

@@ -114,7 +114,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   if (bridge != nullptr)
     findings.bridge = bridge->counters();
   std::vector<SolvedForce> solved;
-  if (command.solved_stride > 0 && scenario.tool && !report.stopped) {
+  if (command.solved_stride > 0 && (scenario.tool || simulation.session().blade() != nullptr) && !report.stopped) {
     say("solving off line for the error of the force model");
     HapticSimulation again(scenario);
     solved = solve_recorded(again, records.ticks, static_cast<std::uint64_t>(command.solved_stride));

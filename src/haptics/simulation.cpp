@@ -85,6 +85,10 @@ StepSample HapticSimulation::sample(const DeviceState& device) const {
   return sample;
 }
 
+bool HapticSimulation::holds_blade() const {
+  return mode_ == HandMode::blade || (mode_ == HandMode::usual && !session_.scenario().tool);
+}
+
 std::optional<topology::ToolPose> HapticSimulation::parked_tool() const {
   const Scenario& scenario = session_.scenario();
   if (!scenario.tool)
@@ -129,10 +133,13 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
     else
       fill(model.patch, model.state->tool, result_.contact, condition, snapshot);
   }
-  if (mode_ == HandMode::blade) {
+  if (holds_blade()) {
     clear(snapshot);
-    if (session_.blade() != nullptr)
-      snapshot.force = result_.cut->blade.force;
+    snapshot.pose.point = device.position;
+    if (session_.blade() != nullptr) {
+      snapshot.blade = session_.blade()->grip(model);
+      snapshot.force = snapshot.blade.force;
+    }
   }
   snapshot.pose_tick = device.tick;
   snapshot.mode = device.mode;
@@ -162,7 +169,17 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     return failed(error);
   }
   snapshot.sequence = event.sequence;
-  return record_of(event, snapshot);
+  SolveRecord record = record_of(event, snapshot);
+  if (const auto& cut = simulation.result().cut) {
+    record.cut_area = cut->area;
+    record.blade_force = cut->blade.force;
+    record.blade_edge = cut->blade.edge_force;
+    record.blade_release = cut->blade.release;
+    record.blade_contacts = cut->blade.contacts;
+    record.blade_work = cut->blade.ledger.work;
+    record.blade_surface = cut->blade.ledger.surface;
+  }
+  return record;
 }
 
 } // namespace spherecut::app

@@ -45,6 +45,8 @@ class HapticSimulation {
   [[nodiscard]] const StepResult& result() const { return result_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const topology::ToolShape& tool() const;
+  /// Whether the device held the blade in the last solve.
+  [[nodiscard]] bool holds_blade() const;
   [[nodiscard]] std::vector<PathPose> path() const { return driven_path(session_.steps()); }
   /// Where the tool is while the hand holds something else: away from the organ, on the line through the start of its
   /// way. Nothing in a scenario without a tool.

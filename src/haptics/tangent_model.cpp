@@ -80,6 +80,7 @@ std::span<const Vector3> TangentModel::normals() const {
 bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
   const bool same_places = count_ == snapshot.count && rest_sum_ == snapshot.rest_sum;
   const bool same_body = same_places && compliance_sum_ == snapshot.compliance_sum;
+  const bool bladed = blade_.solved(snapshot);
   const bool bonded = snapshot.condition == solvers::ContactCondition::bonded;
   snapshot_ = &snapshot;
   count_ = snapshot.count;
@@ -88,7 +89,7 @@ bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
   travelled_ = 0;
   clearance_.fill(0);
   if (bonded ? same_body : same_places)
-    return same_body; // what has been found since is nearer to the tool's place now than the solve
+    return same_body && !bladed; // what has been found since is nearer to the tool's place now than the solve
   pose_ = snapshot.pose;
   chosen_count_ = 0;
   for (int c = 0; c < snapshot.count; ++c) {
@@ -105,6 +106,8 @@ bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
 }
 
 ModelForce TangentModel::at(const topology::ToolPose& pose, double /*time*/) noexcept {
+  if (blade_.pressing())
+    return blade_.at(pose.point);
   if (snapshot_ == nullptr || snapshot_->count == 0)
     return {.stored = 0.0};
   return snapshot_->condition == solvers::ContactCondition::bonded ? follow(pose) : press(pose);
@@ -160,6 +163,27 @@ bool TangentModel::solve_active() noexcept {
     pressure_[chosen_[a]] = right_[a];
   }
   return true;
+}
+
+// Of the contact as it stands against a motion of the tool along the force on it: v^T A^-1 v = |L^-1 v|^2, with the
+// factor L of the active block and what each of its gaps (bonded: its three displacements) changes by per metre.
+double TangentModel::stiffness_along(const Vector3& force) noexcept {
+  const double size = force.norm();
+  if (!(size > 0))
+    return 0;
+  const Vector3 way = force / size;
+  const bool bonded = snapshot_->condition == solvers::ContactCondition::bonded;
+  const int rows = bonded ? 3 * chosen_count_ : chosen_count_;
+  double sum = 0;
+  for (int r = 0; r < rows; ++r) {
+    const auto row = static_cast<std::size_t>(r);
+    double value = bonded ? way[r % 3] : normal_[chosen_[r]].dot(way);
+    for (std::size_t k = 0; k < row; ++k) // bonded: the factor lies by rows
+      value -= (bonded ? factor_[row * ld + k] : factor_[k * most_candidates + row]) * right_[k];
+    right_[row] = value / factor_[row * (bonded ? ld : most_candidates) + row];
+    sum += right_[r] * right_[r];
+  }
+  return sum;
 }
 
 // Displacements under the forces: `moved_` = b + C f.
@@ -288,6 +312,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     }
   }
   result.stored = stored;
+  result.stiffness = stiffness_along(result.force);
   for (int k = 0; k < near_count_; ++k) {
     const int c = near_[k];
     result.sinking = std::max(result.sinking, -(gap_[c] + normal_[c].dot(moved_[c] - snapshot_->base[c])));
@@ -373,6 +398,7 @@ ModelForce TangentModel::follow(const topology::ToolPose& pose) noexcept {
   }
   result.active = chosen_count_;
   result.stored = stored;
+  result.stiffness = stiffness_along(result.force);
   pose_ = pose;
   return result;
 }

@@ -2,7 +2,7 @@
 // tick with the tool where it is now.
 #pragma once
 
-#include "src/haptics/force_model.hpp"
+#include "src/haptics/blade_model.hpp"
 
 #include "solvers/tool_gap.hpp"
 
@@ -13,7 +13,8 @@ namespace spherecut::app {
 
 /// While the body behind the snapshot stands, this is the solve itself in fewer rounds, warm from the last tick: onset,
 /// spreading, sliding and loss of contact are followed; a bonded contact goes with the tool and catches what the tool
-/// overtakes. Rounds and pivots have a fixed budget; what is left over continues in the next tick.
+/// overtakes. A blade in the hand follows the condensed contact of its edge (blade_model.hpp). Rounds and pivots have a
+/// fixed budget; what is left over continues in the next tick.
 class TangentModel : public ForceModel {
  public:
   explicit TangentModel(const topology::ToolShape& tool);
@@ -28,12 +29,14 @@ class TangentModel : public ForceModel {
   ModelForce follow(const topology::ToolPose& pose) noexcept;
   [[nodiscard]] bool solve_active() noexcept;
   void displace() noexcept;
+  [[nodiscard]] double stiffness_along(const Vector3& force) noexcept;
   void look_around(const solvers::PressingTool& tool) noexcept;
   [[nodiscard]] bool catch_node(int candidate) noexcept;
   [[nodiscard]] std::span<const Vector3> rest() const;
   [[nodiscard]] std::span<const Vector3> normals() const;
 
   const topology::ToolShape& tool_;
+  BladeModel blade_;
   const ContactSnapshot* snapshot_ = nullptr;
   topology::ToolPose pose_;            // of the last tick
   PerCandidate<Vector3> displacement_; // m, of the candidates

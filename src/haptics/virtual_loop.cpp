@@ -71,6 +71,7 @@ TickRecord record_of(const DeviceState& device, const TickResult& result, bool a
   record.sequence = result.sequence;
   record.arrived = arrived;
   record.limited = result.limited;
+  record.softened = result.softened;
   record.outside = result.outside;
   record.converged = result.model.converged;
   record.active = result.model.active;
@@ -161,8 +162,8 @@ std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std:
     if (i == 0)
       simulation.prepare(ticks[0].device);
     simulation.solve(ticks[i].device, 0, snapshot);
-    forces.push_back({ticks[i].device.tick, simulation.result().force, simulation.result().resprinkled,
-                      snapshot.cut_triangles, simulation.result().active_nodes});
+    forces.push_back({ticks[i].device.tick, snapshot.force, simulation.result().resprinkled, snapshot.cut_triangles,
+                      simulation.result().active_nodes});
   }
   return forces;
 }

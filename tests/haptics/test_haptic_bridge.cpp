@@ -260,6 +260,7 @@ TEST_CASE("When the client vanishes, the force goes to zero at the slew limit an
   HapticTick core(settings, tool, nullptr);
   ContactSnapshot snapshot;
   snapshot.sequence = 1;
+  snapshot.mode = 1; // as the client says
   snapshot.force = {0, 0, 1};
   core.arrive(snapshot);
   Client client(device.port());

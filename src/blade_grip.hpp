@@ -1,0 +1,25 @@
+// A blade in the tissue between two solves, as far as its force follows from the last one.
+#pragma once
+
+#include "topology/types.hpp"
+
+#include <limits>
+
+namespace spherecut::app {
+
+/// While the edge sticks, its force rises by the condensed stiffness of its own contact; it does not pull; and from the
+/// force at which the next cut is due it cuts on at that force. The flanks drag on their own.
+struct BladeGrip {
+  int contacts = 0;                 // pieces of the edge that stand against the body; 0: the blade is free
+  Vector3 force = Vector3::Zero();  // N, on the blade where it was solved: edge and flanks
+  Vector3 along = Vector3::UnitZ(); // unit, the way of the edge; its force is against it
+  double edge = 0;                  // N, of the edge against its way
+  double stiffness = 0;             // N/m, by which that rises as the blade goes along its way
+  double due = std::numeric_limits<double>::infinity(); // N, of the edge, at which it cuts on
+  Vector3 drag = Vector3::Zero();                       // N, of the flanks on the blade as it goes along
+  double stored = 0;                                    // J, elastic, behind the force
+  double release = 0;                                   // J/m2, of the edge's force on the front that it presses
+  double work = 0, surface = 0;                         // J, of the blade since the start, and of it on new surface
+};
+
+} // namespace spherecut::app

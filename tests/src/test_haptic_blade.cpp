@@ -1,0 +1,150 @@
+// A blade in the hand: its force between solves, continuity while it indents and cuts, and a device's stiffness.
+#include "src/haptics/blade_model.hpp"
+#include "src/haptics/haptic_tick.hpp"
+#include "src/haptics/virtual_loop.hpp"
+
+#include "tests/src/scenario_text.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <fstream>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using spherecut::tests::cut_block;
+using spherecut::tests::replaced;
+using spherecut::tests::TemporaryFolder;
+
+namespace {
+
+/// The block of 60 mm under a blade as wide as it, on a way straight down.
+Scenario blade_down(double toughness) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "s.toml")
+      << replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = " + std::to_string(toughness))
+      << "[cut]\nfront_spacing = 0.004\n[blade]\nedge = [[0, -0.04, 0], [0, 0.04, 0]]\nstep = 0.1\n"
+         "[[blade.path]]\ntime = 0\nposition = [0.004, 0, 0.031]\n[[blade.path]]\ntime = 0.3\nposition = [0.003, 0, "
+         "0.013]\n";
+  return read_scenario(folder.path() / "s.toml");
+}
+
+DeviceState at_height(std::uint64_t tick, double z) {
+  return {tick, 1e-3 * static_cast<double>(tick), {0.004, 0, z}, Eigen::Quaterniond::Identity(), true};
+}
+
+ContactSnapshot edge_of(double stiffness) {
+  ContactSnapshot snapshot;
+  snapshot.sequence = 1;
+  snapshot.blade.contacts = 3;
+  snapshot.blade.along = -Vector3::UnitZ();
+  snapshot.blade.edge = 1;
+  snapshot.blade.stiffness = stiffness;
+  snapshot.blade.due = 1.2;
+  snapshot.blade.drag = {0, 0, 0.1};
+  snapshot.blade.force = {0, 0, 1.1};
+  return snapshot;
+}
+
+} // namespace
+
+TEST_CASE("A blade's edge sticks with its stiffness, cuts on at the force that is due, and does not pull") {
+  BladeModel model;
+  CHECK(model.solved(edge_of(1000)));
+  CHECK(model.at({0, 0, 0}).force.z() == Approx(1.1));
+  CHECK(model.at({0, 0, -1e-4}).force.z() == Approx(1.2)); // 0.1 N stiffer
+  CHECK(model.at({0, 0, -1e-3}).force.z() == Approx(1.3)); // due
+  CHECK(model.at({5e-3, 0, -1e-3}).force.z() == Approx(1.3));
+  const double back = model.at({0, 0, -1e-3 + 1e-4}).force.z();
+  CHECK(back < 1.3); // the drag begins to turn over
+  CHECK(model.at({0, 0, 2e-3}).force.z() == Approx(-0.1));
+  CHECK(*model.at({0, 0, 2e-3}).stored >= 0);
+  ContactSnapshot free;
+  CHECK(model.solved(free)); // it has come out
+  CHECK(model.at({0, 0, 0}).force.norm() == 0);
+  CHECK_FALSE(model.solved(free));
+}
+
+TEST_CASE("While the edge sticks, its force between solves is that of a solve") {
+  HapticSimulation simulation(blade_down(1e4)); // far too tough to cut
+  simulation.prepare(at_height(0, 0.031));
+  ContactSnapshot snapshot;
+  std::uint64_t tick = 0;
+  for (const double z : {0.031, 0.0302, 0.0290})
+    simulation.solve(at_height(tick++, z), 0, snapshot);
+  REQUIRE(snapshot.blade.contacts > 0);
+  CHECK(snapshot.count == 0);
+  BladeModel model;
+  REQUIRE(model.solved(snapshot));
+  CHECK(model.at({0.004, 0, 0.0290}).force == snapshot.force);
+  for (const double z : {0.0288, 0.0284, 0.0292}) {
+    const ModelForce between = model.at({0.004, 0, z});
+    ContactSnapshot there;
+    simulation.solve(at_height(tick++, z), 0, there);
+    CHECK(there.force.z() > 0);
+    CHECK((between.force - there.force).norm() < 0.02 * there.force.norm());
+    CHECK(between.stiffness == Approx(snapshot.blade.stiffness));
+  }
+}
+
+TEST_CASE("The hand feels a blade indent and cut at toughness times width, without steps") {
+  const Scenario scenario = blade_down(10);
+  HapticSettings settings;
+  HapticSimulation simulation(scenario);
+  ScriptedPath device(simulation.path(), settings.rate);
+  const std::uint64_t ticks = 300;
+  const LoopRecords records = run_virtual(settings, simulation, device, regular_solves(ticks, 10, 10), ticks);
+  double peak = 0;
+  double largest_step = 0;
+  double late = 0;
+  double area = 0;
+  for (std::size_t i = 1; i < records.ticks.size(); ++i) {
+    const Vector3& force = records.ticks[i].force;
+    peak = std::max(peak, force.norm());
+    largest_step = std::max(largest_step, (force - records.ticks[i - 1].force).norm());
+    if (i >= 225)
+      late += force.norm() / 75;
+  }
+  for (const SolveRecord& solve : records.solves) {
+    CHECK_FALSE(solve.failed);
+    CHECK(solve.cut_area >= area);
+    area = solve.cut_area;
+    CHECK(solve.blade_surface == Approx(10 * area).margin(1e-12));
+  }
+  CHECK(area > 0.06 * 0.006);
+  CHECK(late == Approx(10 * 0.06).epsilon(0.25)); // the base is near
+  WARN("largest step " << largest_step << " N of " << peak << " N");
+  CHECK(largest_step < 0.03 * peak);
+}
+
+TEST_CASE("With the controller on, a contact stiffer than the device is rendered as stiff as that") {
+  const auto run = [](bool controlled, double stiffness) {
+    const topology::ToolShape tool = topology::SphereTip{0.004};
+    HapticSettings settings;
+    settings.passivity = controlled;
+    settings.limits = {.force = 1000, .slew = 1e5, .stiffness = 500, .damping = 0};
+    HapticTick core(settings, tool, nullptr);
+    ContactSnapshot snapshot = edge_of(stiffness);
+    snapshot.blade.edge = 1e-9;
+    snapshot.blade.due = 1e9;
+    snapshot.blade.drag.setZero();
+    snapshot.blade.force = {0, 0, 1e-9};
+    core.arrive(snapshot);
+    double last = 0;
+    double slope = 0;
+    double softened = 1;
+    for (std::uint64_t t = 0; t < 400; ++t) {
+      const double z = -1e-5 * static_cast<double>(t);
+      const TickResult result = core.tick({t, 1e-3 * static_cast<double>(t), {0, 0, z}});
+      slope = (result.force.z() - last) / 1e-5;
+      last = result.force.z();
+      softened = result.softened;
+    }
+    return std::pair{slope, softened};
+  };
+  CHECK(run(true, 2000).first == Approx(500).epsilon(0.02));
+  CHECK(run(true, 2000).second == Approx(0.25));
+  CHECK(run(false, 2000).first == Approx(2000).epsilon(0.02));
+  CHECK(run(true, 400).first == Approx(400).epsilon(0.02));
+  CHECK(run(true, 400).second == 1);
+}
