@@ -164,6 +164,10 @@ TEST_CASE("Quick haptic loop: every tick of a short session on a liver is made")
   require_quick_run_passes("haptic_loop");
 }
 
+TEST_CASE("Quick remeshing ledger: every back end opens the penny as it should, and better on a finer mesh") {
+  require_quick_run_passes("remeshing_ledger");
+}
+
 TEST_CASE("Quick solve rate: the steps that are timed give forces") {
   require_quick_run_passes("solve_rate");
 }
