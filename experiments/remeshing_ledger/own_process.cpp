@@ -3,12 +3,14 @@
 #include "experiments/remeshing_ledger/back_end.hpp"
 
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <fmt/format.h>
 #include <fstream>
 #include <poll.h>
 #include <string>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -59,6 +61,13 @@ double status_entry(const std::string& key) {
       return 1024 * kilobytes;
     }
   return 0;
+}
+
+constexpr double patience = 30; // wall clock over processor time
+
+/// Ended by the system for the processor time it took (some end a process whose limits are equal outright).
+bool is_over_limit(int status) {
+  return WIFSIGNALED(status) != 0 && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
 }
 
 [[noreturn]] void work_and_leave(int file, const std::function<TetMesh()>& work) {
@@ -119,10 +128,13 @@ GuardedMesh mesh_in_own_process(const std::function<TetMesh()>& work, double lim
   }
   if (child == 0) {
     close(ends[0]);
+    const auto seconds = static_cast<rlim_t>(std::ceil(limit));
+    const rlimit most{seconds, seconds};
+    setrlimit(RLIMIT_CPU, &most);
     work_and_leave(ends[1], work);
   }
   close(ends[1]);
-  const double until = wall_seconds() + limit;
+  const double until = wall_seconds() + patience * limit; // it may wait for a processor
   Header header;
   bool complete = read_all(ends[0], &header, sizeof header, until);
   if (complete && header.vertices >= 0) {
@@ -135,14 +147,15 @@ GuardedMesh mesh_in_own_process(const std::function<TetMesh()>& work, double lim
     complete = read_all(ends[0], result.failure.data(), result.failure.size(), until);
   }
   close(ends[0]);
-  if (!complete)
+  const bool late = wall_seconds() >= until;
+  if (late)
     kill(child, SIGKILL);
   int status = 0;
   waitpid(child, &status, 0);
   if (!complete)
-    result.failure = wall_seconds() >= until    ? fmt::format("not done after {} s", limit)
-                     : WIFSIGNALED(status) != 0 ? fmt::format("the mesher crashed (signal {})", WTERMSIG(status))
-                                                : std::string("the mesher ended without a mesh");
+    result.failure = late || is_over_limit(status) ? fmt::format("not done after {} s", limit)
+                     : WIFSIGNALED(status) != 0    ? fmt::format("the mesher crashed (signal {})", WTERMSIG(status))
+                                                   : std::string("the mesher ended without a mesh");
   result.processor_seconds = header.processor_seconds;
   result.wall_seconds = header.wall_seconds;
   result.peak_memory = header.peak_memory;

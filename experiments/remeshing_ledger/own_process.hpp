@@ -14,8 +14,8 @@ struct GuardedMesh {
   double peak_memory = 0;                         // bytes the process came to hold beyond what it began with
 };
 
-/// Runs `work` in a process that is ended after `limit` seconds. What it throws, a crash and the limit come back as
-/// `failure`.
+/// Runs `work` in a process that is ended after `limit` seconds of processor time. What it throws, a crash and the
+/// limit come back as `failure`.
 GuardedMesh mesh_in_own_process(const std::function<TetMesh()>& work, double limit);
 
 /// Bytes this process holds now, and the most since reset_peak_memory().
