@@ -142,6 +142,7 @@ Front front_of(const Scenario& scenario, int increment) {
   const std::vector<Vector2> outline = scenario.outline(increment);
   const std::vector<Vector3> border = border_in_plane(scenario);
   std::vector<Vector2> loop;
+  loop.reserve(border.size());
   for (const Vector3& x : border)
     loop.push_back(scenario.in_plane(x));
   const auto within = [&](const Vector2& p) {
@@ -275,6 +276,7 @@ Scenario growing_penny(int increments) {
   const auto radius = [=, step = s.advance](int k) { return scale * (last - (increments - k) * step); };
   s.outline = [radius](int k) {
     std::vector<Vector2> polygon;
+    polygon.reserve(sectors);
     for (int j = 0; j < sectors; ++j)
       polygon.emplace_back(radius(k) * std::cos(2 * pi * j / sectors), radius(k) * std::sin(2 * pi * j / sectors));
     return polygon;
@@ -372,9 +374,9 @@ Scenario liver_incision(int increments) {
   };
   static constexpr double radius = 0.012;
   const double low = box.lower.z() + 0.3 * box.extent().z();
-  const Vector3 across = s.frame.normal, middle = top;
-  const Vector3 left = s.domain->closest_surface_point(middle + 0.03 * across),
-                right = s.domain->closest_surface_point(middle - 0.03 * across);
+  const Vector3 across = s.frame.normal;
+  const Vector3 left = s.domain->closest_surface_point(top + 0.03 * across),
+                right = s.domain->closest_surface_point(top - 0.03 * across);
   s.held = [low, left, right](const Vector3& x, const Vector3&) {
     return x.z() < low || (x - left).norm() < radius || (x - right).norm() < radius;
   };
