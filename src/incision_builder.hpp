@@ -24,8 +24,8 @@ class IncisionBuilder {
   /// in between it starts there.
   topology::SweepResult move_to(const topology::BladePose& pose, const topology::RestMap& to_rest);
 
-  /// Keeps a pose for the next motion, which passes it on its way; false, and not kept, when the edge is out of the body
-  /// there.
+  /// Keeps a pose for the next motion, which passes it on its way; false, and not kept, when the edge is out of the
+  /// body there.
   bool put_off(const topology::BladePose& pose, const topology::RestMap& to_rest);
 
   /// Places the blade; its next motion starts there.

@@ -83,7 +83,8 @@ class Session {
   /// opening volume and the hash of the wound; the rotation of the tissue is then not watched.
   void set_force_only(bool on) { force_only_ = on; }
 
-  /// Whether a grasper is closed, from the next step on: a hand's in place of the times of the scenario; empty: by those.
+  /// Whether a grasper is closed, from the next step on: a hand's in place of the times of the scenario; empty: by
+  /// those.
   void set_grip(std::optional<bool> closed) { grip_ = closed; }
 
   /// On: a tear makes one increment a step at most, and goes on in the next: a loop in real time gets its solutions.

@@ -16,10 +16,10 @@ namespace spherecut::app {
 
 /// What the hand holds, as DeviceState::mode has it.
 enum class HandMode : std::uint16_t {
-  usual, // the tool, beside which a blade keeps to its own path; the blade in a scenario without a tool
-  probe, // the tool; a blade is lifted
-  blade, // the blade, which cuts where the hand draws it; a tool stays away from the organ
-  grasper,
+  usual,   // the tool, beside which a blade keeps to its own path; the blade in a scenario without a tool
+  probe,   // the tool; a blade is lifted
+  blade,   // the blade, which cuts where the hand draws it; a tool stays away from the organ
+  grasper, // the tool of a scenario whose tool is one; closed while button 1 is pressed
 };
 
 /// Where a device is at a tick of the haptic loop.

@@ -73,7 +73,7 @@ StepSample HapticSimulation::sample(const DeviceState& device) const {
     sample.tool = parked_;
     if (scenario.blade)
       sample.blade = topology::BladePose{device.time, device.position, device.orientation};
-  } else if (mode == HandMode::probe) {
+  } else if (mode == HandMode::probe || mode == HandMode::grasper) {
     sample.tool = scenario.tool ? std::optional(tool_pose(scenario.tool->shape, device)) : std::nullopt;
   } else if (scenario.tool) {
     sample.tool = tool_pose(scenario.tool->shape, device);
@@ -115,6 +115,8 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
     session_.lift_blade();
     mode_ = mode;
   }
+  if (mode_ != HandMode::usual)
+    session_.set_grip(mode_ == HandMode::grasper && (device.buttons & 1U) != 0);
   result_ = session_.step(sample(device));
   const BodyModel& model = session_.model();
   const solvers::ContactCondition condition =

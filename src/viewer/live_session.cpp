@@ -192,7 +192,7 @@ void LiveSession::find_contact() {
 std::vector<HandMode> LiveSession::modes() const {
   std::vector<HandMode> modes;
   if (scenario_.tool)
-    modes.push_back(HandMode::probe);
+    modes.push_back(scenario_.tool->grasp ? HandMode::grasper : HandMode::probe);
   if (scenario_.blade)
     modes.push_back(HandMode::blade);
   return modes;

@@ -337,6 +337,43 @@ TEST_CASE("The picture is the field at every vertex, evaluated anew only near th
   CHECK(std::count(topology.tags.begin(), topology.tags.end(), ViewerTopology::Tag::front) > 2);
 }
 
+TEST_CASE("A grasper in the hand takes hold where it closes, pulls, and lets go") {
+  const std::size_t tool = live_block.find("[tool]");
+  const std::size_t blade = live_block.find("[blade]");
+  const std::string text = live_block.substr(0, tool) + R"([tool]
+shape = "grasper"
+radius = 0.009
+[[tool.path]]
+time = 0
+position = [0, 0, 0.03]
+[[tool.path]]
+time = 1
+position = [0, 0, 0.034]
+)" + live_block.substr(blade);
+  const TemporaryFolder folder;
+  HapticSimulation simulation(read_scenario(write_file(folder.path() / "live.toml", text)));
+  ContactSnapshot snapshot;
+  DeviceState device;
+  device.mode = static_cast<std::uint16_t>(HandMode::grasper);
+  const auto solve = [&](double height, std::uint16_t buttons) {
+    device.tick += 10;
+    device.time = 1e-3 * static_cast<double>(device.tick);
+    device.position = {0, 0, height};
+    device.buttons = buttons;
+    simulation.solve(device, 0, snapshot);
+    return snapshot.force.z();
+  };
+  CHECK(solve(0.03, 0) == 0);
+  CHECK_FALSE(simulation.session().grasps());
+  CHECK(std::abs(solve(0.03, 1)) < 1e-3);
+  CHECK(simulation.session().grasps());
+  const double pulled = solve(0.032, 1);
+  CHECK(pulled < -0.05); // the tissue pulls back
+  CHECK(solve(0.034, 1) == Approx(2 * pulled).epsilon(0.02));
+  CHECK(solve(0.034, 0) == 0);
+  CHECK_FALSE(simulation.session().grasps());
+}
+
 TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
   const Served served;
   Viewer first(served.port());
