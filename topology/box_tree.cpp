@@ -2,15 +2,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace spherecut::topology {
 
 namespace {
 constexpr int leaf_size = 2;
+
+std::vector<BoundingBox> boxes_of(const std::vector<std::array<Vector3, 3>>& triangles, double margin) {
+  std::vector<BoundingBox> boxes;
+  boxes.reserve(triangles.size());
+  for (const auto& [a, b, c] : triangles)
+    boxes.push_back({a.cwiseMin(b).cwiseMin(c).array() - margin, a.cwiseMax(b).cwiseMax(c).array() + margin});
+  return boxes;
+}
 } // namespace
 
-BoxTree::BoxTree(const std::vector<BoundingBox>& boxes) : order_(boxes.size()) {
+BoxTree::BoxTree(const std::vector<BoundingBox>& boxes) : BoxTree(boxes, {}, 0) {}
+
+BoxTree::BoxTree(const std::vector<std::array<Vector3, 3>>& triangles, double margin)
+    : BoxTree(boxes_of(triangles, margin), triangles, margin) {}
+
+BoxTree::BoxTree(const std::vector<BoundingBox>& boxes, const std::vector<std::array<Vector3, 3>>& triangles,
+                 double margin)
+    : order_(boxes.size()), margin_(margin) {
   if (boxes.empty())
     return;
   bounds_ = boxes.front();
@@ -25,7 +41,7 @@ BoxTree::BoxTree(const std::vector<BoundingBox>& boxes) : order_(boxes.size()) {
   rounding_ = 3e-7F * static_cast<float>(bounds_.extent().maxCoeff());
   std::iota(order_.begin(), order_.end(), 0);
   nodes_.reserve(boxes.size() / 2 + 1);
-  build(boxes, centres, 0, static_cast<int>(boxes.size()));
+  build(boxes, triangles, centres, 0, static_cast<int>(boxes.size()));
 }
 
 /// Halves order_[first, last) by the median along the longest side of the centres' box; the place between.
@@ -45,7 +61,8 @@ int BoxTree::halve(const std::vector<Vector3>& centres, int first, int last) {
 }
 
 /// Node over order_[first, last), depth first; its index.
-int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<Vector3>& centres, int first, int last) {
+int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<std::array<Vector3, 3>>& triangles,
+                   const std::vector<Vector3>& centres, int first, int last) {
   const int self = static_cast<int>(nodes_.size());
   nodes_.emplace_back();
   std::array<int, 5> cut{first, last, last, last, last};
@@ -66,7 +83,10 @@ int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<Vect
   for (int d = 0; d < 3; ++d) {
     node.boxes.centre[d].setZero();
     node.boxes.half[d].setZero();
+    node.across[d].setZero();
   }
+  node.height.setZero();
+  node.thickness.setConstant(std::numeric_limits<float>::infinity());
   node.first.fill(0);
   node.count.fill(0);
   node.children = parts;
@@ -80,12 +100,45 @@ int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<Vect
       node.boxes.centre[d][p] = static_cast<float>(0.5 * (lower[d] + upper[d]) - origin_[d]);
       node.boxes.half[d][p] = static_cast<float>(0.5 * (upper[d] - lower[d])) + rounding_;
     }
+    add_slab(triangles, cut[p], cut[p + 1], p, node);
     const bool leaf = cut[p + 1] - cut[p] <= leaf_size;
-    node.first[p] = leaf ? cut[p] : build(boxes, centres, cut[p], cut[p + 1]);
+    node.first[p] = leaf ? cut[p] : build(boxes, triangles, centres, cut[p], cut[p + 1]);
     node.count[p] = leaf ? cut[p + 1] - cut[p] : 0;
   }
   nodes_[self] = node;
   return self;
+}
+
+/// Slab about the triangles at order_[first, last).
+void BoxTree::add_slab(const std::vector<std::array<Vector3, 3>>& triangles, int first, int last, int child,
+                       Node& node) const {
+  if (triangles.empty())
+    return;
+  const auto area = [&](int place) -> Vector3 {
+    const auto& [a, b, c] = triangles[order_[place]];
+    return (b - a).cross(c - a);
+  };
+  const Vector3 one = area(first);
+  Vector3 sum = Vector3::Zero();
+  for (int i = first; i < last; ++i) {
+    const Vector3 next = area(i);
+    sum += next.dot(one) < 0 ? -next : next;
+  }
+  if (!(sum.norm() > 0))
+    return;
+  const Eigen::Vector3f across = sum.normalized().cast<float>();
+  const Vector3 exact = across.cast<double>(); // heights are those along the direction that is kept
+  double lower = std::numeric_limits<double>::infinity(), upper = -lower;
+  for (int i = first; i < last; ++i)
+    for (const Vector3& corner : triangles[order_[i]]) {
+      const double height = exact.dot(corner - origin_);
+      lower = std::min(lower, height);
+      upper = std::max(upper, height);
+    }
+  for (int d = 0; d < 3; ++d)
+    node.across[d][child] = across[d];
+  node.height[child] = static_cast<float>(0.5 * (lower + upper));
+  node.thickness[child] = static_cast<float>(0.5 * (upper - lower) + 2 * margin_) + rounding_;
 }
 
 bool BoxTree::any_within(const Vector3& x, double radius) const {

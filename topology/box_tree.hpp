@@ -1,6 +1,7 @@
 // A tree of boxes, four children a node, over the boxes of any primitives: segments against boxes and nearest-first
-// search. Single precision with an allowance for rounding, so that no query ever misses a box; the exact tests are the
-// caller's. Queries do not allocate. Used by the incision alone.
+// search. Over triangles every box holds a slab as well, along their mean normal: segments beside a sheet that is
+// nearly plane end there, however it is turned. Single precision with an allowance for rounding, so that no query ever
+// misses a box; the exact tests are the caller's. Queries do not allocate. Used by the incision alone.
 #pragma once
 
 #include "topology/types.hpp"
@@ -16,6 +17,8 @@ class BoxTree {
   BoxTree() = default;
   /// One box per primitive, m, all finite.
   explicit BoxTree(const std::vector<BoundingBox>& boxes);
+  /// Of triangles, whose boxes are `margin` m larger than they are.
+  BoxTree(const std::vector<std::array<Vector3, 3>>& triangles, double margin);
 
   /// The primitive at each place of the tree: primitives that lie close together have places close together.
   [[nodiscard]] const std::vector<int>& order() const { return order_; }
@@ -53,19 +56,25 @@ class BoxTree {
  private:
   struct Node {
     Boxes boxes;
-    std::array<int, 4> first; // leaf: its first place; inner node: its index
-    std::array<int, 4> count; // primitives of a leaf, 0 for an inner node
+    std::array<Four, 3> across; // unit normal of each slab
+    Four height, thickness;     // m, of its middle plane over origin_, half its thickness; infinite: no slab
+    std::array<int, 4> first;   // leaf: its first place; inner node: its index
+    std::array<int, 4> count;   // primitives of a leaf, 0 for an inner node
     int children;
   };
   static constexpr int stack_size = 96; // three postponed children a level, 32 levels hold any number of primitives
 
-  int build(const std::vector<BoundingBox>& boxes, const std::vector<Vector3>& centres, int first, int last);
+  BoxTree(const std::vector<BoundingBox>& boxes, const std::vector<std::array<Vector3, 3>>& triangles, double margin);
+  int build(const std::vector<BoundingBox>& boxes, const std::vector<std::array<Vector3, 3>>& triangles,
+            const std::vector<Vector3>& centres, int first, int last);
+  void add_slab(const std::vector<std::array<Vector3, 3>>& triangles, int first, int last, int child, Node& node) const;
   int halve(const std::vector<Vector3>& centres, int first, int last);
 
   std::vector<Node> nodes_;
   std::vector<int> order_;
   BoundingBox bounds_;
   Vector3 origin_ = Vector3::Zero();
+  double margin_ = 0;  // m, by which boxes of triangles are larger than these
   float rounding_ = 0; // m, by which every half extent is enlarged
 };
 
@@ -86,7 +95,10 @@ bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit)
     const Node& node = nodes_[stack[--height]];
     const auto& [centre, half] = node.boxes;
     const Four x = centre[0] - m[0], y = centre[1] - m[1], z = centre[2] - m[2];
-    Four apart = (x.abs() - half[0] - (reach[0] + margin)).max(y.abs() - half[1] - (reach[1] + margin));
+    const auto& n = node.across;
+    Four apart = (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] - node.height).abs() -
+                 (n[0] * e[0] + n[1] * e[1] + n[2] * e[2]).abs() - node.thickness - 2 * margin;
+    apart = apart.max((x.abs() - half[0] - (reach[0] + margin)).max(y.abs() - half[1] - (reach[1] + margin)));
     apart = apart.max(z.abs() - half[2] - (reach[2] + margin));
     apart = apart.max((y * e[2] - z * e[1]).abs() - half[1] * reach[2] - half[2] * reach[1] - cross_margin);
     apart = apart.max((z * e[0] - x * e[2]).abs() - half[2] * reach[0] - half[0] * reach[2] - cross_margin);

@@ -68,10 +68,6 @@ struct Wall {
   }
 };
 
-BoundingBox box_of(const std::array<Vector3, 3>& p, double margin) {
-  return {p[0].cwiseMin(p[1]).cwiseMin(p[2]).array() - margin, p[0].cwiseMax(p[1]).cwiseMax(p[2]).array() + margin};
-}
-
 /// An order of segments that does not depend on their numbers.
 bool before(const FrontSegment& a, const FrontSegment& b) {
   const auto key = [](const FrontSegment& s) {
@@ -106,13 +102,13 @@ struct Incision::Data {
     const double size = domain->bounds().extent().norm();
     flat = 1e-12 * size;
     std::vector<SheetTriangle> in_sheets;
-    std::vector<BoundingBox> boxes;
+    std::vector<std::array<Vector3, 3>> of_triangles;
     for (int s = 0; s < std::ssize(sheets); ++s)
       for (int t = 0; t < std::ssize(sheets[s].triangles); ++t) {
         in_sheets.push_back({s, t});
-        boxes.push_back(box_of(corners_of(s, t), abutting * size));
+        of_triangles.push_back(corners_of(s, t));
       }
-    tree = BoxTree(boxes);
+    tree = BoxTree(of_triangles, abutting * size);
     std::vector<Neighbours> neighbours;
     std::vector<std::vector<bool>> at_border;
     for (const SurfaceMesh& sheet : sheets) {
