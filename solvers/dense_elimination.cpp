@@ -26,6 +26,7 @@ namespace portable_elimination {
 
 #if defined(__x86_64__) && defined(__GNUC__)
 
+#pragma GCC diagnostic ignored "-Wunknown-pragmas" // clang has no target pragma
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 namespace avx2_elimination {

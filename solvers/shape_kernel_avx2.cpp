@@ -5,6 +5,7 @@
 #if defined(__x86_64__) && defined(__GNUC__)
 #include <immintrin.h>
 
+#pragma GCC diagnostic ignored "-Wunknown-pragmas" // clang has no target pragma
 #pragma GCC push_options
 #pragma GCC target("avx2,fma")
 
