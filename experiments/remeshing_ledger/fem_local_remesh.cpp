@@ -142,17 +142,15 @@ class FemLocalRemesh final : public BackEnd {
           scenario_, number_,
           {resolution_.fine, resolution_.slope, resolution_.coarse_over_fine * resolution_.fine, front.points});
     }
-    const GuardedMesh guarded = mesh_in_own_process([&] { return mesh_volume(request); }, limit_);
-    increment.times.add(Stage::meshing, guarded.processor_seconds, guarded.wall_seconds);
-    increment.mesher_memory = guarded.peak_memory;
-    increment.failure = guarded.failure;
+    const TetMesh meshed = mesh_for(
+        increment, [&] { return mesh_volume(request); }, limit_);
     if (!increment.failure.empty())
       return increment;
     try {
       CutMesh mesh;
       {
         const StageClock clock(increment.times, Stage::meshing);
-        mesh = part(guarded.mesh, scenario_, number_, 1e-3 * resolution_.fine);
+        mesh = part(meshed, scenario_, number_, 1e-3 * resolution_.fine);
         share_motion(mesh);
       }
       {

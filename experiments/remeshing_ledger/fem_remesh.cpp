@@ -39,17 +39,15 @@ class FemRemesh final : public BackEnd {
                       front_of(scenario_, number_).points};
       request = mesh_request(scenario_, number_, grading);
     }
-    const GuardedMesh guarded = mesh_in_own_process([&] { return mesh_volume(request); }, limit_);
-    increment.times.add(Stage::meshing, guarded.processor_seconds, guarded.wall_seconds);
-    increment.mesher_memory = guarded.peak_memory;
-    increment.failure = guarded.failure;
+    const TetMesh meshed = mesh_for(
+        increment, [&] { return mesh_volume(request); }, limit_);
     if (!increment.failure.empty())
       return increment;
     try {
       CutMesh mesh;
       {
         const StageClock clock(increment.times, Stage::meshing);
-        mesh = part(guarded.mesh, scenario_, number_, 1e-3 * resolution_.fine);
+        mesh = part(meshed, scenario_, number_, 1e-3 * resolution_.fine);
       }
       solution_ = solve_fem(mesh, scenario_, element_, increment.times);
       increment.unknowns = solution_.unknowns;

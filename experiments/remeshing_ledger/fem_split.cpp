@@ -41,13 +41,10 @@ class FemSplit final : public BackEnd {
     request.label = [this](const Vector3& x) { return scenario_.domain->signed_distance(x) < 0 ? 1 : 0; };
     request.features = scenario_.sharp_edges;
     request.size = both;
-    const GuardedMesh guarded = mesh_in_own_process([&] { return mesh_volume(request); }, limit_);
-    increment.times.add(Stage::meshing, guarded.processor_seconds, guarded.wall_seconds);
-    increment.mesher_memory = guarded.peak_memory;
-    increment.failure = guarded.failure;
+    mesh_ = mesh_for(
+        increment, [&] { return mesh_volume(request); }, limit_);
     if (!increment.failure.empty())
       return increment;
-    mesh_ = guarded.mesh;
     tets_of_.assign(mesh_.vertices.size(), {});
     for (int t = 0; t < std::ssize(mesh_.tets); ++t)
       for (int v : mesh_.tets[t])

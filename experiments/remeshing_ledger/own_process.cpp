@@ -162,4 +162,12 @@ GuardedMesh mesh_in_own_process(const std::function<TetMesh()>& work, double lim
   return result;
 }
 
+TetMesh mesh_for(Increment& increment, const std::function<TetMesh()>& work, double limit) {
+  GuardedMesh guarded = mesh_in_own_process(work, limit);
+  increment.times.add(Stage::meshing, guarded.processor_seconds, guarded.wall_seconds);
+  increment.mesher_memory = guarded.peak_memory;
+  increment.failure = guarded.failure;
+  return std::move(guarded.mesh);
+}
+
 } // namespace spherecut::experiments::ledger

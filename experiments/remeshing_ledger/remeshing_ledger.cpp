@@ -193,7 +193,7 @@ std::vector<Check> run_remeshing_ledger(const ExperimentContext& context) {
 
   const Scenario liver = liver_incision(20);
   const Reference liver_reference = converged(liver, remesh(Element::quarter_point, {0.004}, reference_limit),
-                                              spheres(true, Upkeep::scratch, {0.0045}), 0.25, context, checks);
+                                              spheres(true, Upkeep::scratch, {0.0045}), 0.05, context, checks);
   if (!std::isfinite(liver_reference.volume)) { // its checks have failed already
     context.say("liver: no reference, no comparison");
     return checks;

@@ -7,7 +7,9 @@
 namespace spherecut::tests {
 
 TemporaryFolder::TemporaryFolder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "spherecut-test-XXXXXX").string();
+  constexpr int letters = 6; // that mkdtemp(3) fills in, each given as X
+  std::string pattern =
+      (std::filesystem::temp_directory_path() / "spherecut-test-").string() + std::string(letters, 'X');
   if (mkdtemp(pattern.data()) == nullptr)
     throw std::system_error(errno, std::generic_category(), pattern);
   path_ = pattern;
