@@ -30,20 +30,39 @@ std::uint64_t next_token(std::uint64_t token) noexcept { // splitmix64
 } // namespace
 
 struct BridgeDevice::Socket {
-  int descriptor = -1;
+  int open = -1;        // for everyone
+  int held = -1;        // connected to the client; to the port itself while there is none: nobody sends from there
+  sockaddr_in own{};    // address and port
   sockaddr_in client{}; // that holds the tool
   std::array<std::array<std::byte, largest_packet>, most_packets> bytes{};
   std::array<sockaddr_in, most_packets> from{};
   std::array<iovec, most_packets> parts{};
   std::array<mmsghdr, most_packets> messages{};
+
+  /// Whether the two may have one port, and with that anyone else who asks for it so.
+  void share_port(bool shared) const {
+    const int value = shared ? 1 : 0;
+    for (const int descriptor : {open, held})
+      ::setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &value, sizeof value);
+  }
+  /// From now on `held` takes what comes from there alone.
+  void connect_to(const sockaddr_in& peer) const noexcept {
+    const sockaddr_in nobody{.sin_family = AF_UNSPEC, .sin_port = 0, .sin_addr = {}, .sin_zero = {}};
+    ::connect(held, reinterpret_cast<const sockaddr*>(&nobody), sizeof nobody); // forgets the address of the last
+    ::connect(held, reinterpret_cast<const sockaddr*>(&peer), sizeof peer);
+  }
+  void close() const noexcept {
+    for (const int descriptor : {open, held})
+      if (descriptor >= 0)
+        ::close(descriptor);
+  }
 };
 
 BridgeDevice::BridgeDevice(const BridgeSettings& settings, const PathPose& waiting, double rate)
     : socket_(std::make_unique<Socket>()), rate_(rate), timeout_(settings.timeout),
       silence_(static_cast<std::uint64_t>(std::max(1.0, std::ceil(settings.timeout * rate)))) {
   const auto fail = [&](const std::string& what) {
-    if (socket_->descriptor >= 0)
-      ::close(socket_->descriptor);
+    socket_->close();
     throw InputError(fmt::format("haptic bridge at {} port {}: {}", settings.address, settings.port, what));
   };
   sockaddr_in address{};
@@ -51,16 +70,26 @@ BridgeDevice::BridgeDevice(const BridgeSettings& settings, const PathPose& waiti
   address.sin_port = htons(static_cast<std::uint16_t>(settings.port));
   if (inet_pton(AF_INET, settings.address.c_str(), &address.sin_addr) != 1)
     fail("not an address; allowed: four numbers as in 127.0.0.1");
-  socket_->descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (socket_->descriptor < 0)
-    fail(std::strerror(errno));
-  ::setsockopt(socket_->descriptor, SOL_SOCKET, SO_RCVBUF, &queue_bytes, sizeof queue_bytes);
-  // The socket calls take any address as a sockaddr.
-  if (::bind(socket_->descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    fail(std::strerror(errno));
-  socklen_t size = sizeof address;
-  if (::getsockname(socket_->descriptor, reinterpret_cast<sockaddr*>(&address), &size) != 0)
-    fail(std::strerror(errno));
+  const auto bound = [&] {
+    const int descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (descriptor < 0)
+      fail(std::strerror(errno));
+    (socket_->open < 0 ? socket_->open : socket_->held) = descriptor;
+    ::setsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &queue_bytes, sizeof queue_bytes);
+    if (descriptor == socket_->held)
+      socket_->share_port(true);
+    // The socket calls take any address as a sockaddr.
+    if (::bind(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+      fail(std::strerror(errno));
+    socklen_t size = sizeof address;
+    if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&address), &size) != 0)
+      fail(std::strerror(errno));
+  };
+  bound();
+  bound(); // at the port that the first has got
+  socket_->share_port(false);
+  socket_->own = address;
+  socket_->connect_to(address);
   port_ = ntohs(address.sin_port);
   for (std::size_t i = 0; i < most_packets; ++i) {
     socket_->parts[i] = {socket_->bytes[i].data(), largest_packet};
@@ -76,13 +105,14 @@ BridgeDevice::BridgeDevice(const BridgeSettings& settings, const PathPose& waiti
 }
 
 BridgeDevice::~BridgeDevice() {
-  ::close(socket_->descriptor);
+  socket_->close();
 }
 
 void BridgeDevice::release() noexcept {
   held_ = false;
   state_.connected = false;
   state_.buttons = 0;
+  socket_->connect_to(socket_->own);
 }
 
 void BridgeDevice::take(std::size_t packet) noexcept {
@@ -106,6 +136,7 @@ void BridgeDevice::take(std::size_t packet) noexcept {
       held_ = true;
       posed_ = false;
       socket_->client = from;
+      socket_->connect_to(from);
       token_ = next_token(token_);
       heard_ = state_.tick;
     }
@@ -134,14 +165,25 @@ void BridgeDevice::take(std::size_t packet) noexcept {
   state_.connected = true;
 }
 
+void BridgeDevice::take_from(int descriptor, int most) noexcept {
+  for (mmsghdr& message : socket_->messages)
+    message.msg_hdr.msg_namelen = sizeof(sockaddr_in);
+  const auto receive = [&] {
+    return ::recvmmsg(descriptor, socket_->messages.data(), static_cast<unsigned>(most), MSG_DONTWAIT, nullptr);
+  };
+  int count = receive();
+  if (count < 0 && errno == ECONNREFUSED) // an earlier force found nobody there; packets wait behind that news
+    count = receive();
+  for (int i = 0; i < count; ++i)
+    take(static_cast<std::size_t>(i));
+}
+
 DeviceState BridgeDevice::read(std::uint64_t tick) noexcept {
   state_.tick = tick;
   state_.time = static_cast<double>(tick) / rate_;
-  for (mmsghdr& message : socket_->messages)
-    message.msg_hdr.msg_namelen = sizeof(sockaddr_in);
-  const int count = ::recvmmsg(socket_->descriptor, socket_->messages.data(), most_packets, MSG_DONTWAIT, nullptr);
-  for (int i = 0; i < count; ++i)
-    take(static_cast<std::size_t>(i));
+  if (held_)
+    take_from(socket_->held, most_packets);
+  take_from(socket_->open, held_ ? most_others : most_packets);
   if (held_ && tick - heard_ >= silence_) {
     ++counters_.lost;
     release();
@@ -155,7 +197,7 @@ void BridgeDevice::apply(const Vector3& force) noexcept {
   std::array<std::byte, bridge_body> bytes{};
   const std::size_t size =
       write_packet(BridgeReply{token_, state_.tick, posed_ ? sequence_ : 0, force, state_.position, timeout_}, bytes);
-  if (::sendto(socket_->descriptor, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL,
+  if (::sendto(socket_->open, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL,
                reinterpret_cast<const sockaddr*>(&socket_->client), sizeof socket_->client) < 0)
     ++counters_.unsent;
 }

@@ -1,9 +1,10 @@
 // A device behind a UDP socket: whoever owns the hardware runs a small client that sends its pose and gets the force
 // (docs/haptic_bridge.md).
 //
-// Chosen here: the haptic thread itself asks the socket, which never waits, and takes most_packets a tick at most. A
-// flood costs those and no more; what does not fit into the system's small queue is lost there. A thread of its own for
-// the socket would add its wake-up to every force.
+// Chosen here: the haptic thread itself asks the sockets, which never wait. Two of them have the port: one is connected
+// to the client that holds the tool, so that the system puts that client's packets, and no others, into its queue; the
+// other gets the rest, of which most_others a tick are looked at. So a flood from elsewhere costs those and no more,
+// and does not crowd out the client. A thread of its own for the socket would add its wake-up to every force.
 #pragma once
 
 #include "src/haptics/bridge_protocol.hpp"
@@ -26,10 +27,11 @@ struct BridgeCounters {
 
 class BridgeDevice : public Device {
  public:
-  static constexpr int most_packets = 16; // taken at a tick
+  static constexpr int most_packets = 16; // taken at a tick, of the client that holds the tool
+  static constexpr int most_others = 4;   // of anyone else, while there is one; without one, most_packets
 
-  /// Binds the socket. `waiting`: where the tool is until a client moves it. Throws InputError naming address, port and
-  /// the system's reason.
+  /// Binds the sockets. `waiting`: where the tool is until a client moves it. Throws InputError naming address, port
+  /// and the system's reason.
   BridgeDevice(const BridgeSettings& settings, const PathPose& waiting, double rate);
   ~BridgeDevice() override;
   BridgeDevice(const BridgeDevice&) = delete;
@@ -46,6 +48,7 @@ class BridgeDevice : public Device {
 
  private:
   struct Socket; // and what the system fills in, made once
+  void take_from(int descriptor, int most) noexcept;
   void take(std::size_t packet) noexcept;
   void release() noexcept;
 
