@@ -103,5 +103,9 @@ std::unique_ptr<BackEnd> make_fem_local_remesh(const Scenario& scenario, const R
                                                double limit);
 /// Linear tetrahedra split along the sheet.
 std::unique_ptr<BackEnd> make_fem_split(const Scenario& scenario, const Resolution& resolution, double limit);
+/// Tetrahedra of the uncut organ, enriched at the cut; GetFEM cuts them. Null where the build has no GetFEM.
+std::unique_ptr<BackEnd> make_xfem(const Scenario& scenario, const Resolution& resolution, Element element,
+                                   double limit);
+bool has_xfem();
 
 } // namespace spherecut::experiments::ledger

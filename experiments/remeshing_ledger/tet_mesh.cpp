@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <functional>
+#include <numeric>
 #include <unordered_map>
 
 namespace spherecut::experiments::ledger {
@@ -19,6 +20,23 @@ struct TetFace {
   std::array<int, 3> key; // ascending
   int tet, face;
 };
+
+/// Faces of all tetrahedra; those of two stand beside one another.
+std::vector<TetFace> sorted_faces(const TetMesh& mesh) {
+  std::vector<TetFace> faces;
+  faces.reserve(4 * mesh.tets.size());
+  for (int t = 0; t < std::ssize(mesh.tets); ++t)
+    for (int f = 0; f < 4; ++f) {
+      std::array<int, 3> key;
+      for (int k = 0; k < 3; ++k)
+        key[k] = mesh.tets[t][face_of[f][k]];
+      std::sort(key.begin(), key.end());
+      faces.push_back({key, t, f});
+    }
+  std::sort(faces.begin(), faces.end(),
+            [](const TetFace& a, const TetFace& b) { return a.key != b.key ? a.key < b.key : a.tet < b.tet; });
+  return faces;
+}
 
 /// Corners of cut faces around which the material above and below is joined by tetrahedra that share whole faces: the
 /// front, where the tetrahedra ahead of it cross the plane.
@@ -80,6 +98,29 @@ double smallest_quality(const std::vector<Vector3>& vertices, const std::vector<
   return least;
 }
 
+CutMesh uncut(const TetMesh& mesh) {
+  CutMesh whole;
+  whole.vertices = mesh.vertices;
+  whole.tets = mesh.tets;
+  whole.original.resize(mesh.vertices.size());
+  std::iota(whole.original.begin(), whole.original.end(), 0);
+  whole.front.assign(mesh.vertices.size(), 0);
+  whole.skin = whole.front;
+  const std::vector<TetFace> faces = sorted_faces(mesh);
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    if (i + 1 < faces.size() && faces[i + 1].key == faces[i].key) {
+      ++i;
+      continue;
+    }
+    const auto& t = mesh.tets[faces[i].tet];
+    const auto& f = face_of[faces[i].face];
+    whole.surface.push_back({t[f[0]], t[f[1]], t[f[2]]});
+    for (int k : f)
+      whole.skin[t[k]] = 1;
+  }
+  return whole;
+}
+
 CutMesh part(const TetMesh& mesh, const Scenario& scenario, int increment, double tolerance) {
   const std::size_t count = mesh.vertices.size();
   const std::vector<Vector2> outline = scenario.outline(increment);
@@ -92,18 +133,7 @@ CutMesh part(const TetMesh& mesh, const Scenario& scenario, int increment, doubl
       sum += in_plane[v] != 0 ? 0 : scenario.height(mesh.vertices[v]);
     return sum > 0;
   };
-  std::vector<TetFace> faces;
-  faces.reserve(4 * mesh.tets.size());
-  for (int t = 0; t < std::ssize(mesh.tets); ++t)
-    for (int f = 0; f < 4; ++f) {
-      std::array<int, 3> key;
-      for (int k = 0; k < 3; ++k)
-        key[k] = mesh.tets[t][face_of[f][k]];
-      std::sort(key.begin(), key.end());
-      faces.push_back({key, t, f});
-    }
-  std::sort(faces.begin(), faces.end(),
-            [](const TetFace& a, const TetFace& b) { return a.key != b.key ? a.key < b.key : a.tet < b.tet; });
+  const std::vector<TetFace> faces = sorted_faces(mesh);
   CutMesh cut;
   cut.vertices = mesh.vertices;
   cut.tets = mesh.tets;

@@ -27,4 +27,7 @@ struct CutMesh {
 /// Vertices within `tolerance` m of the plane belong to it.
 CutMesh part(const TetMesh& mesh, const Scenario& scenario, int increment, double tolerance);
 
+/// The mesh as it is: no faces of a cut, no front.
+CutMesh uncut(const TetMesh& mesh);
+
 } // namespace spherecut::experiments::ledger
