@@ -102,13 +102,14 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
   DegradationRule rule(settings.budget);
   std::uint64_t sequence = 0;
   std::optional<DeviceState> solved; // the last that was
+  bool tearing = false;              // in that
   while (!shared.done.load(std::memory_order_acquire)) {
     if (!shared.poses.fetch()) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
       continue;
     }
     const DeviceState state = shared.poses.front();
-    if (!options.solve_at_rest && solved && at_rest(state, *solved)) {
+    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved)) {
       feed.offer_again(simulation);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       continue;
@@ -119,6 +120,7 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
     const long long began = clock_now(CLOCK_MONOTONIC);
     const SolveRecord record = solve_recording(simulation, state, event, snapshot);
     lost += shared.solves.push(record) ? 0 : 1;
+    tearing = !record.failed && simulation.tearing();
     if (record.failed)
       continue;
     shared.snapshots.publish();

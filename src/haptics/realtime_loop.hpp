@@ -32,7 +32,7 @@ struct RealtimeOptions {
   std::function<void(const TickRecord&)> on_tick = [](const TickRecord&) {};    // on the viewer's thread, in order
   std::function<void(const SolveRecord&)> on_solve = [](const SolveRecord&) {}; // likewise, before ticks that use it
   bool keep = true;           // ticks and solves for the returned records; false: on_tick and on_solve alone see them
-  bool solve_at_rest = true;  // false: none is begun while the device stays where it was in the last
+  bool solve_at_rest = true;  // false: none is begun while device and tears stay as they were in the last
   ViewerFeed* feed = nullptr; // in place of one of the loop's own; then `view` is not called
 };
 

@@ -45,6 +45,8 @@ class HapticSimulation {
   [[nodiscard]] const StepResult& result() const { return result_; }
   [[nodiscard]] const Session& session() const { return session_; }
   [[nodiscard]] const topology::ToolShape& tool() const;
+  /// Whether a tear has grown in the last solve: it may grow on in the next, wherever the device is.
+  [[nodiscard]] bool tearing() const { return result_.tear && result_.tear->increments.size() > 1; }
   /// Whether the device held the blade in the last solve.
   [[nodiscard]] bool holds_blade() const;
   [[nodiscard]] std::vector<PathPose> path() const { return driven_path(session_.steps()); }

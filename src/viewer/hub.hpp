@@ -3,7 +3,7 @@
 // ended.
 #pragma once
 
-#include "src/viewer/requests.hpp"
+#include "src/viewer/replies.hpp"
 
 #include <deque>
 #include <map>

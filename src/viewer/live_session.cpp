@@ -174,6 +174,8 @@ void LiveSession::find_contact() {
     const topology::ToolPose pose = tool_pose(simulation_->tool(), device);
     newest_.axis = pose.axis;
     newest_.contact = query_->first_touch(simulation_->tool(), pose);
+    if (device.mode == static_cast<std::uint16_t>(HandMode::grasper)) // held or not: against the surface at rest
+      newest_.record.depth = -domain_->signed_distance(device.position);
     return;
   }
   newest_.axis = device.orientation * Vector3::UnitZ();

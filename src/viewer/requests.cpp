@@ -1,7 +1,6 @@
 #include "src/viewer/requests.hpp"
 
 #include "src/scenario_keys.hpp"
-#include "src/version.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -36,13 +35,6 @@ constexpr std::array<std::pair<HandMode, std::string_view>, 3> mode_names{
     {{HandMode::probe, "probe"}, {HandMode::blade, "blade"}, {HandMode::grasper, "grasper"}}};
 
 constexpr double most_coordinate = 1e3; // m
-
-std::string_view name_of(HandMode mode) {
-  for (const auto& [value, name] : mode_names)
-    if (value == mode)
-      return name;
-  return "probe";
-}
 
 [[noreturn]] void refuse(const std::string& text) {
   throw InputError(text);
@@ -182,40 +174,6 @@ void read_pose(const Json& message, Request& request) {
   request.orientation = Eigen::Quaterniond(turn[3], turn[0], turn[1], turn[2]).normalized();
 }
 
-Json array_of(const Vector3& x) {
-  return {x.x(), x.y(), x.z()};
-}
-
-Json tool_of(const Scenario& scenario) {
-  if (!scenario.tool)
-    return nullptr;
-  const topology::ToolShape& shape = scenario.tool->shape;
-  if (const auto* ball = std::get_if<topology::SphereTip>(&shape))
-    return {{"shape", "sphere"}, {"radius", ball->radius}};
-  if (const auto* punch = std::get_if<topology::FlatPunch>(&shape))
-    return {{"shape", "punch"}, {"radius", punch->radius}, {"length", punch->length}};
-  const auto& instrument = std::get<topology::Laparoscope>(shape);
-  return {{"shape", "laparoscope"},
-          {"radius", instrument.tip_radius},
-          {"shaft_radius", instrument.shaft_radius},
-          {"shaft_length", instrument.shaft_length},
-          {"port", array_of(instrument.port)}};
-}
-
-Json blade_of(const Scenario& scenario) {
-  if (!scenario.blade)
-    return nullptr;
-  Json edge = Json::array();
-  for (const Vector3& x : scenario.blade->edge)
-    edge.push_back(array_of(x));
-  return {{"edge", edge}};
-}
-
-/// Text that is not UTF-8 (of a file's name) is shown as far as it is.
-std::string dumped(const Json& message) {
-  return message.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 void check_key(const char* path, double value) {
   const ScenarioKey* key = find_scenario_key(path);
   if (key != nullptr && !key->range.holds(value))
@@ -307,95 +265,6 @@ void apply(const SettingsChange& change, Scenario& scenario) {
     scenario.method.method = *change.method;
   if (change.sight)
     scenario.cut.sight = *change.sight;
-}
-
-std::string welcome_text(int client, const std::vector<ScenarioEntry>& scenarios,
-                         const std::vector<RecordingEntry>& recordings, int viewers, double speed) {
-  Json list = Json::array();
-  for (const ScenarioEntry& entry : scenarios)
-    list.push_back({{"name", entry.name}, {"title", entry.title}});
-  Json records = Json::array();
-  for (const RecordingEntry& entry : recordings)
-    records.push_back({{"name", entry.name}, {"bytes", entry.bytes}, {"url", "/recordings/" + entry.name}});
-  return dumped({{"type", "welcome"},
-                 {"version", protocol_version},
-                 {"id", client},
-                 {"server", fmt::format("spherecut {}", version())},
-                 {"scenarios", list},
-                 {"recordings", records},
-                 {"limits",
-                  {{"message_bytes", WebServerOptions{}.message_bytes},
-                   {"messages_per_second", WebServerOptions{}.messages_per_second},
-                   {"credit", most_credit},
-                   {"viewers", viewers},
-                   {"speed", speed}}}});
-}
-
-std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMode mode) {
-  const Scenario& scenario = session.scenario();
-  const BoundingBox box = session.domain().bounds();
-  Json modes = Json::array();
-  Json park = Json::object();
-  for (const HandMode each : session.modes()) {
-    modes.push_back(name_of(each));
-    park[std::string(name_of(each))] = array_of(session.parked(each).position);
-  }
-  const std::string title = scenario.title.empty() ? scenario.file.stem().string() : scenario.title;
-  return dumped({{"type", "session"},
-                 {"epoch", epoch},
-                 {"scenario", scenario.file.filename().string()},
-                 {"title", title},
-                 {"bounds", {{"lower", array_of(box.lower)}, {"upper", array_of(box.upper)}}},
-                 {"triangles", session.domain().surface().triangles.size()},
-                 {"nodes", session.nodes()},
-                 {"modes", modes},
-                 {"mode", name_of(mode)},
-                 {"tool", tool_of(scenario)},
-                 {"blade", blade_of(scenario)},
-                 {"park", park},
-                 {"spring", scenario.haptics.hand.stiffness},
-                 {"settings",
-                  {{"young_modulus", scenario.material.young_modulus},
-                   {"poisson_ratio", scenario.material.poisson_ratio},
-                   {"toughness", scenario.toughness},
-                   {"method", solvers::to_string(scenario.method.method)},
-                   {"sight", solvers::to_string(scenario.cut.sight.value_or(scenario.method.sight))},
-                   {"fine_spacing", session.fine_spacing()},
-                   {"coarse_spacing", session.coarse_spacing()}}}});
-}
-
-std::string holder_text(int holder) {
-  return dumped({{"type", "holder"}, {"id", holder > 0 ? Json(holder) : Json(nullptr)}});
-}
-
-std::string mode_text(HandMode mode) {
-  return dumped({{"type", "mode"}, {"mode", name_of(mode)}});
-}
-
-std::string building_text(const std::string& what) {
-  return dumped({{"type", "building"}, {"what", what}});
-}
-
-std::string error_text(std::string_view code, const std::string& text, std::string_view about) {
-  return dumped({{"type", "error"}, {"code", code}, {"text", text}, {"about", about}});
-}
-
-std::string log_text(const std::string& line) {
-  const bool warns = line.rfind("warning: ", 0) == 0;
-  return dumped({{"type", "log"}, {"level", warns ? "warning" : "info"}, {"text", warns ? line.substr(9) : line}});
-}
-
-std::string recording_text(bool on, const RecordingEntry& entry, double seconds) {
-  return dumped({{"type", "recording"},
-                 {"on", on},
-                 {"name", entry.name},
-                 {"seconds", seconds},
-                 {"bytes", entry.bytes},
-                 {"url", "/recordings/" + entry.name}});
-}
-
-std::string replay_text(bool on, const std::string& name) {
-  return dumped({{"type", "replay"}, {"name", name}, {"on", on}});
 }
 
 } // namespace spherecut::app

@@ -1,7 +1,6 @@
-// JSON messages between viewers and server, as docs/viewer_protocol.md has them: read into structs, written as text.
+// JSON messages of viewers, as docs/viewer_protocol.md has them, read into structs.
 #pragma once
 
-#include "src/viewer/web_server.hpp"
 #include "src/viewer/wire.hpp"
 
 namespace spherecut::app {
@@ -62,25 +61,5 @@ Request parse_request(std::string_view text);
 
 /// The scenario with the change. Throws InputError with the key, the value and what is allowed.
 void apply(const SettingsChange& change, Scenario& scenario);
-
-struct ScenarioEntry {
-  std::string name, title;
-};
-struct RecordingEntry {
-  std::string name;
-  std::uint64_t bytes = 0;
-};
-
-std::string welcome_text(int client, const std::vector<ScenarioEntry>& scenarios,
-                         const std::vector<RecordingEntry>& recordings, int viewers, double speed);
-std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMode mode);
-/// 0: nobody.
-std::string holder_text(int holder);
-std::string mode_text(HandMode mode);
-std::string building_text(const std::string& what);
-std::string error_text(std::string_view code, const std::string& text, std::string_view about);
-std::string log_text(const std::string& line);
-std::string recording_text(bool on, const RecordingEntry& entry, double seconds);
-std::string replay_text(bool on, const std::string& name);
 
 } // namespace spherecut::app
