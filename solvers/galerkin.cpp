@@ -11,7 +11,6 @@
 #include "solvers/background_cells.hpp"
 #include "solvers/cell_shapes.hpp"
 #include "solvers/elastic_body.hpp"
-#include "solvers/stiffness_kernel.hpp"
 #include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
 
@@ -115,7 +114,9 @@ class Galerkin final : public ElasticBody {
   void hold_surface();
   void order_and_build_pattern(UnheldPieces unheld);
   void treat_unheld(UnheldPieces unheld);
-  void list_by_rank();
+  /// Calls visit(cluster) for clusters of neighbouring cells, all cells in turn.
+  template <typename Visit>
+  void for_clusters(Visit&& visit) const;
   void assemble();
   void assemble_loads();
   /// The matrix is kept in elimination order; vectors outside are in node order.
@@ -216,9 +217,7 @@ class Galerkin final : public ElasticBody {
   std::vector<Anchor> anchors_;                  // hold pieces that nothing else holds
   std::vector<int> order_;                       // node of every elimination rank
   std::vector<int> rank_;                        // elimination rank of every node
-  std::vector<CellShapes> shapes_;               // by ranks
-  std::vector<int> cells_start_, cells_of_rank_; // compressed rows: (cell, place of the node in it) pairs
-  std::vector<int> constraints_start_, constraints_of_rank_; // prescribed entries whose mean holds the node
+  std::vector<CellShapes> shapes_;               // of every cell
   std::vector<int> column_start_, column_rows_;              // lower block pattern in ranks, rows >= column, ascending
   SparseMatrix stiffness_;                                   // lower triangle (diagonal blocks full), in ranks
   std::vector<double> elastic_; // entries of stiffness_ without the penalties of the prescribed means
@@ -248,33 +247,18 @@ void Galerkin::hold_surface() {
     held_.push_back(value_at(spheres_, problem_.nodes.positions[node]));
 }
 
-void Galerkin::list_by_rank() {
-  const int count = problem_.nodes.size();
-  cells_start_.assign(count + 1, 0);
-  for (const CellShapes& cell : shapes_)
-    for (int rank : cell.nodes)
-      ++cells_start_[rank + 1];
-  constraints_start_.assign(count + 1, 0);
-  for (const DisplacementMean& mean : held_)
-    for (int node : mean.nodes)
-      ++constraints_start_[rank_[node] + 1];
-  for (int i = 0; i < count; ++i) {
-    cells_start_[i + 1] += cells_start_[i];
-    constraints_start_[i + 1] += constraints_start_[i];
-  }
-  cells_of_rank_.resize(2 * static_cast<std::size_t>(cells_start_[count]));
-  constraints_of_rank_.resize(constraints_start_[count]);
-  std::vector<int> next(cells_start_.begin(), cells_start_.end() - 1);
-  for (int c = 0; c < std::ssize(shapes_); ++c)
-    for (int k = 0; k < std::ssize(shapes_[c].nodes); ++k) {
-      const int slot = next[shapes_[c].nodes[k]]++;
-      cells_of_rank_[2 * slot] = c;
-      cells_of_rank_[2 * slot + 1] = k;
+template <typename Visit>
+void Galerkin::for_clusters(Visit&& visit) const {
+  CellCluster cluster(problem_.nodes.size());
+  for (int cell : cells_by_place(cells_)) {
+    if (!cluster.has_room_for(shapes_[cell])) {
+      visit(cluster);
+      cluster.clear();
     }
-  next.assign(constraints_start_.begin(), constraints_start_.end() - 1);
-  for (int p = 0; p < std::ssize(held_); ++p)
-    for (int node : held_[p].nodes)
-      constraints_of_rank_[next[rank_[node]]++] = p;
+    cluster.add(shapes_[cell]);
+  }
+  if (!cluster.empty())
+    visit(cluster);
 }
 
 void Galerkin::order_and_build_pattern(UnheldPieces unheld) {
@@ -283,27 +267,30 @@ void Galerkin::order_and_build_pattern(UnheldPieces unheld) {
   // factorisation.
   const int count = problem_.nodes.size();
   rank_.resize(count);
-  std::iota(rank_.begin(), rank_.end(), 0);
-  list_by_rank();
+  struct Together {
+    std::vector<int> nodes;
+    std::vector<std::uint64_t> reached;
+  };
+  std::vector<Together> clusters;
+  for_clusters([&](const CellCluster& cluster) { clusters.push_back({cluster.nodes(), cluster.reached()}); });
+  for (const DisplacementMean& mean : held_)
+    clusters.push_back({mean.nodes, std::vector<std::uint64_t>(mean.nodes.size(), 1)});
+  std::vector<std::vector<std::pair<int, std::uint64_t>>> clusters_of(count); // of a node: cluster, points it supports
+  for (int c = 0; c < std::ssize(clusters); ++c)
+    for (std::size_t k = 0; k < clusters[c].nodes.size(); ++k)
+      clusters_of[clusters[c].nodes[k]].emplace_back(c, clusters[c].reached[k]);
   std::vector<int> start(1, 0), neighbours, seen(count, -1);
   for (int j = 0; j < count; ++j) {
-    const auto visit = [&](int i) {
-      if (seen[i] != j) {
-        seen[i] = j;
-        neighbours.push_back(i);
-      }
-    };
-    visit(j);
-    for (int slot = cells_start_[j]; slot < cells_start_[j + 1]; ++slot) {
-      const CellShapes& cell = shapes_[cells_of_rank_[2 * slot]];
-      const std::uint32_t own = cell.reached[cells_of_rank_[2 * slot + 1]];
-      for (std::size_t k = 0; k < cell.nodes.size(); ++k)
-        if ((own & cell.reached[k]) != 0)
-          visit(cell.nodes[k]);
+    seen[j] = j;
+    neighbours.push_back(j);
+    for (const auto& [c, own] : clusters_of[j]) {
+      const Together& cluster = clusters[c];
+      for (std::size_t k = 0; k < cluster.nodes.size(); ++k)
+        if (const int i = cluster.nodes[k]; (own & cluster.reached[k]) != 0 && seen[i] != j) {
+          seen[i] = j;
+          neighbours.push_back(i);
+        }
     }
-    for (int slot = constraints_start_[j]; slot < constraints_start_[j + 1]; ++slot)
-      for (int node : held_[constraints_of_rank_[slot]].nodes)
-        visit(node);
     start.push_back(static_cast<int>(neighbours.size()));
   }
   report_.pieces = find_pieces(problem_, start, neighbours);
@@ -322,10 +309,6 @@ void Galerkin::order_and_build_pattern(UnheldPieces unheld) {
     std::sort(column_rows_.begin() + column_start_.back(), column_rows_.end());
     column_start_.push_back(static_cast<int>(column_rows_.size()));
   }
-  CellEvaluator evaluator(spheres_);
-  for (CellShapes& cell : shapes_)
-    evaluator.renumber(rank_, cell);
-  list_by_rank();
 }
 
 void Galerkin::treat_unheld(UnheldPieces unheld) {
@@ -358,44 +341,45 @@ void Galerkin::assemble() {
   int* inner = stiffness_.innerIndexPtr();
   double* values = stiffness_.valuePtr();
   std::fill(values, values + 9 * blocks, 0.0);
-  std::vector<int> place(count, -1);
-  StiffnessColumn column;
   outer[0] = 0;
   for (int j = 0; j < count; ++j) {
     const int begin = column_start_[j], rows = column_start_[j + 1] - begin;
-    const int offset = 9 * begin;
-    double* target[3];
     for (int b = 0; b < 3; ++b) {
-      outer[3 * j + b + 1] = offset + 3 * rows * (b + 1);
-      target[b] = values + offset + static_cast<long>(3 * rows) * b;
-    }
-    for (int k = 0; k < rows; ++k) {
-      const int i = column_rows_[begin + k];
-      place[i] = k;
-      for (int b = 0; b < 3; ++b)
+      outer[3 * j + b + 1] = 9 * begin + 3 * rows * (b + 1);
+      for (int k = 0; k < rows; ++k)
         for (int a = 0; a < 3; ++a)
-          inner[offset + 3 * rows * b + 3 * k + a] = 3 * i + a;
+          inner[9 * begin + 3 * rows * b + 3 * k + a] = 3 * column_rows_[begin + k] + a;
     }
-    const bool is_dropped = !dropped_.empty() && dropped_[order_[j]] != 0;
-    if (is_dropped) // the unknowns stay, alone and without load
+    if (!dropped_.empty() && dropped_[order_[j]] != 0) // the unknowns stay, alone and without load
       for (int c = 0; c < 3; ++c)
-        target[c][c] = problem_.material.young_modulus * problem_.nodes.spacings[order_[j]];
-    for (int slot = cells_start_[j]; slot < cells_start_[j + 1] && !is_dropped; ++slot) {
-      const CellShapes& cell = shapes_[cells_of_rank_[2 * slot]];
-      const int own = cells_of_rank_[2 * slot + 1], size = static_cast<int>(cell.nodes.size());
-      stiffness_column(cell.gradients.data(), cell.points, cell.stride, own, size, own, lambda, mu, column);
-      for (int k = own; k < size; ++k) {
-        const int p = 3 * place[cell.nodes[k]];
-        if (p < 0)
+        values[9L * begin + 3L * rows * c + c] = problem_.material.young_modulus * problem_.nodes.spacings[order_[j]];
+  }
+  StiffnessColumn column;
+  for_clusters([&](CellCluster& cluster) {
+    cluster.gather(rank_);
+    const std::vector<int>& nodes = cluster.nodes();
+    const int size = static_cast<int>(nodes.size());
+    for (int own = 0; own < size; ++own) {
+      if (!dropped_.empty() && dropped_[nodes[own]] != 0)
+        continue;
+      cluster.column(own, lambda, mu, column);
+      const int j = rank_[nodes[own]], begin = column_start_[j], rows = column_start_[j + 1] - begin;
+      double* target[3];
+      for (int b = 0; b < 3; ++b)
+        target[b] = values + 9L * begin + 3L * rows * b;
+      // Both lists of rows ascend; nodes that share no point with the column's are not in the pattern.
+      for (int k = own, row = 0; k < size; ++k) {
+        if ((cluster.reached()[own] & cluster.reached()[k]) == 0)
           continue;
+        const int i = rank_[nodes[k]];
+        while (column_rows_[begin + row] < i)
+          ++row;
         for (int b = 0; b < 3; ++b)
           for (int a = 0; a < 3; ++a)
-            target[b][p + a] += column.plane[3 * a + b][k];
+            target[b][3 * row + a] += column.plane[3 * a + b][k];
       }
     }
-    for (int k = 0; k < rows; ++k)
-      place[column_rows_[begin + k]] = -1;
-  }
+  });
   for (const Anchor& anchor : anchors_) {
     const int j = rank_[anchor.node], first = 3 * column_start_[j], rows = column_start_[j + 1] - column_start_[j];
     const double spring = problem_.material.young_modulus * problem_.nodes.spacings[anchor.node];
@@ -455,7 +439,7 @@ void Galerkin::assemble_loads() {
         const double root = std::sqrt(cells_.points[cells_.start[c] + q].weight);
         const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
         for (std::size_t k = 0; k < cell.nodes.size(); ++k)
-          loads_.segment<3>(3 * static_cast<Eigen::Index>(order_[cell.nodes[k]])) +=
+          loads_.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) +=
               root * initial * Vector3(x[k], x[cell.stride + k], x[2 * cell.stride + k]);
       }
     }

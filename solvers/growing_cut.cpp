@@ -113,7 +113,6 @@ void GrowingCut::State::condense_all() {
     for (int& node : mean.nodes)
       node = id[node]; // ascending still
   boxes.clear();
-  CellEvaluator evaluator(*spheres);
   std::vector<char> in_window(problem.nodes.size(), 0);
   const auto in_reach = reach_of(options.way, true);
   for (const BackgroundBox& leaf : stiffness.cells.boxes) {
@@ -121,7 +120,8 @@ void GrowingCut::State::condense_all() {
     if (in_reach(leaf.centre, leaf.half.norm()))
       for (int c = leaf.first_cell; c < leaf.last_cell; ++c) {
         box.cells.push_back(stiffness.shapes[static_cast<std::size_t>(c)]);
-        evaluator.renumber(elastic_order, box.cells.back());
+        for (int& node : box.cells.back().nodes)
+          node = id[node]; // ascending still
         if (has_cell_loads())
           box.points.emplace_back(stiffness.cells.of(c).begin(), stiffness.cells.of(c).end());
         for (int node : box.cells.back().nodes)
@@ -474,24 +474,34 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   }
   s.next_room += change.added.size();
   s.slot = std::move(new_slot);
-  CellEvaluator numbering(*fresh_spheres);
-  CellShapes by_slot;
+  CellCluster cluster(s.problem.nodes.size() + change.added.size());
+  const auto add = [&](const CellShapes& cell, double sign) {
+    if (!cluster.has_room_for(cell)) {
+      s.scatter(cluster);
+      cluster.clear();
+    }
+    cluster.add(cell, sign);
+  };
+  for (const auto& [b, box] : exchanged) {
+    // A cell that came out as it was cancels itself.
+    const std::vector<CellShapes>& old_cells = s.boxes[b].cells;
+    const auto is_same = [&, &fresh = box.cells](std::size_t c) {
+      return c < old_cells.size() && c < fresh.size() && old_cells[c].nodes == fresh[c].nodes &&
+             old_cells[c].gradients == fresh[c].gradients;
+    };
+    for (std::size_t c = 0; c < old_cells.size(); ++c)
+      if (!is_same(c))
+        add(old_cells[c], -1);
+    for (std::size_t c = 0; c < box.cells.size(); ++c)
+      if (!is_same(c))
+        add(box.cells[c], 1);
+  }
+  if (!cluster.empty())
+    s.scatter(cluster);
   for (auto& exchange : exchanged) {
     const int b = exchange.first;
     State::Box& box = exchange.second;
     s.add_cell_loads(s.boxes[b], -1, *s.spheres, s.cell_loads);
-    // A cell that came out as it was cancels itself.
-    const std::vector<CellShapes>& old_cells = s.boxes[b].cells;
-    const auto is_same = [&](std::size_t c) {
-      return c < old_cells.size() && c < box.cells.size() && old_cells[c].nodes == box.cells[c].nodes &&
-             old_cells[c].gradients == box.cells[c].gradients;
-    };
-    for (std::size_t c = 0; c < old_cells.size(); ++c)
-      if (!is_same(c))
-        s.scatter(old_cells[c], -1, numbering, by_slot);
-    for (std::size_t c = 0; c < box.cells.size(); ++c)
-      if (!is_same(c))
-        s.scatter(box.cells[c], 1, numbering, by_slot);
     if (box.exchanged = true; s.boxes[b].exchanged)
       box.first = std::move(s.boxes[b].first);
     else

@@ -20,7 +20,7 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
       evaluator.evaluate(filled.of(c), cell);
       const int count = static_cast<int>(cell.nodes.size());
       for (int own = 0; own < count; ++own) {
-        stiffness_column(cell.gradients.data(), cell.points, cell.stride, own, count, own, lambda, mu, column);
+        stiffness_column(cell.gradients.data(), nullptr, cell.points, cell.stride, own, count, own, lambda, mu, column);
         for (int i = own; i < count; ++i)
           for (int a = 0; a < 3; ++a)
             for (int b = 0; b < 3; ++b)

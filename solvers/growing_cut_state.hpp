@@ -98,21 +98,21 @@ struct GrowingCut::State {
     }
   }
 
-  /// Adds sign times the stiffness of a cell, whose nodes are all in the window, to S.
-  void scatter(const CellShapes& by_node, double sign, CellEvaluator& evaluator, CellShapes& by_slot) {
-    by_slot = by_node;
-    evaluator.renumber(slot, by_slot);
+  /// Adds the stiffness of a cluster, whose nodes are all in the window, to S.
+  void scatter(CellCluster& cluster) {
+    cluster.gather(slot);
     const double mu = problem.material.shear_modulus(), lambda = problem.material.lame_lambda();
-    const int size = static_cast<int>(by_slot.nodes.size());
+    const std::vector<int>& nodes = cluster.nodes();
+    const int size = static_cast<int>(nodes.size());
     StiffnessColumn column;
     for (int own = 0; own < size; ++own) {
-      stiffness_column(by_slot.gradients.data(), by_slot.points, by_slot.stride, own, size, own, lambda, mu, column);
-      const int first = 3 * by_slot.nodes[own];
+      cluster.column(own, lambda, mu, column);
+      const int first = 3 * slot[nodes[own]];
       for (int b = 0; b < 3; ++b) {
         double* target = window->column(first + b);
         for (int k = own; k < size; ++k)
           for (int a = 0; a < 3; ++a)
-            target[3 * by_slot.nodes[k] + a] += sign * column.plane[3 * a + b][k];
+            target[3 * slot[nodes[k]] + a] += column.plane[3 * a + b][k];
       }
     }
   }

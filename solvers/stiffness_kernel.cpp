@@ -12,24 +12,28 @@ constexpr int lane_count = 8;
 
 // One function, compiled for the baseline and for the vector widths of the machine; the loader picks once.
 __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
-stiffness_column(const double* gradients, int points, int stride, int first, int count, int column, double lambda,
-                 double mu, StiffnessColumn& out) {
+stiffness_column(const double* gradients, const double* signs, int points, int stride, int first, int count, int column,
+                 double lambda, double mu, StiffnessColumn& out) {
   // A point that the column's sphere does not reach adds nothing, whatever the row.
-  const double* reached[stiffness_kernel_points];
+  struct Reached {
+    const double* gradients;
+    double x, y, z; // of the column
+  };
+  Reached reached[stiffness_kernel_points];
   int reached_count = 0;
   for (int q = 0; q < points; ++q) {
     const double* point = gradients + static_cast<long>(3 * q) * stride;
     const double* own = point + column;
+    const double sign = signs == nullptr ? 1 : signs[q];
     if (own[0] != 0 || own[stride] != 0 || own[2 * stride] != 0)
-      reached[reached_count++] = point;
+      reached[reached_count++] = {point, sign * own[0], sign * own[stride], sign * own[2 * stride]};
   }
   const double both = lambda + mu;
   for (int block = first & ~(lane_count - 1); block < count; block += lane_count) {
     Lanes xx{}, xy{}, xz{}, yx{}, yy{}, yz{}, zx{}, zy{}, zz{};
     for (int k = 0; k < reached_count; ++k) {
-      const double* point = reached[k];
-      const double* own = point + column;
-      const double jx = own[0], jy = own[stride], jz = own[2 * stride];
+      const double* point = reached[k].gradients;
+      const double jx = reached[k].x, jy = reached[k].y, jz = reached[k].z;
       const Lanes x = *reinterpret_cast<const Lanes*>(point + block);
       const Lanes y = *reinterpret_cast<const Lanes*>(point + stride + block);
       const Lanes z = *reinterpret_cast<const Lanes*>(point + 2 * stride + block);
