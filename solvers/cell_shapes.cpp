@@ -57,12 +57,12 @@ bool CellCluster::has_room_for(const CellShapes& cell) const {
     return true;
   if (points_ + cell.points > stiffness_kernel_points)
     return false;
-  const auto fresh =
-      std::count_if(cell.nodes.begin(), cell.nodes.end(), [&](int node) { return place_[node] < 0; });
+  const auto fresh = std::count_if(cell.nodes.begin(), cell.nodes.end(), [&](int node) { return place_[node] < 0; });
   return std::ssize(nodes_) + fresh <= stiffness_kernel_rows;
 }
 
-void CellCluster::add(const CellShapes& cell, double sign) {
+void CellCluster::add(const CellShapes& cell, double sign, int id) {
+  cells_.push_back(id);
   for (std::size_t k = 0; k < cell.nodes.size(); ++k) {
     int& place = place_[cell.nodes[k]];
     if (place < 0) {
@@ -81,6 +81,7 @@ void CellCluster::clear() {
   for (int node : nodes_)
     place_[node] = -1;
   parts_.clear();
+  cells_.clear();
   nodes_.clear();
   reached_.clear();
   signs_.clear();

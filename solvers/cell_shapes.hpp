@@ -42,10 +42,11 @@ class CellCluster {
 
   /// Whether there is room for one more cell; there always is in an empty cluster.
   [[nodiscard]] bool has_room_for(const CellShapes& cell) const;
-  /// `sign` multiplies the cell's stiffness. The cell must stay alive until clear().
-  void add(const CellShapes& cell, double sign = 1);
+  /// `sign` multiplies the cell's stiffness. The cell must stay alive until clear(). `id`: what cells() tells.
+  void add(const CellShapes& cell, double sign = 1, int id = -1);
   void clear();
   [[nodiscard]] bool empty() const { return parts_.empty(); }
+  [[nodiscard]] const std::vector<int>& cells() const { return cells_; }
 
   /// Nodes of all cells, as they came until gather() puts them into ascending order of rank[node].
   [[nodiscard]] const std::vector<int>& nodes() const { return nodes_; }
@@ -65,7 +66,7 @@ class CellCluster {
     double sign;
   };
   std::vector<Part> parts_;
-  std::vector<int> nodes_;
+  std::vector<int> cells_, nodes_;
   std::vector<std::uint64_t> reached_;
   std::vector<int> place_; // of a node in nodes_, -1 outside
   int points_ = 0, stride_ = 0;

@@ -116,6 +116,28 @@ double sight_seconds() {
   return std::chrono::duration<double>(sight_time).count();
 }
 
+namespace {
+double now_in_seconds() {
+  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
+} // namespace
+
+SharedSightTime::SharedSightTime() : begin_(now_in_seconds()), sight_begin_(sight_seconds()), sight_(0), spent_(0) {}
+
+SharedSightTime::~SharedSightTime() {
+  const double share = spent_ > 0 ? std::min(1.0, sight_ / spent_) : 0;
+  sight_time = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(sight_begin_ + share * (now_in_seconds() - begin_)));
+}
+
+SharedSightTime::Part::Part(const SharedSightTime& whole)
+    : whole_(whole), begin_(now_in_seconds()), sight_begin_(sight_seconds()) {}
+
+SharedSightTime::Part::~Part() {
+  whole_.sight_ += sight_seconds() - sight_begin_;
+  whole_.spent_ += now_in_seconds() - begin_;
+}
+
 Branch branch_at(const topology::Incision& incision, const FrontFrame& frame, const Vector3& x) {
   const Vector3 d = x - frame.point;
   const double ahead = d.dot(frame.ahead), above = d.dot(frame.normal), r = std::hypot(ahead, above);

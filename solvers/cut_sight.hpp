@@ -5,6 +5,8 @@
 #include "solvers/shape_kernel.hpp"
 #include "solvers/sight.hpp"
 
+#include <atomic>
+
 namespace spherecut::solvers {
 
 /// The four leading terms of the field at a crack front, sqrt(r) {cos t/2, sin t/2, sin t/2 sin t, cos t/2 sin t}, in
@@ -65,5 +67,32 @@ class CutSight {
 /// Wall clock that this thread has spent so far on what points see around cuts (sight lines, ways around the front, the
 /// frame of the nearest front), s. Take differences.
 double sight_seconds();
+
+/// Sight of a loop that threads share: its part of their time counts as that part of the loop's wall clock, for the
+/// thread that waits for them.
+class SharedSightTime {
+ public:
+  SharedSightTime();
+  ~SharedSightTime();
+  SharedSightTime(const SharedSightTime&) = delete;
+  SharedSightTime& operator=(const SharedSightTime&) = delete;
+
+  /// Lives as long as a range of the loop is worked on.
+  class Part {
+   public:
+    explicit Part(const SharedSightTime& whole);
+    ~Part();
+    Part(const Part&) = delete;
+    Part& operator=(const Part&) = delete;
+
+   private:
+    const SharedSightTime& whole_;
+    double begin_, sight_begin_; // s
+  };
+
+ private:
+  double begin_, sight_begin_;                // s
+  mutable std::atomic<double> sight_, spent_; // s, of all parts
+};
 
 } // namespace spherecut::solvers

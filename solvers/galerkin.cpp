@@ -10,7 +10,9 @@
 
 #include "solvers/background_cells.hpp"
 #include "solvers/cell_shapes.hpp"
+#include "solvers/cut_sight.hpp"
 #include "solvers/elastic_body.hpp"
+#include "solvers/parallel.hpp"
 #include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
 
@@ -114,6 +116,9 @@ class Galerkin final : public ElasticBody {
   void hold_surface();
   void order_and_build_pattern(UnheldPieces unheld);
   void treat_unheld(UnheldPieces unheld);
+  void add_to_columns(const CellCluster& cluster, int own, const StiffnessColumn& column);
+  void add_clusters();
+  void add_clusters_in_parallel();
   /// Calls visit(cluster) for clusters of neighbouring cells, all cells in turn.
   template <typename Visit>
   void for_clusters(Visit&& visit) const;
@@ -213,24 +218,27 @@ class Galerkin final : public ElasticBody {
   std::unique_ptr<SurfacePatches> patches_;
   mutable std::unordered_map<int, DisplacementMean> contact_means_; // by node, as they are asked for
   std::vector<DisplacementMean> held_;                              // one per prescribed entry
-  std::vector<char> dropped_;                    // nodes whose unknowns are taken out; empty when there are none
-  std::vector<Anchor> anchors_;                  // hold pieces that nothing else holds
-  std::vector<int> order_;                       // node of every elimination rank
-  std::vector<int> rank_;                        // elimination rank of every node
-  std::vector<CellShapes> shapes_;               // of every cell
-  std::vector<int> column_start_, column_rows_;              // lower block pattern in ranks, rows >= column, ascending
-  SparseMatrix stiffness_;                                   // lower triangle (diagonal blocks full), in ranks
-  std::vector<double> elastic_; // entries of stiffness_ without the penalties of the prescribed means
+  std::vector<char> dropped_;                   // nodes whose unknowns are taken out; empty when there are none
+  std::vector<Anchor> anchors_;                 // hold pieces that nothing else holds
+  std::vector<int> order_;                      // node of every elimination rank
+  std::vector<int> rank_;                       // elimination rank of every node
+  std::vector<CellShapes> shapes_;              // of every cell
+  std::vector<int> column_start_, column_rows_; // lower block pattern in ranks, rows >= column, ascending
+  SparseMatrix stiffness_;                      // lower triangle (diagonal blocks full), in ranks
+  std::vector<double> elastic_;                 // entries of stiffness_ without the penalties of the prescribed means
   VectorX loads_;
   std::unique_ptr<Factorisation> factorisation_;
 };
 
 void Galerkin::evaluate_cells() {
   shapes_.resize(cells_.start.size() - 1);
-  CellEvaluator evaluator(spheres_);
-  for (std::size_t c = 0; c < shapes_.size(); ++c)
-    evaluator.evaluate(std::span(cells_.points).subspan(cells_.start[c], cells_.start[c + 1] - cells_.start[c]),
-                       shapes_[c]);
+  const SharedSightTime sight_time;
+  parallel_ranges(static_cast<int>(shapes_.size()), 64, [&](int begin, int end) {
+    const SharedSightTime::Part timed(sight_time);
+    CellEvaluator evaluator(spheres_);
+    for (int c = begin; c < end; ++c)
+      evaluator.evaluate(cells_.of(c), shapes_[c]);
+  });
 }
 
 void Galerkin::hold_surface() {
@@ -255,7 +263,7 @@ void Galerkin::for_clusters(Visit&& visit) const {
       visit(cluster);
       cluster.clear();
     }
-    cluster.add(shapes_[cell]);
+    cluster.add(shapes_[cell], 1, cell);
   }
   if (!cluster.empty())
     visit(cluster);
@@ -328,9 +336,72 @@ void Galerkin::treat_unheld(UnheldPieces unheld) {
   }
 }
 
+void Galerkin::add_to_columns(const CellCluster& cluster, int own, const StiffnessColumn& column) {
+  const std::vector<int>& nodes = cluster.nodes();
+  const int size = static_cast<int>(nodes.size());
+  const int j = rank_[nodes[own]], begin = column_start_[j], rows = column_start_[j + 1] - begin;
+  double* target[3];
+  for (int b = 0; b < 3; ++b)
+    target[b] = stiffness_.valuePtr() + 9L * begin + 3L * rows * b;
+  // Both lists of rows ascend; nodes that share no point with the column's are not in the pattern.
+  for (int k = own, row = 0; k < size; ++k) {
+    if ((cluster.reached()[own] & cluster.reached()[k]) == 0)
+      continue;
+    const int i = rank_[nodes[k]];
+    while (column_rows_[begin + row] < i)
+      ++row;
+    for (int b = 0; b < 3; ++b)
+      for (int a = 0; a < 3; ++a)
+        target[b][3 * row + a] += column.plane[3 * a + b][k];
+  }
+}
+
+void Galerkin::add_clusters() {
+  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
+  StiffnessColumn column;
+  for_clusters([&](CellCluster& cluster) {
+    cluster.gather(rank_);
+    for (int own = 0; own < std::ssize(cluster.nodes()); ++own)
+      if (dropped_.empty() || dropped_[cluster.nodes()[own]] == 0) {
+        cluster.column(own, lambda, mu, column);
+        add_to_columns(cluster, own, column);
+      }
+  });
+}
+
+/// The same bits: every column of the matrix gets its clusters in their order.
+void Galerkin::add_clusters_in_parallel() {
+  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
+  std::vector<std::vector<int>> clusters;
+  for_clusters([&](const CellCluster& cluster) { clusters.push_back(cluster.cells()); });
+  constexpr int batch = 32;
+  std::vector<std::unique_ptr<CellCluster>> evaluated(batch);
+  for (auto& cluster : evaluated)
+    cluster = std::make_unique<CellCluster>(problem_.nodes.size());
+  const int count = static_cast<int>(clusters.size()), threads = thread_count();
+  for (int first = 0; first < count; first += batch) {
+    const int in_batch = std::min(batch, count - first);
+    parallel_ranges(in_batch, 1, [&](int k, int) {
+      evaluated[k]->clear();
+      for (const int cell : clusters[first + k])
+        evaluated[k]->add(shapes_[cell], 1, cell);
+      evaluated[k]->gather(rank_);
+    });
+    parallel_ranges(4 * threads, 1, [&](int share, int) {
+      StiffnessColumn column;
+      for (int k = 0; k < in_batch; ++k)
+        for (int own = 0; own < std::ssize(evaluated[k]->nodes()); ++own)
+          if (const int node = evaluated[k]->nodes()[own];
+              rank_[node] % (4 * threads) == share && (dropped_.empty() || dropped_[node] == 0)) {
+            evaluated[k]->column(own, lambda, mu, column);
+            add_to_columns(*evaluated[k], own, column);
+          }
+    });
+  }
+}
+
 void Galerkin::assemble() {
   const int count = problem_.nodes.size();
-  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
   const long blocks = static_cast<long>(column_rows_.size());
   if (9 * blocks > std::numeric_limits<int>::max())
     throw InputError(
@@ -354,32 +425,10 @@ void Galerkin::assemble() {
       for (int c = 0; c < 3; ++c)
         values[9L * begin + 3L * rows * c + c] = problem_.material.young_modulus * problem_.nodes.spacings[order_[j]];
   }
-  StiffnessColumn column;
-  for_clusters([&](CellCluster& cluster) {
-    cluster.gather(rank_);
-    const std::vector<int>& nodes = cluster.nodes();
-    const int size = static_cast<int>(nodes.size());
-    for (int own = 0; own < size; ++own) {
-      if (!dropped_.empty() && dropped_[nodes[own]] != 0)
-        continue;
-      cluster.column(own, lambda, mu, column);
-      const int j = rank_[nodes[own]], begin = column_start_[j], rows = column_start_[j + 1] - begin;
-      double* target[3];
-      for (int b = 0; b < 3; ++b)
-        target[b] = values + 9L * begin + 3L * rows * b;
-      // Both lists of rows ascend; nodes that share no point with the column's are not in the pattern.
-      for (int k = own, row = 0; k < size; ++k) {
-        if ((cluster.reached()[own] & cluster.reached()[k]) == 0)
-          continue;
-        const int i = rank_[nodes[k]];
-        while (column_rows_[begin + row] < i)
-          ++row;
-        for (int b = 0; b < 3; ++b)
-          for (int a = 0; a < 3; ++a)
-            target[b][3 * row + a] += column.plane[3 * a + b][k];
-      }
-    }
-  });
+  if (thread_count() == 1)
+    add_clusters();
+  else
+    add_clusters_in_parallel();
   for (const Anchor& anchor : anchors_) {
     const int j = rank_[anchor.node], first = 3 * column_start_[j], rows = column_start_[j + 1] - column_start_[j];
     const double spring = problem_.material.young_modulus * problem_.nodes.spacings[anchor.node];

@@ -1,5 +1,6 @@
 #include "solvers/surface_patches.hpp"
 
+#include "solvers/parallel.hpp"
 #include "topology/errors.hpp"
 #include "topology/point_tree.hpp"
 
@@ -79,6 +80,18 @@ int nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>
   return nearest.index;
 }
 
+/// The same for some of the points.
+std::vector<int> nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>& positions,
+                                  const topology::Incision* incision, const std::vector<SurfacePoint>& points,
+                                  const std::vector<int>& chosen) {
+  std::vector<int> nearest(chosen.size());
+  parallel_ranges(static_cast<int>(chosen.size()), 256, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k)
+      nearest[k] = nearest_in_sight(tree, positions, incision, points[chosen[k]].position);
+  });
+  return nearest;
+}
+
 } // namespace
 
 Vector3 DisplacementMean::of(const VectorX& coefficients) const {
@@ -141,8 +154,11 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
       continue;
     const topology::PointTree tree(positions);
     const int begin = lips ? faces_begin_ : 0, end = lips ? static_cast<int>(points_.size()) : faces_begin_;
-    for (int p = begin; p < end; ++p)
-      points_of_node_[ids[nearest_in_sight(tree, positions, incision_.get(), points_[p].position)]].push_back(p);
+    std::vector<int> all(static_cast<std::size_t>(end - begin));
+    std::iota(all.begin(), all.end(), begin);
+    const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, all);
+    for (std::size_t k = 0; k < all.size(); ++k)
+      points_of_node_[ids[owners[k]]].push_back(all[k]);
   }
 }
 
@@ -163,14 +179,19 @@ SurfacePatches::means(const std::vector<int>& nodes, const Spheres& spheres,
   for (int node : nodes)
     positions.push_back(nodes_.positions[node]);
   const topology::PointTree tree(positions);
-  std::vector<std::vector<int>> chosen(nodes.size());
+  std::vector<int> in_region;
   for (int p = 0; p < faces_begin_; ++p)
     if (held(points_[p].position, points_[p].normal))
-      chosen[nearest_in_sight(tree, positions, incision_.get(), points_[p].position)].push_back(p);
-  std::vector<DisplacementMean> result;
-  result.reserve(nodes.size());
-  for (std::size_t k = 0; k < nodes.size(); ++k)
-    result.push_back(chosen[k].empty() ? value_at(spheres, positions[k]) : mean_over(points_, chosen[k], spheres));
+      in_region.push_back(p);
+  const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, in_region);
+  std::vector<std::vector<int>> chosen(nodes.size());
+  for (std::size_t k = 0; k < in_region.size(); ++k)
+    chosen[owners[k]].push_back(in_region[k]);
+  std::vector<DisplacementMean> result(nodes.size());
+  parallel_ranges(static_cast<int>(nodes.size()), 4, [&](int begin, int end) {
+    for (int k = begin; k < end; ++k)
+      result[k] = chosen[k].empty() ? value_at(spheres, positions[k]) : mean_over(points_, chosen[k], spheres);
+  });
   return result;
 }
 

@@ -1,6 +1,7 @@
 // The command line. Exit status: 0 done, 1 a check of an experiment failed or a replay differs, 2 unusable input or
 // command line, 3 numerical failure, 130 interrupted.
 #include "experiments/experiment.hpp"
+#include "solvers/parallel.hpp"
 #include "src/blas_threads.hpp"
 #include "src/haptics/run_haptics.hpp"
 #include "src/run.hpp"
@@ -10,8 +11,10 @@
 #include "topology/errors.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <fmt/core.h>
+#include <thread>
 
 namespace {
 
@@ -67,6 +70,12 @@ int run_experiment(const std::string& name, const std::string& out, bool quick) 
   return all_pass ? 0 : status_check_failed;
 }
 
+/// Cores of the machine that threads of a solve may have; the real-time loop keeps one for itself.
+int default_threads(bool is_real_time) {
+  const int cores = static_cast<int>(std::thread::hardware_concurrency());
+  return std::clamp(is_real_time ? cores - 1 : cores, 1, 16);
+}
+
 int run(int argc, char** argv) {
   CLI::App commands("Spherecut: palpation of soft tissue by the method of finite spheres", "spherecut");
   commands.set_version_flag("--version", fmt::format("spherecut {}", app::version()));
@@ -76,8 +85,14 @@ int run(int argc, char** argv) {
   std::string name;
   bool quick = false;
   bool names_only = false;
+  int threads = 0;
+  const auto add_threads = [&](CLI::App* command, const std::string& by_default) {
+    command->add_option("--threads", threads,
+                        "Threads of a solve, 1 to 256; the results do not depend on it; default " + by_default);
+  };
 
   auto* run_command = commands.add_subcommand("run", "Run a scenario");
+  add_threads(run_command, "one a core, at most 16");
   run_command->add_option("scenario", scenario, "TOML file")->required();
   run_command->add_option("--out", out, "Folder for the results; must not hold results yet")->required();
 
@@ -98,6 +113,8 @@ int run(int argc, char** argv) {
   haptics->add_option("--solved-every", haptic.solved_stride,
                       "Afterwards solve at every so many ticks for the model's error; 0: not; default 10");
 
+  add_threads(haptics, "one a core but one, at most 16");
+
   app::ServeCommand served;
   auto* serve = commands.add_subcommand("serve", "Press and cut in a browser: a live session at http://ADDRESS:PORT/");
   serve->add_option("scenario", served.scenario, "TOML file; default liver_live.toml of those that come along");
@@ -106,6 +123,8 @@ int run(int argc, char** argv) {
   serve->add_flag("--open", served.open, "Open the page in a browser");
   serve->add_option("--out", served.out, "Folder for recordings; default out/serve");
   serve->add_option("--page", served.page, "Folder of the built page; default: beside the program or as installed");
+
+  add_threads(serve, "one a core but one, at most 16");
 
   auto* experiment = commands.add_subcommand("experiment", "List or run the experiments");
   experiment->require_subcommand(1);
@@ -116,6 +135,7 @@ int run(int argc, char** argv) {
   run_one->add_option("--out", out, "Folder for tables, figures and summary.json; must not hold results yet")
       ->required();
   run_one->add_flag("--quick", quick, "Smaller variant");
+  add_threads(run_one, "1, as times are compared");
 
   auto* help = commands.add_subcommand("scenario-help", "Every key of a scenario file");
   bool markdown = false;
@@ -128,6 +148,13 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return complain(fmt::format("{} (spherecut --help)", error.what()), status_bad_input);
   }
+
+  bool has_threads = false;
+  for (const CLI::App* command : {run_command, haptics, serve, run_one})
+    has_threads = has_threads || (command->parsed() && command->count("--threads") > 0);
+  solvers::set_thread_count(has_threads         ? threads
+                            : run_one->parsed() ? 1
+                                                : default_threads(haptics->parsed() || serve->parsed()));
 
   if (run_command->parsed())
     return status_of(app::run_scenario(scenario, out, stdout));

@@ -170,7 +170,7 @@ TEST_CASE(
   for (const std::string threads : {"1", "2"}) {
     const auto out = folder.path() / ("out" + threads);
     const ProgramResult result = run_shell("OPENBLAS_NUM_THREADS=" + threads + " OMP_NUM_THREADS=" + threads + " " +
-                                           spherecut_command({"run", scenario, "--out", out}));
+                                           spherecut_command({"run", scenario, "--out", out, "--threads", threads}));
     INFO(result.err);
     REQUIRE(result.status == 0);
     CHECK_THAT(result.out, Contains("peak force") && Contains("cut of") && Contains("1 piece"));
