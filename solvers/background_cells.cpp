@@ -15,6 +15,8 @@ namespace {
 /// Halving a cell that is a little too large would cost eight times the points: where the spacing is graded, cells
 /// range from slack / 2 to slack times the size asked for.
 constexpr double slack = 1.6;
+/// A node within a cell may want smaller ones by this much before the cell is divided for it.
+constexpr double finer_node_slack = 1.3;
 
 /// Part of a box on the inner side of a plane through it, by the distance of its centre: exact for a box cut parallel
 /// to a face, second order otherwise.
@@ -273,7 +275,7 @@ class Octree {
       return;
     const double longest = 2 * half.maxCoeff(), spacing = spacing_near(centre);
     // A coarse node may be nearest to the centre while fine ones sit in a corner: large cells always divide.
-    if (longest > slack * filler_.size_wanted(centre, spacing) * spacing || holds_finer_node(centre, half, longest)) {
+    if (longest > slack * filler_.size_wanted(centre, spacing) * spacing || holds_finer_node(centre, half)) {
       std::array<int, 3> parts{};
       for (int c = 0; c < 3; ++c)
         parts[c] = half[c] > 0.3 * longest ? 2 : 1;
@@ -289,12 +291,11 @@ class Octree {
     filler_.fill(centre, half, spacing, distance);
   }
 
-  bool holds_finer_node(const Vector3& centre, const Vector3& half, double longest) {
+  bool holds_finer_node(const Vector3& centre, const Vector3& half) {
     found_.clear();
     tree_.within(centre, half.norm(), found_);
     return std::any_of(found_.begin(), found_.end(), [&](const topology::PointTree::Found& node) {
-      return ((nodes_.positions[node.index] - centre).cwiseAbs().array() <= half.array()).all() &&
-             longest > 1.3 * slack * options_.cell_size * nodes_.spacings[node.index];
+      return is_too_large({centre, half}, nodes_.positions[node.index], nodes_.spacings[node.index], options_);
     });
   }
 
@@ -318,6 +319,11 @@ BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud
   if (nodes.size() == 0)
     throw InputError("background cells need nodes: their spacings set the size");
   return Octree(domain, nodes, options, incision).build();
+}
+
+bool is_too_large(const BackgroundBox& box, const Vector3& x, double spacing, const BackgroundOptions& options) {
+  return ((x - box.centre).cwiseAbs().array() <= box.half.array()).all() &&
+         2 * box.half.maxCoeff() > finer_node_slack * slack * options.cell_size * spacing;
 }
 
 void refill_box(const topology::Domain& domain, const BackgroundBox& box, const BackgroundOptions& options,

@@ -49,6 +49,10 @@ BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud
 void refill_box(const topology::Domain& domain, const BackgroundBox& box, const BackgroundOptions& options,
                 const topology::Incision* incision, BackgroundCells& out);
 
+/// Whether a box of the octree is larger than it would be made with a node of this spacing at x; false when x lies
+/// outside it.
+bool is_too_large(const BackgroundBox& box, const Vector3& x, double spacing, const BackgroundOptions& options);
+
 /// Most points of one cell.
 inline constexpr int most_cell_points = 27;
 

@@ -113,13 +113,12 @@ BodyGrowth GrowingBody::grow(const SprinkleIncrement& change, Problem grown,
   report_.pieces = std::move(pieces);
   report_.grown_supports = cut_->spheres().grown();
   if (growth.update.condensed_anew) {
-    const double condition = report_.condition_estimate;
     const AssemblyReport& anew = cut_->report();
     report_.supports_seconds = anew.supports_seconds;
     report_.assembly_seconds = std::max(0.0, growth.update.total_seconds - anew.supports_seconds - anew.factor_seconds);
     report_.factor_seconds = anew.factor_seconds;
     report_.worst_moment_condition = anew.worst_moment_condition;
-    report_.condition_estimate = condition;
+    report_.condition_estimate = anew.condition_estimate;
   } else {
     report_.supports_seconds = growth.update.spheres_seconds;
     report_.assembly_seconds = growth.update.cells_seconds;

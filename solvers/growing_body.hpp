@@ -27,7 +27,8 @@ class GrowingBody final : public Discretisation {
 
   [[nodiscard]] Method method() const override { return Method::galerkin; }
   [[nodiscard]] const Problem& problem() const override { return problem_; }
-  /// Pieces are told by which nodes see each other; seconds are those of the last increment.
+  /// Pieces are told by which nodes see each other; seconds are those of the last increment, the condition is that of
+  /// the last condensation.
   [[nodiscard]] const AssemblyReport& report() const override { return report_; }
   [[nodiscard]] const GrowingCut& system() const { return *cut_; }
 

@@ -1,6 +1,8 @@
 #include "solvers/growing_cut.hpp"
 
+#include "solvers/cut_sight.hpp"
 #include "solvers/growing_cut_state.hpp"
+#include "solvers/parallel.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Cholesky>
@@ -89,10 +91,7 @@ void GrowingCut::State::condense_all() {
   present.nodes = present_nodes(problem.nodes, removed);
   for (Prescribed& entry : present.prescribed)
     entry.node = compact[entry.node];
-  // The ordinary factor is good for the condition estimate alone.
-  const std::unique_ptr<Discretisation> body = options.method.estimate_condition
-                                                   ? discretise(std::move(present), options.method)
-                                                   : assemble_galerkin(std::move(present), options.method);
+  const std::unique_ptr<Discretisation> body = assemble_galerkin(std::move(present), options.method);
   const OrderedStiffness stiffness = stiffness_of(*body);
   if (stiffness.dropped)
     throw InputError("a severed piece that leaves the computation cannot be followed by an update");
@@ -166,7 +165,14 @@ void GrowingCut::State::condense_all() {
   };
   const int contact_nodes = count([&](int node) { return in_contact[node] != 0; });
   const int changing = count([&](int node) { return in_contact[node] == 0 && in_window[node] != 0; });
+  const Stopwatch factor_watch;
   window = std::make_unique<SchurWindow>(permuted, 3 * changing, 3 * options.room, 3 * contact_nodes);
+  report.factor_seconds = factor_watch.seconds();
+  report.factor_nonzeros = window->factor_nonzeros();
+  if (options.method.estimate_condition) {
+    report.condition_estimate = window->condition_estimate();
+    require_regular(report);
+  }
   slot.assign(problem.nodes.size(), -1);
   window_node.assign(static_cast<std::size_t>(window->slots() / 3), -1);
   far_order.clear();
@@ -272,7 +278,6 @@ void GrowingCut::State::condense_contact() {
 GrowingCut::GrowingCut(Problem problem, GrowthOptions options)
     : state_(std::make_unique<State>(std::move(problem), std::move(options))) {
   state_->condense_all();
-  state_->options.method.estimate_condition = false; // once is enough
 }
 
 GrowingCut::~GrowingCut() = default;
@@ -365,8 +370,6 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   for (int k = 0; k < change.added.size(); ++k)
     new_slot.push_back(s.next_room + k);
   std::vector<std::pair<int, State::Box>> exchanged;
-  CellEvaluator evaluator(*fresh_spheres);
-  BackgroundCells filled;
   BoundingBox touched{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
   const auto include = [&](const Vector3& x, double reach) {
     touched.lower = touched.lower.cwiseMin((x.array() - reach).matrix());
@@ -392,7 +395,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     include(next.nodes.positions[i], radius);
   }
   const char* outside = nullptr;
-  for (int b = 0; b < std::ssize(s.boxes) && outside == nullptr; ++b) {
+  std::vector<int> touched_boxes;
+  for (int b = 0; b < std::ssize(s.boxes); ++b) {
     const BackgroundBox& leaf = s.boxes[b].box;
     if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
         ((touched.upper - leaf.centre).array() < -leaf.half.array()).any())
@@ -404,17 +408,34 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
                     [&](const auto& ball) { return (ball.first - leaf.centre).norm() < ball.second + half; });
     if (!is_touched)
       continue;
-    State::Box box{leaf, {}, {}};
-    refill_box(*next.domain, leaf, s.background(), incision.get(), filled);
-    s.evaluate(box, filled, evaluator);
     if (s.boxes[b].cells.empty())
-      outside = "the cut left the predicted way";
-    for (const State::Box* one : {&std::as_const(box), &std::as_const(s.boxes[b])})
+      return anew("the cut left the predicted way", std::move(next), std::move(removed));
+    for (int k = 0; k < change.added.size(); ++k)
+      if (is_too_large(leaf, change.added.positions[k], change.added.spacings[k], s.background()))
+        return anew("the added nodes are finer than the cells", std::move(next), std::move(removed));
+    touched_boxes.push_back(b);
+  }
+  std::vector<State::Box> fresh_boxes(touched_boxes.size());
+  {
+    const SharedSightTime shared_sight;
+    parallel_ranges(static_cast<int>(touched_boxes.size()), 16, [&](int begin, int end) {
+      const SharedSightTime::Part timed(shared_sight);
+      CellEvaluator evaluator(*fresh_spheres);
+      BackgroundCells filled;
+      for (int k = begin; k < end; ++k) {
+        fresh_boxes[k].box = s.boxes[touched_boxes[k]].box;
+        refill_box(*next.domain, fresh_boxes[k].box, s.background(), incision.get(), filled);
+        s.evaluate(fresh_boxes[k], filled, evaluator);
+      }
+    });
+  }
+  for (std::size_t k = 0; k < touched_boxes.size(); ++k) {
+    for (const State::Box* one : {&std::as_const(fresh_boxes[k]), &std::as_const(s.boxes[touched_boxes[k]])})
       for (const CellShapes& cell : one->cells)
         for (int node : cell.nodes)
           if (new_slot[node] < 0)
             outside = "the cut left the predicted way";
-    exchanged.emplace_back(b, std::move(box));
+    exchanged.emplace_back(touched_boxes[k], std::move(fresh_boxes[k]));
   }
   // The same for means over the surface: those whose points see the change have new weights, and where the faces or
   // surface nodes come near the shares themselves are new.

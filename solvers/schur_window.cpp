@@ -84,6 +84,7 @@ SchurWindow::SchurWindow(const SparseMatrix& lower, int changing, int room, int 
     throw InputError(fmt::format("a window of {} changing and {} contact unknowns with room for {} does not fit a "
                                  "system of {}",
                                  changing, contact, room, lower.rows()));
+  norm_ = one_norm(lower, true);
   cholesky_ = factor_ordered(lower);
   const int window = changing + contact;
   trailing_ = cholesky_->trailing(window);
@@ -98,6 +99,10 @@ SchurWindow::SchurWindow(const SparseMatrix& lower, int changing, int room, int 
     for (int i = j; i < window; ++i)
       schur_(slot_of(far_ + i), slot) = product(i, j);
   }
+}
+
+double SchurWindow::condition_estimate() const {
+  return solvers::condition_estimate(*cholesky_, norm_, far_ + changing_ + contact_);
 }
 
 void SchurWindow::activate(int slot) {

@@ -23,6 +23,11 @@ class SchurWindow {
   /// the counts do not fit.
   SchurWindow(const SparseMatrix& lower, int changing, int room, int contact);
 
+  /// Condition of K as it was given (solvers::condition_estimate).
+  [[nodiscard]] double condition_estimate() const;
+  /// Nonzeros of the sparse factor.
+  [[nodiscard]] long factor_nonzeros() const { return cholesky_->nonzeros(); }
+
   [[nodiscard]] int far() const { return far_; }
   [[nodiscard]] int slots() const { return static_cast<int>(schur_.rows()); }
   [[nodiscard]] int contact_begin() const { return changing_ + room_; }
@@ -81,6 +86,7 @@ class SchurWindow {
   [[nodiscard]] MatrixX recover_from(MatrixX halfway, const MatrixX& window) const;
 
   int far_, changing_, room_, contact_;
+  double norm_; // of K
   std::unique_ptr<OrderedCholesky> cholesky_;
   MatrixX trailing_;          // L_WW at construction
   MatrixX schur_;             // lower triangle, by slots

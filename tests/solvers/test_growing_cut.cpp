@@ -168,6 +168,55 @@ TEST_CASE("A cut that leaves its predicted way is condensed anew, and said", "[g
   CHECK(left);
 }
 
+TEST_CASE("Nodes finer than the cells they come into are not followed on those cells", "[growing_cut]") {
+  GrowingBlock block;
+  GrowthOptions options;
+  options.method.sight = SightRule::diffraction;
+  options.way = block.way(-0.5, 0.4);
+  options.contact = block.contact();
+  options.method.estimate_condition = true;
+  GrowingCut cut(block.problem(), options);
+  const double condition = cut.report().condition_estimate;
+  CHECK(condition > 1);
+  NodeChange change = block.grow(0.12);
+  NodeCloud fine;
+  const Vector3 middle = block.frame.origin + 0.5 * spacing * block.frame.normal;
+  for (int k = 0; k < 27; ++k)
+    fine.add(middle + spacing / 3 * Vector3(k % 3 - 1.0, k / 3 % 3 - 1.0, k / 9 - 1.0), spacing / 3, NodeKind::interior,
+             Vector3::Zero());
+  for (int k = 0; k < fine.size(); ++k) {
+    change.added.add(fine.positions[k], fine.spacings[k], fine.kinds[k], fine.normals[k]);
+    block.nodes.add(fine.positions[k], fine.spacings[k], fine.kinds[k], fine.normals[k]);
+  }
+  block.removed.resize(static_cast<std::size_t>(block.nodes.size()), 0);
+  const GrowthReport report = cut.grow(change, block.incision());
+  CHECK(report.condensed_anew);
+  CHECK_THAT(report.reason, Catch::Contains("finer than the cells"));
+  CHECK(cut.report().condition_estimate > 1);
+  CHECK(cut.report().condition_estimate != condition); // that of the body as it is now
+
+  // The body assembled on the same nodes without any growth.
+  Problem present = block.problem();
+  present.nodes = {};
+  std::vector<int> place(static_cast<std::size_t>(block.nodes.size()), -1);
+  for (int i = 0; i < block.nodes.size(); ++i)
+    if (block.removed[i] == 0) {
+      place[i] = present.nodes.size();
+      present.nodes.add(block.nodes.positions[i], block.nodes.spacings[i], block.nodes.kinds[i],
+                        block.nodes.normals[i]);
+    }
+  for (Prescribed& entry : present.prescribed)
+    entry.node = place[entry.node];
+  const std::unique_ptr<Discretisation> anew = discretise(std::move(present), options.method);
+  const VectorX followed = cut.coefficients(std::vector<Vector3>(options.contact.size(), Vector3::Zero()));
+  const VectorX expected = anew->solve().coefficients;
+  double worst = 0;
+  for (int i = 0; i < block.nodes.size(); ++i)
+    if (place[i] >= 0)
+      worst = std::max(worst, (followed.segment<3>(3 * i) - expected.segment<3>(3 * place[i])).norm());
+  CHECK(worst < 1e-6 * expected.lpNorm<Eigen::Infinity>());
+}
+
 TEST_CASE("A growing cut refuses what it cannot update", "[growing_cut]") {
   GrowingBlock block;
   GrowthOptions options;
