@@ -58,6 +58,7 @@ bool at_rest(const DeviceState& a, const DeviceState& b) {
 void haptic_thread(const HapticSettings& settings, Device& device, const DeviceState& first, HapticTick& core,
                    Shared& shared, const RealtimeOptions& options, std::uint64_t count,
                    RealtimeReport& report) noexcept {
+  pthread_setname_np(pthread_self(), "haptic"); // so that a profiler finds it
   report.fifo = options.fifo && ask_for_fifo();
   const bool spins = report.fifo && std::thread::hardware_concurrency() > 1;
   const auto period = static_cast<long long>(std::llround(static_cast<double>(second) / settings.rate));
@@ -99,6 +100,7 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
 
 void simulation_thread(const HapticSettings& settings, HapticSimulation& simulation, Shared& shared, ViewerFeed& feed,
                        const RealtimeOptions& options, std::uint64_t& lost, RealtimeReport& report) {
+  pthread_setname_np(pthread_self(), "simulation");
   DegradationRule rule(settings.budget);
   std::uint64_t sequence = 0;
   std::optional<DeviceState> solved; // the last that was

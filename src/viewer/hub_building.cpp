@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <utility>
 
 namespace spherecut::app {
@@ -119,7 +120,10 @@ void Hub::finish_building() {
     // The old one may be in a long solve: it ends on a thread of its own, one at a time.
     if (ending_.joinable())
       ending_.join();
-    ending_ = std::thread([old = std::move(session_)]() mutable { old.reset(); });
+    ending_ = std::thread([old = std::move(session_)]() mutable {
+      old.reset();
+      malloc_trim(0);
+    });
     session_ = std::move(job->session);
     ++epoch_;
     changed_ = job->about == "set" || (changed_ && job->about != "scenario" && job->about != "replay");

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <spawn.h>
 #include <unistd.h>
 
@@ -57,9 +58,18 @@ std::string url_of(const std::string& address, int port) {
   return fmt::format("http://{}:{}/", host, port);
 }
 
+/// Sessions come and go, each with threads of its own. With an arena for every thread, and thresholds that grow with
+/// what was freed, glibc keeps most of what the ones before had.
+void keep_memory_together() {
+  mallopt(M_ARENA_MAX, 2);
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);  // bytes; also keeps it from growing
+  mallopt(M_TRIM_THRESHOLD, 16 << 20); // bytes
+}
+
 } // namespace
 
 RunEnd serve(const ServeCommand& command, std::FILE* screen) {
+  keep_memory_together();
   const InterruptWatch watch;
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };

@@ -2,6 +2,7 @@
 # The page of `spherecut serve` under test: run.sh BUILD_FOLDER KIND [ARGUMENTS]
 #   unit             the protocol's decoder and the surface, under node
 #   browser          the page in Chromium against the server
+#   tear             likewise: the grasper lifts a flap that tears
 #   pictures FOLDER  pictures of the page, JPEG below 150 kB, for docs/images
 #   measure          frame rate and latency at 20,000 triangles
 #   soak SECONDS [SEED]  random pressing and cutting
@@ -22,5 +23,5 @@ if [ "$kind" = unit ]; then
   exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs"
 fi
 command -v chromium >/dev/null || skip "the Debian package chromium is not installed"
-[ "$kind" = browser ] && kind=browser.test
+case $kind in browser | tear) kind=$kind.test ;; esac
 exec "$node" "$build/page-tests/$kind.mjs" "$build" "$source" "$@"

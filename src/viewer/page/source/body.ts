@@ -13,7 +13,7 @@ import {
 } from 'three';
 import { linearTable, sequential } from './colours';
 import { Part, type Scalars, type Topology, type Vec3 } from './protocol';
-import { castRay, frontEdges, type Hit, lipDistance, lipEdges, trianglesOf, vertexNormals } from './surface';
+import { castRay, frontEdges, frontFaces, type Hit, lipDistance, lipEdges, trianglesOf, vertexNormals } from './surface';
 
 const tissueColour = new Color('#9a4b45');
 const wallColour = new Color('#84191f');
@@ -27,6 +27,7 @@ const table = linearTable(sequential, tableSize);
 interface Skin {
   mesh: Mesh<BufferGeometry, MeshPhongMaterial>;
   triangles: Uint32Array;
+  drawn: BufferAttribute; // those of them that are drawn, in front of the geometry's index
   normals: BufferAttribute;
 }
 
@@ -64,7 +65,9 @@ export class Body {
       geometry.setAttribute('position', positions);
       geometry.setAttribute('normal', normals);
       geometry.setAttribute('color', colours);
-      geometry.setIndex(new BufferAttribute(triangles, 1));
+      const drawn = new BufferAttribute(triangles.slice(), 1);
+      drawn.setUsage(DynamicDrawUsage);
+      geometry.setIndex(drawn);
       const material = new MeshPhongMaterial({
         color: colour,
         emissive: colour.clone().multiplyScalar(glow),
@@ -78,7 +81,7 @@ export class Body {
       const mesh = new Mesh(geometry, material);
       mesh.frustumCulled = false;
       this.group.add(mesh);
-      return { mesh, triangles, normals };
+      return { mesh, triangles, drawn, normals };
     };
     this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), tissueColour, 26, 0);
     this.wall = skin(trianglesOf(topology, (part) => part !== Part.organ), wallColour, 8, wallGlow);
@@ -141,6 +144,22 @@ export class Body {
       material.depthWrite = !transparent;
       material.wireframe = wireframe;
       material.needsUpdate = true;
+    }
+  }
+
+  /**
+   * Leaves out of the next picture what turns its back to `eye`. Where the processor draws, triangles cost what a picture
+   * costs, seen or not, and pixels hardly anything.
+   */
+  leaveOutBacks(eye: Vec3): void {
+    for (const skin of [this.organ, this.wall]) {
+      if (!skin || !this.positions || skin.triangles.length === 0) continue;
+      const drawn = skin.drawn.array as Uint32Array;
+      let count = skin.triangles.length;
+      if (this.transparent || this.wireframe) drawn.set(skin.triangles);
+      else count = frontFaces(this.positions.array as Float32Array, skin.triangles, eye, drawn);
+      skin.mesh.geometry.setDrawRange(0, count);
+      skin.drawn.needsUpdate = true;
     }
   }
 

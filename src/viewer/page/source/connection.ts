@@ -10,12 +10,14 @@ export interface Listener {
   onFrame(frame: Frame): void;
 }
 
-/** Frames that may be on their way at a time. */
+/** Frames that may be on their way at a time; where pictures are slow one, or it waits for the picture before. */
 const credit = 2;
+const slowPicture = 0.025; // s
 
 export class Connection {
   private socket: WebSocket | null = null;
   private wait = 500; // ms until the next attempt
+  private heldBack = false; // one of the credit
 
   constructor(
     private readonly address: string,
@@ -32,9 +34,13 @@ export class Connection {
     if (this.ready) this.socket?.send(JSON.stringify(message));
   }
 
-  /** Gives back the credit of a frame that has been shown. */
-  shown(): void {
-    this.send({ type: 'credit', frames: 1 });
+  /** Gives back the credit of frames that have been shown, the last of them in a picture that took `seconds`. */
+  shown(frames: number, seconds: number): void {
+    const slow = seconds > slowPicture;
+    if (slow && !this.heldBack) frames -= 1;
+    if (!slow && this.heldBack) frames += 1;
+    this.heldBack = slow;
+    if (frames > 0) this.send({ type: 'credit', frames });
   }
 
   private open(): void {
@@ -45,6 +51,7 @@ export class Connection {
     let fault = '';
     socket.onopen = () => {
       this.send({ type: 'hello', version: protocolVersion });
+      this.heldBack = false;
       this.send({ type: 'credit', frames: credit });
       this.listener.onState('open', '');
     };

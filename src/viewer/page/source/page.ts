@@ -194,7 +194,9 @@ export class Page {
     requestAnimationFrame(() => this.paint());
     const frames = this.pending;
     this.pending = [];
-    for (const frame of frames) this.take(frame);
+    // Of several only the newest vertices are seen.
+    const seen = frames.map((frame) => frame.vertices !== null).lastIndexOf(true);
+    frames.forEach((frame, i) => this.take(frame, i === seen));
     const now = performance.now();
     if (this.view.draw()) {
       this.drawn.push(now);
@@ -202,15 +204,17 @@ export class Page {
       // The picture counts when it is done, not when it is ordered.
       if (this.frame) this.latency.drawn(this.frame.poseInSolve, performance.now());
     }
-    frames.forEach(() => this.connection.shown());
-    if (frames.length > 0) this.showNumbers(now);
+    if (frames.length > 0) {
+      this.connection.shown(frames.length, this.view.pictureSeconds);
+      this.showNumbers(now);
+    }
   }
 
-  private take(frame: Frame): void {
+  private take(frame: Frame, moves: boolean): void {
     const body = this.view.body;
     if (frame.epoch !== this.session?.epoch || frame.topology !== body.topology?.topology) return;
     this.frame = frame;
-    if (frame.vertices) body.setVertices(frame.vertices);
+    if (frame.vertices && moves) body.setVertices(frame.vertices);
     if (frame.vertices || frame.scalars) this.scalars = frame.scalars;
     this.nodes = frame.nodes ?? this.nodes;
     this.support = frame.support ?? this.support;
@@ -291,7 +295,8 @@ export class Page {
 
   private step(): void {
     const now = performance.now();
-    const seconds = Math.min((now - this.lastStep) / 1000, 0.05);
+    // A picture that takes long holds this up; the hand and keys that are held go on by what was missed.
+    const seconds = Math.min((now - this.lastStep) / 1000, 0.3);
     this.lastStep = now;
     if (this.keyboard.advance(seconds)) this.view.change();
     this.stylus.advance(seconds);

@@ -52,6 +52,34 @@ export function vertexNormals(positions: Float32Array, triangles: Uint32Array, n
   }
 }
 
+/** Writes the triangles that turn their front to `eye` into `front`; how many indices that is. */
+export function frontFaces(positions: Float32Array, triangles: Uint32Array, eye: Vec3, front: Uint32Array): number {
+  const p = positions as ArrayLike<number> as number[];
+  const index = triangles as ArrayLike<number> as number[];
+  const [ex, ey, ez] = eye;
+  let count = 0;
+  for (let i = 0; i < triangles.length; i += 3) {
+    const a = 3 * index[i]!;
+    const b = 3 * index[i + 1]!;
+    const c = 3 * index[i + 2]!;
+    const x = p[a]!;
+    const y = p[a + 1]!;
+    const z = p[a + 2]!;
+    const ux = p[b]! - x;
+    const uy = p[b + 1]! - y;
+    const uz = p[b + 2]! - z;
+    const vx = p[c]! - x;
+    const vy = p[c + 1]! - y;
+    const vz = p[c + 2]! - z;
+    if ((uy * vz - uz * vy) * (ex - x) + (uz * vx - ux * vz) * (ey - y) + (ux * vy - uy * vx) * (ez - z) <= 0) continue;
+    front[count] = index[i]!;
+    front[count + 1] = index[i + 1]!;
+    front[count + 2] = index[i + 2]!;
+    count += 3;
+  }
+  return count;
+}
+
 /** Edges between the organ's own surface and a wall: the lips, as pairs of vertices. */
 export function lipEdges(topology: Topology): Uint32Array {
   const key = (a: number, b: number): number => Math.min(a, b) * topology.vertexCount + Math.max(a, b);

@@ -157,14 +157,14 @@ function metal(colour = steel): MeshPhongMaterial {
 
 /** A solid of revolution along +z from `from`, m. */
 function rod(radius: number, from: number, length: number, material: Material): Mesh {
-  const mesh = new Mesh(new CylinderGeometry(radius, radius, length, 28), material);
+  const mesh = new Mesh(new CylinderGeometry(radius, radius, length, 24), material);
   mesh.quaternion.setFromUnitVectors(along, up);
   mesh.position.set(0, 0, from + 0.5 * length);
   return mesh;
 }
 
 function ball(radius: number, material: Material): Mesh {
-  const mesh = new Mesh(new SphereGeometry(radius, 36, 24), material);
+  const mesh = new Mesh(new SphereGeometry(radius, 24, 16), material);
   mesh.position.set(0, 0, radius);
   return mesh;
 }

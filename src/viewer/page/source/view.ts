@@ -95,6 +95,7 @@ export class View {
     const above = new Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
     // A lamp over the left shoulder: shading tells the shape from every side.
     this.lamp.position.copy(camera.position).addScaledVector(right, -0.35).addScaledVector(above, 0.45);
+    if (this.software) this.body.leaveOutBacks(camera.position.toArray() as Vec3);
     this.renderer.render(this.scene, camera);
   }
 

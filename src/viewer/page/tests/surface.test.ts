@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { Part, Tag, type Topology } from '../source/protocol';
-import { castRay, frontEdges, lipDistance, lipEdges, trianglesOf, vertexNormals } from '../source/surface';
+import { castRay, frontEdges, frontFaces, lipDistance, lipEdges, trianglesOf, vertexNormals } from '../source/surface';
 
 /** A square of two triangles at z = 0, and a wall of one triangle below the edge from 1 to 2. */
 const square: Topology = {
@@ -25,6 +25,14 @@ test('Normals are of unit length and point to where the triangles face', () => {
   vertexNormals(square.rest, trianglesOf(square, (part) => part === Part.organ), normals);
   for (let v = 0; v < 4; ++v) assert.deepEqual([...normals.subarray(3 * v, 3 * v + 3)], [0, 0, 1]);
   assert.deepEqual([...normals.subarray(12)], [0, 0, 0]);
+});
+
+test('Faces are in front for an eye on their outer side alone', () => {
+  const front = new Uint32Array(9);
+  assert.equal(frontFaces(square.rest, square.triangles, [0.5, 0.5, 2], front), 6);
+  assert.deepEqual([...front.subarray(0, 6)], [0, 1, 2, 0, 2, 3]);
+  assert.equal(frontFaces(square.rest, square.triangles, [3, 0.5, -2], front), 3);
+  assert.deepEqual([...front.subarray(0, 3)], [2, 1, 4]);
 });
 
 test('A ray meets the nearest face that looks at it', () => {

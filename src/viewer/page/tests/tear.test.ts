@@ -1,0 +1,89 @@
+// The grasper in the hand, by mouse and by keyboard, on a flap that tears: node tear.test.mjs BUILD_FOLDER SOURCE_FOLDER
+import assert from 'node:assert/strict';
+import { join } from 'node:path';
+import test, { after, before } from 'node:test';
+import type { Browser } from 'playwright-core';
+import { launch, type Opened, openPage, until } from './browser';
+import { hover, look, ready } from './hand';
+import { serve, type Served } from './server';
+
+const [build = '.', source = '.'] = process.argv.slice(2);
+const flap = { x: -0.062, y: 0.003 }; // m, where it is held
+let served: Served;
+let browser: Browser;
+let opened: Opened;
+
+before(async () => {
+  // The flap of the liver with fewer triangles and nodes: the same tear, sooner.
+  served = await serve(build, join(source, 'scenarios/liver_flap.toml'), (text) =>
+    text
+      .replace('triangles = 20000', 'triangles = 5000')
+      .replace('fine_spacing = 0.004', 'fine_spacing = 0.006')
+      .replace('coarse_spacing = 0.020', 'coarse_spacing = 0.026')
+      .replace('fine_radius = 0.006', 'fine_radius = 0.008'),
+  );
+  browser = await launch();
+  opened = await openPage(browser, served.address);
+});
+
+after(async () => {
+  await browser?.close();
+  await served?.stop();
+});
+
+test('The grasper is what this scenario offers, beside no probe and no blade', async () => {
+  const { tab } = opened;
+  await ready(tab);
+  const seen = await look(tab);
+  assert.deepEqual(seen.modes, ['grasper']);
+  assert.equal(seen.mode, 'grasper');
+  assert.ok(seen.cutArea > 1e-3, `the precut has ${seen.cutArea} m2`);
+  assert.equal(seen.force, 0);
+});
+
+test('By mouse: it takes hold, pulls, and the tissue pulls back', async () => {
+  const { tab } = opened;
+  await hover(tab, flap.x, flap.y);
+  await tab.mouse.down();
+  await until(tab, 'it pulls', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.01, 150);
+  await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3, 150);
+});
+
+test('Pulled further it tears: the cut grows and its sides part', async () => {
+  const { tab } = opened;
+  const before = await look(tab);
+  await tab.keyboard.down(',');
+  await until(tab, 'the hand is far up', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber <= -15);
+  await tab.keyboard.up(',');
+  await tab.waitForFunction((area) => globalThis.spherecut!.frame!.cutArea > 1.02 * area, before.cutArea, { timeout: 120_000 });
+  const torn = await look(tab);
+  assert.ok(torn.cutArea > 1.02 * before.cutArea, `${before.cutArea} m2 became ${torn.cutArea}`);
+  assert.ok(torn.lips > before.lips + 5e-4, `${before.lips} m became ${torn.lips}`);
+});
+
+test('Let go, it is without force, and what is torn stays torn', async () => {
+  const { tab } = opened;
+  const before = await look(tab);
+  await tab.mouse.up();
+  await until(tab, 'it has let go', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0, 150);
+  const after = await look(tab);
+  assert.ok(after.cutArea >= before.cutArea);
+});
+
+test('By keyboard: a reset, then the grasper takes hold and pulls', async () => {
+  const { tab } = opened;
+  const epoch = await tab.evaluate(() => globalThis.spherecut!.session!.epoch);
+  await hover(tab, flap.x, flap.y); // the arrows go on from there
+  await tab.keyboard.press('r');
+  await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 90_000 });
+  await until(tab, 'a frame', () => globalThis.spherecut!.frame?.epoch === globalThis.spherecut!.session!.epoch);
+  await tab.focus('#scene');
+  await tab.keyboard.down('ArrowLeft');
+  await tab.waitForTimeout(120);
+  await tab.keyboard.up('ArrowLeft');
+  await tab.keyboard.press('Space');
+  await until(tab, 'it pulls', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.01, 150);
+  await tab.keyboard.press('Space');
+  await until(tab, 'it has let go', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0, 150);
+  assert.deepEqual(opened.complaints, []);
+});
