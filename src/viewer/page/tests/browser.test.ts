@@ -162,7 +162,7 @@ test('Everything goes by keyboard', async () => {
   await until(tab, 'the press is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.02);
   const before = await look(tab);
   await tab.keyboard.down('.');
-  await tab.waitForTimeout(600);
+  await until(tab, 'the key is felt', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber > 8);
   await tab.keyboard.up('.');
   await tab.waitForFunction((depth) => globalThis.spherecut!.frame!.depth > depth + 0.001, before.depth, { timeout: 40_000 });
   await tab.keyboard.press('Escape');
