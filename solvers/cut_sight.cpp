@@ -8,6 +8,7 @@
 #include "topology/point_tree.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -24,7 +25,12 @@ namespace {
 constexpr int plain_size = 4, enriched_size = 8;
 constexpr int enriched_spare = 2;        // nodes beyond the basis functions that an enriched support must have
 constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nearer to the sheet a point lies on it
-constexpr double largest_growth = 2.5;   // of a sphere at a point, 1.25^4
+// Least product of the three principal spreads of a support (squares of lengths) over that of a ball. On the rim of a
+// wound in a thin wedge of tissue a point may see lip nodes of one plane alone and, around the front, their partners
+// 2e-4 spacings below. That tells nothing across the plane, but scaled to a unit diagonal the moment matrix does not
+// show it.
+constexpr double flattest = 1e-6;
+constexpr double largest_growth = 2.5; // of a sphere at a point, 1.25^4
 
 /// Everything about the support of one point, node by node.
 struct Scratch {
@@ -63,6 +69,10 @@ double solve_moments(const Scratch& s, int n, const Eigen::Matrix<double, size, 
   }
   const Vector diagonal = a.diagonal();
   if (!(diagonal.minCoeff() > 0))
+    return std::numeric_limits<double>::infinity();
+  const Eigen::Vector3d mean = a.template block<3, 1>(1, 0) / a(0, 0);
+  const Matrix3 spread = a.template block<3, 3>(1, 1) - a(0, 0) * mean * mean.transpose();
+  if (const double even = spread.trace() / 3; !(spread.determinant() > flattest * even * even * even))
     return std::numeric_limits<double>::infinity();
   const Vector scale = diagonal.cwiseSqrt().cwiseInverse();
   a = scale.asDiagonal() * a * scale.asDiagonal();

@@ -128,7 +128,9 @@ SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const Sprink
       around.add(x, previous.spacings[j], previous.kinds[j], previous.normals[j]);
       ids.push_back(j);
       // Lips outside the region too: their pairs are not chosen anew, and the search for pairs has to know them.
-      fixed.push_back(previous.kinds[j] != NodeKind::lip && (j < std::ssize(options.seeds) || !region.contains(x)));
+      const bool is_seed = std::any_of(options.seeds.begin(), options.seeds.end(),
+                                       [&](const SeedNode& seed) { return seed.position == x; });
+      fixed.push_back(previous.kinds[j] != NodeKind::lip && (is_seed || !region.contains(x)));
     }
   Filler filler(domain, local, &region);
   filler.keep_around(around, fixed);

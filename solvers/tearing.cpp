@@ -118,6 +118,33 @@ std::vector<FrontState> averaged(const Material& material, const std::vector<Fro
   return result;
 }
 
+double onset_share(const Material& material, const std::vector<FrontState>& unloaded,
+                   const std::vector<FrontState>& loaded, double drive) {
+  if (unloaded.size() != loaded.size())
+    throw InputError(fmt::format("tearing: {} places of the front without load, {} with it; the same are wanted",
+                                 unloaded.size(), loaded.size()));
+  const auto reached = [&](double share) {
+    for (std::size_t k = 0; k < loaded.size(); ++k) {
+      const Intensities& from = unloaded[k].intensities;
+      if (driving_release_rate(material, from + share * (loaded[k].intensities - from)) >= drive * loaded[k].toughness)
+        return true;
+    }
+    return false;
+  };
+  constexpr int parts = 32, halvings = 40; // G is not monotonous where the load turns
+  if (reached(0))
+    return 0;
+  for (int part = 1; part <= parts; ++part) {
+    double low = (part - 1.0) / parts, high = static_cast<double>(part) / parts;
+    if (!reached(high))
+      continue;
+    for (int k = 0; k < halvings; ++k)
+      (reached(0.5 * (low + high)) ? high : low) = 0.5 * (low + high);
+    return high;
+  }
+  return 1;
+}
+
 std::vector<FrontState> directed(std::vector<FrontState> states, TearDirection rule,
                                  const std::function<double(const Vector3&)>& toughness, double probe) {
   if (!(probe > 0) || !std::isfinite(probe))

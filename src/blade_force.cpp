@@ -18,6 +18,7 @@ constexpr double probe_share = 0.05;    // of the half width: a step along the w
 constexpr double due_reach = 3;         // node spacings ahead in which the next cut is looked for
 constexpr int stroke_parts = 4;         // over which the forces are taken to change evenly
 constexpr double lip_tolerance = 1e-6;  // m
+constexpr double open_reach = 0.3;      // node spacings from a sheet: a place there lies in the cut
 
 Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
   return pose.orientation * point + pose.position;
@@ -61,10 +62,11 @@ solvers::Field without_lips(const BodyModel& body) {
 } // namespace
 
 BladeForce::BladeForce(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double spacing,
-                       MapOf map_of)
-    : settings_(*scenario.blade), toughness_(scenario.toughness), spacing_(spacing),
-      half_width_(solvers::edge_half_width(scenario.material, settings_.edge_radius, toughness_)),
-      lips_(scenario.cut.lips), domain_(std::move(domain)), map_of_(std::move(map_of)) {
+                       MapOf map_of, std::function<double(const Vector3&)> toughness)
+    : settings_(*scenario.blade), toughness_(std::move(toughness)), spacing_(spacing),
+      half_width_(solvers::edge_half_width(scenario.material, settings_.edge_radius, scenario.toughness)),
+      tears_(scenario.tearing.enabled), lips_(scenario.cut.lips), domain_(std::move(domain)),
+      map_of_(std::move(map_of)) {
   finer_ = half_width_ < least_width * spacing;
   half_width_ = std::max(half_width_, least_width * spacing);
   for (std::size_t i = 1; i < settings_.edge.size(); ++i) {
@@ -86,10 +88,49 @@ void BladeForce::go_to(const topology::BladePose& pose, const BodyModel& body) {
   if (way_.empty())
     at_ = pose;
   way_.push_back(pose);
+  pass_open_cut(body);
   meeting_ = meet(body, 0);
   if (proposal_)
     proposal_->meeting = meet(proposal_->body, proposal_->poses);
   press(body);
+}
+
+// Where a tear has run ahead of the blade, its edge is in the open cut and meets nothing until it comes to the front.
+void BladeForce::pass_open_cut(const BodyModel& now) {
+  if (!tears_ || now.incision == nullptr || proposal_)
+    return;
+  const topology::RestMap to_rest = map_of_(now);
+  const auto is_open = [&](const topology::BladePose& pose) {
+    bool any = false;
+    for (const EdgePiece& piece : edge_) {
+      Vector3 rest;
+      try {
+        rest = to_rest(placed(pose, piece.point));
+      } catch (const NumericalError&) {
+        return false;
+      }
+      if (domain_->signed_distance(rest) >= 0)
+        continue;
+      any = true;
+      if (!now.incision->closest(rest, open_reach * spacing_) || now.incision->front_frame(rest, spacing_))
+        return false;
+    }
+    return any;
+  };
+  while (way_.size() > 1 && is_open(way_[1]))
+    way_.pop_front();
+}
+
+void BladeForce::meet_again(const BodyModel& now) {
+  if (way_.empty())
+    return;
+  proposal_.reset();
+  pass_open_cut(now);
+  const double stored = state_ ? state_->stored : 0;
+  meeting_ = meet(now, 0);
+  press(now);
+  ledger_.excess += stored - (state_ ? state_->stored : 0); // the tear has taken it
+  ledger_.stored = state_ ? state_->stored : 0;
 }
 
 void BladeForce::leave() {
@@ -289,8 +330,29 @@ std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
   return near && remaining < travel(front, last) ? poses_up_to(front, remaining) : std::vector<topology::BladePose>{};
 }
 
-void BladeForce::propose(BodyModel body, std::size_t poses) {
+// Where the edge stands; the same everywhere without layers.
+double BladeForce::toughness_of(const Meeting& meeting) const {
+  double sum = 0, length = 0;
+  for (const solvers::EdgeContact& contact : meeting.patch.contacts) {
+    sum += contact.length * toughness_(contact.point + 0.5 * half_width_ * contact.push);
+    length += contact.length;
+  }
+  return sum / length;
+}
+
+double BladeForce::needed_for_proposal() const {
+  constexpr double least = 1e-9; // of what the cut takes: the loads pay for it all
+  const double all = needed() * (proposal_->meeting.area - meeting_.area);
+  return std::max(least * all, all - proposal_->drawn);
+}
+
+double BladeForce::proposed_surface() const {
+  return toughness_of(meeting_) * (proposal_->meeting.area - meeting_.area);
+}
+
+void BladeForce::propose(BodyModel body, std::size_t poses, double drawn) {
   Proposal next;
+  next.drawn = drawn;
   next.way = travel(0, way_.size() - 1);
   next.poses = poses + (proposal_ ? proposal_->poses : 0);
   next.body = std::move(body);
@@ -319,7 +381,7 @@ bool BladeForce::advance(const BodyModel& now) {
     share = solvers::cutting_share(
         meeting_.patch, {state_->advance, advances(meeting_, now, target)}, proposal_->meeting.patch,
         {advances(proposal_->meeting, proposal_->body, at_), advances(proposal_->meeting, proposal_->body, target)},
-        needed() * (proposal_->meeting.area - meeting_.area), friction);
+        needed_for_proposal(), friction);
   const topology::BladePose from = at_;
   const VectorX start = state_->advance, end = advances(meeting_, now, target);
   const double reached = share.value_or(1), slide = (target.position - from.position).norm();
@@ -334,14 +396,14 @@ bool BladeForce::advance(const BodyModel& now) {
 }
 
 BodyModel BladeForce::take() {
-  const double area = proposal_->meeting.area - meeting_.area;
+  const double area = proposal_->meeting.area - meeting_.area, paid = needed_for_proposal() * settings_.sharpness;
   const solvers::BladeState before = *state_;
   way_.erase(way_.begin(), way_.begin() + static_cast<std::ptrdiff_t>(proposal_->poses));
   meeting_ = std::move(proposal_->meeting);
   BodyModel body = std::move(proposal_->body);
   proposal_.reset();
   press(body);
-  ledger_.cut(before, *state_, toughness_, settings_.sharpness, area);
+  ledger_.cut(before, *state_, paid / area, settings_.sharpness, area);
   return body;
 }
 
@@ -388,10 +450,9 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
   if (proposal_ && !proposal_->meeting.pieces.empty()) {
     const double reach = due_reach * spacing_;
     const VectorX coming = advances(proposal_->meeting, proposal_->body, at_);
-    if (const auto share =
-            solvers::cutting_share(meeting_.patch, {state_->advance, onward(meeting_, state_->advance, reach)},
-                                   proposal_->meeting.patch, {coming, onward(proposal_->meeting, coming, reach)},
-                                   needed() * (proposal_->meeting.area - meeting_.area), friction))
+    if (const auto share = solvers::cutting_share(
+            meeting_.patch, {state_->advance, onward(meeting_, state_->advance, reach)}, proposal_->meeting.patch,
+            {coming, onward(proposal_->meeting, coming, reach)}, needed_for_proposal(), friction))
       grip.due = std::max(grip.edge, -edge_after(*share * reach).dot(grip.along));
   } else if (now.incision != nullptr && !first_cut(*state_)) {
     double length = 0;

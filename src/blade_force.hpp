@@ -12,6 +12,7 @@
 #include "topology/blade.hpp"
 
 #include <deque>
+#include <functional>
 
 namespace spherecut::app {
 
@@ -31,9 +32,10 @@ class BladeForce {
   /// The rest position of what is at a place of a body without blade.
   using MapOf = std::function<topology::RestMap(const BodyModel& body)>;
 
-  /// `spacing`, m: of the nodes where the blade cuts, and of the pieces that its edge is taken in. Throws InputError as
-  /// solvers::edge_half_width.
-  BladeForce(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double spacing, MapOf map_of);
+  /// `spacing`, m: of the nodes where the blade cuts, and of the pieces that its edge is taken in; `toughness`, J/m2,
+  /// in the tissue at rest. Throws InputError as solvers::edge_half_width.
+  BladeForce(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double spacing, MapOf map_of,
+             std::function<double(const Vector3&)> toughness);
 
   /// m, of the edge's contact; `finer_than_nodes` when they are too coarse for it and stand for it instead.
   [[nodiscard]] double half_width() const { return half_width_; }
@@ -55,8 +57,14 @@ class BladeForce {
   /// Poses through which the next proposal should cut, in order; none: no cut is near. A later cut ends where the edge
   /// would be left with the force of steady cutting at the end of its motion.
   [[nodiscard]] std::vector<topology::BladePose> wanted(const BodyModel& now);
-  /// The body with the way cut through these poses.
-  void propose(BodyModel body, std::size_t poses);
+  /// The body with the way cut through these poses. `drawn`, J: what loads other than the blade release by that cut;
+  /// the edge has the rest to pay.
+  void propose(BodyModel body, std::size_t poses, double drawn = 0);
+  /// Energy of the surface that the proposal makes, J.
+  [[nodiscard]] double proposed_surface() const;
+  /// The cut has grown otherwise: the blade meets the body `now`, and nothing is proposed. Poses of its way that lie in
+  /// the open cut are passed.
+  void meet_again(const BodyModel& now);
   /// There was nothing to cut through these poses, or it cannot be: the front goes on without a cut.
   void pass(std::size_t poses, const BodyModel& now);
   [[nodiscard]] bool proposed() const { return proposal_.has_value(); }
@@ -89,7 +97,8 @@ class BladeForce {
     BodyModel body;
     Meeting meeting;
     std::size_t poses = 0;
-    double way = 0; // m, from the front to the blade when it was proposed
+    double way = 0;   // m, from the front to the blade when it was proposed
+    double drawn = 0; // J, released by other loads
   };
 
   [[nodiscard]] Meeting meet(const BodyModel& body, std::size_t front) const;
@@ -98,7 +107,10 @@ class BladeForce {
   [[nodiscard]] VectorX advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const;
   [[nodiscard]] solvers::ForcePattern drag(const BodyModel& body,
                                            const std::vector<solvers::EdgeContact>& contacts) const;
-  [[nodiscard]] double needed() const { return toughness_ / settings_.sharpness; } // J/m2
+  [[nodiscard]] double toughness_of(const Meeting& meeting) const;
+  [[nodiscard]] double needed() const { return toughness_of(meeting_) / settings_.sharpness; } // J/m2
+  [[nodiscard]] double needed_for_proposal() const;                                            // J
+  void pass_open_cut(const BodyModel& now);
   [[nodiscard]] bool first_cut(const solvers::BladeState& state) const;
   [[nodiscard]] double travel(std::size_t from, std::size_t to) const;
   [[nodiscard]] std::vector<topology::BladePose> poses_up_to(std::size_t front, double remaining);
@@ -106,8 +118,10 @@ class BladeForce {
   void press(const BodyModel& now);
 
   BladeSettings settings_;
-  double toughness_, spacing_, half_width_;
+  std::function<double(const Vector3&)> toughness_; // J/m2
+  double spacing_, half_width_;
   bool finer_ = false;
+  bool tears_; // the cut may run ahead of the blade
   solvers::LipCondition lips_;
   std::shared_ptr<const topology::Domain> domain_;
   MapOf map_of_;

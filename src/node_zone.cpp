@@ -93,18 +93,19 @@ std::vector<solvers::SeedNode> contact_seeds(const Scenario& scenario, const top
                                              const topology::SurfaceContact& contact, double spacing) {
   std::vector<solvers::SeedNode> tip{{contact.point, solvers::NodeKind::surface}};
   const auto* punch = std::get_if<topology::FlatPunch>(&scenario.tool->shape);
-  if (punch == nullptr || punch->radius < 2 * spacing)
+  const bool grasps = scenario.tool->grasp.has_value();
+  if (!grasps && (punch == nullptr || punch->radius < 2 * spacing))
     return tip;
+  const double radius = topology::tip_radius(scenario.tool->shape);
   const auto flat = [&](const solvers::SeedNode& seed) {
     return domain.normal(seed.position).dot(contact.normal) > 0.95 &&
            std::abs((seed.position - contact.point).dot(contact.normal)) < 0.25 * spacing;
   };
   try {
-    std::vector<solvers::SeedNode> rings =
-        solvers::contact_rings(domain, contact.point, contact.normal, punch->radius, spacing,
-                               solvers::contact_ring_offset(scenario.method.method));
+    std::vector<solvers::SeedNode> rings = solvers::contact_rings(
+        domain, contact.point, contact.normal, radius, spacing, solvers::contact_ring_offset(scenario.method.method));
     return std::all_of(rings.begin(), rings.end(), flat) ? rings : tip;
-  } catch (const InputError&) { // the end of the punch reaches over the edge of the organ
+  } catch (const InputError&) { // punch or jaws reach over the edge of the organ
     return tip;
   }
 }

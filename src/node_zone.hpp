@@ -20,7 +20,8 @@ FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain);
 double sheet_edge(const FineZone& zone);
 
 /// Nodes that must stand at the contact: one there; about a flat punch on a flat surface also rings on both sides of
-/// its edge, where the pressure peaks.
+/// its edge, where the pressure peaks, and about a grasper, whose patch would else be as large as the nodes happen to
+/// lie.
 std::vector<solvers::SeedNode> contact_seeds(const Scenario& scenario, const topology::Domain& domain,
                                              const topology::SurfaceContact& contact, double spacing);
 

@@ -119,7 +119,7 @@ void RunOutput::add(const Session& session, const StepResult& step) {
     findings_.refused_cuts += step.cut->refused ? 1 : 0;
   }
   if (step.tear) {
-    tears_->write(tear_rows(step.time, *step.tear));
+    tears_->write(tear_rows(*step.tear));
     findings_.tear = *step.tear;
     findings_.tear_increments += static_cast<int>(step.tear->increments.size()) - 1;
     findings_.torn_unstably = findings_.torn_unstably || step.tear->unstable;

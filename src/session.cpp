@@ -19,6 +19,7 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
+constexpr double crowded_by_sheet = 0.3;    // of the fine spacing: nearer to a sheet no node of a grasp is put
 
 Organ timed_organ(const OrganSettings& settings, double& seconds) {
   const StageTimer timer(seconds);
@@ -138,10 +139,11 @@ StepResult Session::step(const StepSample& sample) {
       if (must_follow(centre))
         follow(sample, centre, result);
     }
+    Loading loading{.releases = released};
     if (blade_force_ != nullptr && sample.blade)
-      press_blade(sample, *result.cut);
+      loading.cut_surface = press_blade(sample, *result.cut);
     if (tears())
-      tear(sample, released || solved, result);
+      tear(sample, loading, result);
     evaluate(result);
   }
   if (result.cut)
@@ -199,8 +201,14 @@ void Session::follow(const StepSample& sample, const topology::SurfaceContact& c
 solvers::SprinkleOptions Session::sprinkle_options(const BodyModel& model) const {
   solvers::SprinkleOptions options;
   options.spacing = zone_.spacing;
-  if (zone_contact_)
+  if (grasp_)
+    options.seeds = grasp_->nodes;
+  else if (zone_contact_)
     options.seeds = contact_seeds(scenario_, *organ_.domain, *zone_contact_, zone_.spacing.fine);
+  if (scenario_.tool && scenario_.tool->grasp && model.incision != nullptr)
+    std::erase_if(options.seeds, [&](const solvers::SeedNode& seed) {
+      return model.incision->closest(seed.position, crowded_by_sheet * zone_.spacing.fine).has_value();
+    });
   options.random_seed = scenario_.nodes.random_seed;
   options.incision = model.incision;
   return options;

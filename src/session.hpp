@@ -141,7 +141,7 @@ class Session {
   [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
   void make_blade_force();
   [[nodiscard]] bool blade_enters(const StepSample& sample) const;
-  void press_blade(const StepSample& sample, CutReport& report);
+  double press_blade(const StepSample& sample, CutReport& report);
   [[nodiscard]] std::optional<BodyModel> propose_cut(const std::vector<topology::BladePose>& poses,
                                                      const StepSample& sample, CutReport& report);
   void check_pieces(double time);
@@ -151,11 +151,21 @@ class Session {
   bool handle_grasper(const StepSample& sample);
   [[nodiscard]] std::vector<Vector3> grasped_displacements(const topology::ToolPose& pose,
                                                            const BodyModel& model) const;
-  void tear(const StepSample& sample, bool released, StepResult& result);
-  void book_loading(const StepSample& sample, bool dissipates);
+  /// What a step has done before it tears.
+  struct Loading {
+    bool releases = false;  // a grasper has let go
+    double cut_surface = 0; // J, that a blade's cut takes
+  };
+  void tear(const StepSample& sample, const Loading& loading, StepResult& result);
+  void book_loading(const StepSample& sample, const Loading& loading);
+  [[nodiscard]] bool follows_load(const StepSample& sample, const Loading& loading) const;
+  void drop_blade_proposal();
+  [[nodiscard]] double drawn_open(const BodyModel& model, const topology::Incision& after) const;
   [[nodiscard]] std::vector<solvers::FrontState> front_states() const;
+  [[nodiscard]] std::optional<std::vector<solvers::FrontState>> known_states() const;
   [[nodiscard]] std::optional<topology::SurfaceMesh> seed_of_tear() const;
   [[nodiscard]] topology::FrontGrowth grow_tear(const std::vector<solvers::FrontState>& states, double longest) const;
+  [[nodiscard]] topology::FrontGrowth join_tears(const std::vector<solvers::FrontState>& states) const;
   bool take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report);
   void report_cut(CutReport& report) const;
   void evaluate(StepResult& result);
@@ -166,6 +176,7 @@ class Session {
   struct Grasp {
     Vector3 place = Vector3::Zero(), normal = Vector3::UnitZ(); // m, on the surface at rest; outward there
     std::vector<Vector3> rest, displacement;                    // m, of the patch when it took hold
+    std::vector<solvers::SeedNode> nodes;                       // its own and those about it: they stay while it holds
     topology::ToolPose pose;                                    // when it took hold
   };
   /// What the last step has left for the next one's account.
@@ -174,6 +185,7 @@ class Session {
     Energies last;
     Vector3 force = Vector3::Zero();        // N, on the tool
     std::optional<topology::ToolPose> pose; // of the tool
+    double time = 0;                        // s
     double area = 0;                        // m2 torn
     double decay = 0;                       // 1/m, of the release rate with the way of the front, as last seen
   };

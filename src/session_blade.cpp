@@ -10,12 +10,12 @@
 namespace spherecut::app {
 
 void Session::make_blade_force() {
-  if (!scenario_.blade || scenario_.toughness == 0 || tears())
+  if (!scenario_.blade || scenario_.toughness == 0)
     return;
-  blade_force_ =
-      std::make_unique<BladeForce>(scenario_, organ_.domain, zone_.spacing.fine, [this](const BodyModel& model) {
-        return [this, &model](const Vector3& x) { return rest_position(x, model); };
-      });
+  blade_force_ = std::make_unique<BladeForce>(
+      scenario_, organ_.domain, zone_.spacing.fine,
+      [this](const BodyModel& model) { return [this, &model](const Vector3& x) { return rest_position(x, model); }; },
+      toughness_field(scenario_.toughness, scenario_.layers));
   if (blade_force_->finer_than_nodes())
     warn("edge",
          fmt::format("the contact of the blade's edge is narrower than the nodes; it is taken as {:.3g} m wide: "
@@ -27,23 +27,49 @@ bool Session::blade_enters(const StepSample& sample) const {
   return blade_force_ != nullptr && sample.blade && blade_force_->inside(*sample.blade, model_);
 }
 
-// A cut is built when it comes near, beside the body, and the body becomes it when it is due.
-void Session::press_blade(const StepSample& sample, CutReport& report) {
+// The proposal is not taken any more.
+void Session::drop_blade_proposal() {
+  if (mark_)
+    incisions_->go_back(*mark_);
+  mark_.reset();
+  shown_wound_.reset();
+}
+
+// What the loads on the body, without the blade, release when the cut grows to `after`: by the intensities at the
+// fronts near its new part, J. Two bodies' energies would tell it too, but nodes differ between them.
+double Session::drawn_open(const BodyModel& model, const topology::Incision& after) const {
+  if (!tears() || model.incision == nullptr)
+    return 0;
+  const std::optional<std::vector<solvers::FrontState>> states = known_states();
+  if (!states || states->empty())
+    return 0;
+  const double reach = 2 * zone_.spacing.fine;
+  double release = 0, weights = 0;
+  for (const solvers::FrontState& state : *states)
+    if (const auto front = after.front_frame(state.frame.point, reach);
+        !front || front->distance > 1e-3 * zone_.spacing.fine) { // it has moved
+      release += state.release;
+      weights += 1;
+    }
+  return weights > 0 ? release / weights * std::max(0.0, after.area() - model.incision->area()) : 0;
+}
+
+// A cut is built when it comes near, beside the body, and the body becomes it when it is due. The energy of the
+// surface that it makes, J.
+double Session::press_blade(const StepSample& sample, CutReport& report) {
   const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
   const bool placed = blade_force_->has_place();
   blade_force_->go_to(*sample.blade, model_);
   if (!blade_force_->inside(*sample.blade, model_)) {
     blade_force_->leave();
-    if (mark_) // a proposal that is not taken any more
-      incisions_->go_back(*mark_);
-    mark_.reset();
-    shown_wound_.reset();
+    drop_blade_proposal();
     incisions_->place(*sample.blade, to_rest);
-    return;
+    return 0;
   }
   if (!placed)
     incisions_->place(*sample.blade, to_rest);
   int triangles = 0;
+  double surface = 0;
   for (;;) {
     if (const std::vector<topology::BladePose> poses = blade_force_->wanted(model_); !poses.empty()) {
       if (!mark_) {
@@ -52,7 +78,8 @@ void Session::press_blade(const StepSample& sample, CutReport& report) {
       }
       if (std::optional<BodyModel> next = propose_cut(poses, sample, report)) {
         triangles += report.triangles;
-        blade_force_->propose(std::move(*next), poses.size());
+        const double drawn = drawn_open(model_, *next->incision);
+        blade_force_->propose(std::move(*next), poses.size(), drawn);
       } else if (!blade_force_->proposed()) {
         mark_.reset();
         shown_wound_.reset();
@@ -62,11 +89,13 @@ void Session::press_blade(const StepSample& sample, CutReport& report) {
     }
     if (!blade_force_->advance(model_))
       break;
+    surface += blade_force_->proposed_surface();
     model_ = blade_force_->take();
     mark_.reset();
     shown_wound_.reset();
   }
   report.triangles = triangles;
+  return surface;
 }
 
 // The body with the cut that the blade makes through these poses, built and solved; none when it cuts nothing or is

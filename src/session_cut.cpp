@@ -131,10 +131,7 @@ void Session::lift_blade() {
   if (blade_force_ == nullptr)
     return;
   blade_force_->lift();
-  if (mark_) // a proposal that is not taken any more
-    incisions_->go_back(*mark_);
-  mark_.reset();
-  shown_wound_.reset();
+  drop_blade_proposal();
 }
 
 // Moves the blade, or keeps its motion for later: until it has gone blade.advance, the body need not follow. What is

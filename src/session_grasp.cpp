@@ -8,6 +8,8 @@
 namespace spherecut::app {
 namespace {
 
+constexpr double kept_about = 1.5; // fine spacings beyond the jaws: nodes that share the surface with the patch
+
 topology::SurfaceContact grasped_place(const topology::Domain& domain, const Vector3& x) {
   topology::SurfaceContact contact;
   contact.point = domain.closest_surface_point(x);
@@ -119,6 +121,13 @@ bool Session::handle_grasper(const StepSample& sample) {
   }
   grasp_ = std::move(grasp);
   const std::vector<int> nodes = grasped_nodes(model_);
+  // Were they exchanged behind a tear, the patch would grow or shrink by a share of the surface, and do work of its
+  // own.
+  const solvers::NodeCloud& cloud = model_.sprinkling.nodes;
+  const double about = topology::tip_radius(scenario_.tool->shape) + kept_about * zone_.spacing.fine;
+  for (int i = 0; i < cloud.size(); ++i)
+    if (on_surface(cloud.kinds[i]) && (cloud.positions[i] - grasp_->place).norm() <= about)
+      grasp_->nodes.push_back({cloud.positions[i], cloud.kinds[i]});
   const solvers::Field before = model_.field;
   condense(nodes, model_);
   const MatrixX moved = model_.body->contact_displacements(nodes, {before});

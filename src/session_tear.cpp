@@ -1,9 +1,7 @@
 // The tears of a session: fronts that are given more energy than new cut takes move, increment by increment, until they
 // are not, or nothing is left to tear. The tool stands still meanwhile.
-#include "solvers/tear_seed.hpp"
 #include "src/session.hpp"
 #include "src/stage_timer.hpp"
-#include "topology/cut_sheets.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -14,14 +12,9 @@ namespace spherecut::app {
 namespace {
 
 // In units of the fine spacing:
-constexpr double averaged_over = 1.5; // length along the front over which intensities are averaged
-constexpr double smoothing = 1;       // and motions
-constexpr double probe = 0.5;         // so far ahead the toughness is looked at
-constexpr double met_reach = 0.3;     // nearer to another sheet a front has met it
-constexpr double overlap = 0.05;      // by which a front runs into the sheet that it meets
-constexpr double bridge = 4;          // a front shorter than this, too near to the surface for intensities, gives way
-constexpr double bridge_step = 3;     // by this in one increment
-constexpr double smallest_seed = 2;   // least radius of a tear that starts without a cut
+constexpr double smoothing = 1;   // length along the front over which motions are averaged
+constexpr double bridge = 4;      // a front shorter than this, too near to the surface for intensities, gives way
+constexpr double bridge_step = 3; // by this in one increment
 // Of the longest step:
 constexpr double first_step = 0.5, least_step = 0.2; // while the decay of G is not known; where it is
 constexpr double told = 0.5;        // increments at least so long tell the decay, and whether growth is unstable
@@ -34,32 +27,6 @@ double drive_of(const std::vector<solvers::FrontState>& states) {
   for (const solvers::FrontState& state : states)
     most = std::max(most, state.release / state.toughness);
   return most;
-}
-
-/// Whether another sheet passes through the front there, beside the own one on both of its faces.
-bool has_met(const topology::Incision& incision, const topology::FrontFrame& frame, double fine) {
-  const Vector3 along = met_reach * fine * frame.ahead, off = 0.1 * fine * frame.normal;
-  return incision.blocks(frame.point + off - along, frame.point + off + along) &&
-         incision.blocks(frame.point - off - along, frame.point - off + along);
-}
-
-/// The motion, ended just behind the first sheet in its way; none where the front has met one.
-Vector3 up_to_next_sheet(const topology::Incision& incision, const topology::FrontFrame& frame, const Vector3& motion,
-                         double fine) {
-  const double length = motion.norm();
-  if (length < 1e-3 * fine)
-    return Vector3::Zero();
-  if (has_met(incision, frame, fine))
-    return Vector3::Zero();
-  const Vector3 way = motion / length;
-  const double start = 1e-2 * fine;
-  const auto blocked = [&](double at) { return incision.blocks(frame.point + start * way, frame.point + at * way); };
-  if (length <= start || !blocked(length + overlap * fine))
-    return motion;
-  double clear = start, hit = length + overlap * fine;
-  for (int halving = 0; halving < 30; ++halving)
-    (blocked(0.5 * (clear + hit)) ? hit : clear) = 0.5 * (clear + hit);
-  return (hit + overlap * fine) * way;
 }
 
 double mean_toughness(const topology::FrontGrowth& growth, const topology::Incision& before,
@@ -128,9 +95,9 @@ Energies energies(const BodyModel& model) {
   return energies;
 }
 
-// What the step has done before it tears. What a blade that cuts without resistance releases, and what a grasper does
-// that lets go, belongs to nobody.
-void Session::book_loading(const StepSample& sample, bool dissipates) {
+// What the step has done so far. A blade's cut takes of what the loads release what its surface needs; the rest of
+// that, and what a grasper does that lets go, belongs to nobody.
+void Session::book_loading(const StepSample& sample, const Loading& loading) {
   const Energies now = energies(model_);
   const Vector3 force = model_.state->tool.tool_force;
   if (!tears_) {
@@ -144,67 +111,23 @@ void Session::book_loading(const StepSample& sample, bool dissipates) {
     ledger.tool += work;
     ledger.loads += loads;
     ledger.elastic += elastic;
-    if (dissipates)
-      ledger.dissipation += std::max(0.0, work + loads - elastic);
+    const double released = std::max(0.0, work + loads - elastic);
+    if (loading.cut_surface > 0)
+      ledger.surface += std::min(released, loading.cut_surface);
+    if (loading.releases || loading.cut_surface > 0)
+      ledger.dissipation += std::max(0.0, released - loading.cut_surface);
   }
   tears_->last = now;
   tears_->force = force;
   tears_->pose = sample.tool;
+  tears_->time = sample.time;
 }
 
-// Along all fronts but where they have met another sheet.
-std::vector<solvers::FrontState> Session::front_states() const {
-  if (model_.incision == nullptr || model_.incision->front().empty())
-    return {};
-  const double fine = zone_.spacing.fine;
-  std::vector<solvers::FrontState> states = solvers::front_states(*model_.body, model_.field, toughness_, fine);
-  std::erase_if(states, [&](const solvers::FrontState& state) {
-    return !state.intensities.allFinite() || has_met(*model_.incision, state.frame, fine);
-  });
-  return solvers::directed(solvers::averaged(scenario_.material, states, averaged_over * fine),
-                           scenario_.tearing.direction, toughness_, probe * fine);
-}
-
-topology::FrontGrowth Session::grow_tear(const std::vector<solvers::FrontState>& states, double longest) const {
-  const double fine = zone_.spacing.fine;
-  const topology::Incision& incision = *model_.incision;
-  const auto motion = states.empty()
-                          ? std::function<Vector3(const topology::FrontFrame&)>(
-                                [&](const topology::FrontFrame& frame) -> Vector3 { return longest * frame.ahead; })
-                          : solvers::tear_motion(states, longest, smoothing * fine);
-  return topology::grow_front(
-      incision,
-      [&](const topology::FrontFrame& frame) { return up_to_next_sheet(incision, frame, motion(frame), fine); },
-      sheet_edge(zone_));
-}
-
-// A crack across the largest stress, where that reaches the strength off every cut, held region and tool.
-std::optional<topology::SurfaceMesh> Session::seed_of_tear() const {
-  const TearSettings& settings = scenario_.tearing;
-  if (settings.strength == 0)
-    return std::nullopt;
-  const solvers::NodeCloud& nodes = model_.sprinkling.nodes;
-  const auto toughness = toughness_;
-  const double length = settings.length > 0
-                            ? settings.length
-                            : solvers::averaging_length(scenario_.material, scenario_.toughness, settings.strength);
-  std::vector<Vector3> held;
-  for (const solvers::Prescribed& entry : model_.body->problem().prescribed)
-    held.push_back(nodes.positions[entry.node]);
-  held.insert(held.end(), model_.patch.rest.begin(), model_.patch.rest.end());
-  const solvers::WeakPlace weakest =
-      solvers::weakest_place(*model_.body, model_.field, length, settings.strength, [&](int i) {
-        const Vector3& x = nodes.positions[i];
-        return nodes.kinds[i] != solvers::NodeKind::lip &&
-               (model_.incision == nullptr || !model_.incision->closest(x, length)) &&
-               std::none_of(held.begin(), held.end(), [&](const Vector3& y) { return (y - x).norm() < length; });
-      });
-  if (weakest.node < 0)
-    return std::nullopt;
-  const Vector3& place = nodes.positions[weakest.node];
-  const double radius = std::max(solvers::seed_radius(scenario_.material, toughness(place), settings.strength),
-                                 smallest_seed * zone_.spacing.fine);
-  return topology::make_disc_sheet(place, weakest.stress.direction, radius, std::min(sheet_edge(zone_), radius / 2));
+// Whether the tool has brought the load of this step since the last account, so that the load at which a front moves
+// can be looked for. A loop in real time wants the force where the tool is.
+bool Session::follows_load(const StepSample& sample, const Loading& loading) const {
+  return !tear_gradually_ && !loading.releases && loading.cut_surface == 0 && tears_ && tears_->pose && sample.tool &&
+         (grasps() || model_.state->tool.active_nodes > 0) && sample.tool->point != tears_->pose->point;
 }
 
 // Cuts as `grow` does and solves the body with it; where that cannot be, all is as before and the report says why.
@@ -257,31 +180,104 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
   return false;
 }
 
-void Session::tear(const StepSample& sample, bool released, StepResult& result) {
+namespace {
+
+/// The moment at which the tool has gone `share` of its way from `pose` at `time` to that of `sample`.
+StepSample loaded(const topology::ToolPose& pose, double time, const StepSample& sample, double share) {
+  StepSample part = sample;
+  if (share >= 1 || !sample.tool)
+    return part;
+  part.time = time + share * (sample.time - time);
+  part.tool->point = pose.point + share * (sample.tool->point - pose.point);
+  part.tool->axis = (pose.axis + share * (sample.tool->axis - pose.axis)).normalized();
+  return part;
+}
+
+/// Intensities that scatter from place to place would let one place move at a time when the load stops at the first:
+/// those within a tenth of it move along.
+std::vector<solvers::FrontState> acting(std::vector<solvers::FrontState> states, double drive) {
+  constexpr double along = 1.1;
+  for (solvers::FrontState& state : states)
+    state.release *= std::max(1.0, along / drive);
+  return states;
+}
+
+} // namespace
+
+void Session::tear(const StepSample& sample, const Loading& loading, StepResult& result) {
   TearReport& report = result.tear.emplace();
-  book_loading(sample, released);
-  EnergyLedger& ledger = tears_->ledger;
   const TearSettings& settings = scenario_.tearing;
   const double fine = zone_.spacing.fine, stride = settings.step * fine;
   const int most = tear_gradually_ ? 1 : settings.most_increments;
-  const std::size_t pieces = incisions_->wound().pieces.size();
-  const auto fronts = [&]() -> std::optional<std::vector<solvers::FrontState>> {
-    try {
-      return front_states();
-    } catch (const NumericalError&) { // too near to the surface all along
-      return std::nullopt;
-    }
+  const std::size_t pieces = wound()->pieces.size();
+  const bool proposed = mark_.has_value();
+  using States = std::optional<std::vector<solvers::FrontState>>;
+  States states = known_states();
+  const auto way_of = [&](double drive) { // of the front in the next increment, as far as it is known how G falls
+    if (tears_->decay > 0)
+      return stride * std::clamp(std::log(std::max(drive, 1.0)) / (tears_->decay * stride), least_step, 1.0);
+    return drive < 1.1 ? first_step * stride : stride;
   };
-  std::optional<std::vector<solvers::FrontState>> states = fronts();
-  report.increments.push_back(increment_of(states.value_or(std::vector<solvers::FrontState>{}), incision()));
-  report.increments.back().ledger = ledger;
-  const double start = states ? drive_of(*states) : 0;
+  // The tool's way in this step, and how much of it the body has been loaded by.
+  const bool follows = states && !states->empty() && drive_of(*states) >= in_balance && follows_load(sample, loading);
+  const topology::ToolPose from = follows ? *tears_->pose : topology::ToolPose{};
+  const double since = follows ? tears_->time : 0;
+  double share = follows ? 0 : 1;
+  const auto load_to = [&](double to) {
+    share = to;
+    const StepSample part = loaded(from, since, sample, share);
+    solve(part, model_);
+    book_loading(part, share < 1 ? Loading{} : loading);
+    states = known_states();
+  };
+  // On to where the largest G / G_c is `target`, if it comes to that in this step, else to its end. `states` is at
+  // `share`, `full` at its end; the solution is at either.
+  const auto load_until = [&](double target, const States& full) {
+    const double part = states && full && states->size() == full->size()
+                            ? solvers::onset_share(scenario_.material, *states, *full, target)
+                            : 1;
+    load_to(share + (1 - share) * part);
+  };
+  if (follows) {
+    const States full = states;
+    solve(loaded(from, since, sample, 0), model_);
+    states = known_states();
+    load_until(1, full);
+  } else {
+    book_loading(sample, loading);
+  }
+  EnergyLedger& ledger = tears_->ledger;
+  const auto add_row = [&] {
+    report.increments.push_back(increment_of(states.value_or(std::vector<solvers::FrontState>{}), incision()));
+    report.increments.back().time = loaded(from, since, sample, share).time;
+    report.increments.back().force = model_.state->tool.tool_force.norm();
+    report.increments.back().ledger = ledger;
+  };
+  add_row();
+  double start = states ? drive_of(*states) : 0;
   int kept = 0;
   for (int number = 1;; ++number) {
+    double drive = states ? drive_of(*states) : 0, ahead = drive; // now, and at the end of the step
+    if (share < 1 && (!states || drive < in_balance)) {
+      const States now = states;
+      solve(sample, model_);
+      const States full = known_states();
+      ahead = full ? drive_of(*full) : 0;
+      states = now;
+      // G falls by exp(-decay way) in the increment: half of that before, half after it is in balance.
+      if (ahead < in_balance)
+        load_to(1);
+      else
+        load_until(std::max(drive, std::exp(0.5 * tears_->decay * way_of(ahead))), full);
+      drive = states ? drive_of(*states) : 0;
+      ahead = std::max(ahead, drive);
+      start = drive;
+      kept = 0;
+    }
+    const bool moves = drive >= in_balance || (share < 1 && states && !states->empty());
     const bool gives_way = !states && model_.incision->front_length() < bridge * fine;
-    const double drive = states ? drive_of(*states) : 0;
     std::optional<topology::SurfaceMesh> seed;
-    if (!gives_way && drive < in_balance && !(seed = seed_of_tear())) {
+    if (!gives_way && !moves && !(seed = seed_of_tear())) {
       report.reason = !states           ? "the front is too near to the surface for its intensities"
                       : states->empty() ? "there is no front"
                                         : "less is released than a tear takes";
@@ -297,19 +293,24 @@ void Session::tear(const StepSample& sample, bool released, StepResult& result) 
                                tears_->area));
       break;
     }
-    double longest = gives_way ? bridge_step * fine : stride;
-    if (!gives_way && tears_->decay > 0)
-      longest = stride * std::clamp(std::log(drive) / (tears_->decay * stride), least_step, 1.0);
-    else if (!gives_way && drive < 1.1)
-      longest = first_step * stride;
+    drop_blade_proposal();
+    const double longest = gives_way ? bridge_step * fine : way_of(ahead);
+    const std::vector<solvers::FrontState> moving = gives_way || seed ? std::vector<solvers::FrontState>{}
+                                                    : share < 1       ? acting(*states, drive)
+                                                                      : *states;
     topology::FrontGrowth growth;
+    bool joins = false;
     if (seed) {
       if (model_.incision != nullptr)
         growth.sheets = model_.incision->sheets();
       growth.sheets.push_back(*seed);
       growth.triangles = static_cast<int>(seed->triangles.size());
     } else {
-      growth = grow_tear(gives_way ? std::vector<solvers::FrontState>{} : *states, longest);
+      if (!gives_way)
+        growth = join_tears(moving);
+      joins = growth.triangles > 0;
+      if (!joins)
+        growth = grow_tear(moving, longest);
     }
     if (growth.triangles == 0) {
       report.reason = "the fronts have met other cuts";
@@ -320,17 +321,17 @@ void Session::tear(const StepSample& sample, bool released, StepResult& result) 
     const double toughness = before == nullptr ? toughness_(seed->vertices.front())
                                                : mean_toughness(growth, *before, *organ_.domain, toughness_);
     const auto grow = [&] { seed ? incisions_->seed(*seed) : incisions_->tear(growth.sheets); };
-    if (!take_tear(sample, grow, report))
+    if (!take_tear(loaded(from, since, sample, share), grow, report))
       break;
     report.seeded = report.seeded || seed.has_value();
     const double torn = model_.incision->area() - area_before;
-    std::optional<std::vector<solvers::FrontState>> next = fronts();
+    const States next = known_states();
     const Energies now = energies(model_);
     const double free = tears_->last.potential() - now.potential(), surface = toughness * torn;
     double surplus = free - surface; // of a front that is gone, or comes about, by the energies alone
-    if (!seed && !gives_way && next && !next->empty()) {
+    if (!seed && !gives_way && !joins && next && !next->empty()) {
       std::vector<double> advance;
-      const auto motion = solvers::tear_motion(*states, longest, smoothing * fine);
+      const auto motion = solvers::tear_motion(moving, longest, smoothing * fine);
       for (const solvers::FrontState& state : *states)
         advance.push_back(motion(state.frame).norm());
       surplus = 0.5 * (mean_surplus(*states, *states, advance) + mean_surplus(*next, *states, advance)) * torn;
@@ -348,13 +349,12 @@ void Session::tear(const StepSample& sample, bool released, StepResult& result) 
     tears_->force = model_.state->tool.tool_force;
     tears_->area += torn;
     result.cut->triangles += growth.triangles;
-    states = std::move(next);
-    report.increments.push_back(increment_of(states.value_or(std::vector<solvers::FrontState>{}), incision()));
+    states = next;
+    add_row();
     TearIncrement& row = report.increments.back();
     row.number = number;
     row.triangles = growth.triangles;
-    row.advance = seed ? 0 : longest;
-    row.ledger = ledger;
+    row.advance = seed || joins ? 0 : longest;
     if (kept >= kept_to_tell && !report.unstable) {
       report.unstable = true;
       say_(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample.time));
@@ -362,6 +362,10 @@ void Session::tear(const StepSample& sample, bool released, StepResult& result) 
     if (incisions_->wound().pieces.size() > pieces)
       report.severed = true;
   }
+  if (share < 1)
+    load_to(1);
+  if (blade_force_ != nullptr && (report.increments.size() > 1 || (proposed && !mark_)))
+    blade_force_->meet_again(model_);
   report.area = tears_->area;
   report.ledger = ledger;
   if (report.severed)

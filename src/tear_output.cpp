@@ -7,10 +7,10 @@ namespace spherecut::app {
 std::string_view tear_columns() {
   return "time_s,increment,front_x_m,front_y_m,front_z_m,most_x_m,most_y_m,most_z_m,K_I_Pa_m05,K_II_Pa_m05,K_III_Pa_"
          "m05,G_J_m2,toughness_J_m2,advance_m,triangles,area_m2,front_m,tool_J,loads_J,elastic_J,surface_J,dissipation_"
-         "J,imbalance_J,unstable,severed,reason\n";
+         "J,imbalance_J,force_N,unstable,severed,reason\n";
 }
 
-std::string tear_rows(double time, const TearReport& report) {
+std::string tear_rows(const TearReport& report) {
   std::string rows;
   for (std::size_t k = 0; k < report.increments.size(); ++k) {
     const TearIncrement& r = report.increments[k];
@@ -22,11 +22,11 @@ std::string tear_rows(double time, const TearReport& report) {
     const auto vector = [](const Vector3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z()); };
     const EnergyLedger& e = r.ledger;
     rows += fmt::format("{:.9g},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},"
-                        "{:.3g},{},{},\"{}\"\n",
-                        time, r.number, vector(r.front), vector(r.most), vector(r.intensities), r.release, r.toughness,
-                        r.advance, r.triangles, r.area, r.front_length, e.tool, e.loads, e.elastic, e.surface,
-                        e.dissipation, e.imbalance(), last && report.unstable ? 1 : 0, last && report.severed ? 1 : 0,
-                        reason);
+                        "{:.3g},{:.9g},{},{},\"{}\"\n",
+                        r.time, r.number, vector(r.front), vector(r.most), vector(r.intensities), r.release,
+                        r.toughness, r.advance, r.triangles, r.area, r.front_length, e.tool, e.loads, e.elastic,
+                        e.surface, e.dissipation, e.imbalance(), r.force, last && report.unstable ? 1 : 0,
+                        last && report.severed ? 1 : 0, reason);
   }
   return rows;
 }

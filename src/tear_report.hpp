@@ -12,8 +12,8 @@ struct EnergyLedger {
   double tool = 0;        // work of the tool on the body, from its force and motion
   double loads = 0;       // work of gravity, of the pressure in cuts, and of pre-strain as the load that it stands for
   double elastic = 0;     // change of the energy of the strain by which the body differs from its given shape
-  double surface = 0;     // toughness times the area torn
-  double dissipation = 0; // released beyond that: surplus of unstable and of late growth, cuts of a blade, letting go
+  double surface = 0;     // toughness times the area torn, and what the loads pay of a blade's cut
+  double dissipation = 0; // released beyond that: surplus of unstable and of late growth, letting go
   /// What the account leaves open: the error of the solution and of the release rates.
   [[nodiscard]] double imbalance() const { return tool + loads - elastic - surface - dissipation; }
 };
@@ -27,9 +27,12 @@ struct Energies {
 };
 Energies energies(const BodyModel& model);
 
-/// The fronts after loading (number 0) or after an increment of the tears.
+/// The fronts after loading (number 0: up to where the first of them moves, if one does) or after an increment of the
+/// tears.
 struct TearIncrement {
   int number = 0;
+  double time = 0;                                                 // s; in a step, while the load is followed
+  double force = 0;                                                // N, on the tool
   int triangles = 0;                                               // of sheet, added
   double advance = 0;                                              // m, farthest way of the front
   double area = 0;                                                 // m2, of the cut

@@ -16,12 +16,8 @@ namespace {
 
 constexpr double still = 0.02, merged = 0.35, stretched = 1.5; // in units of the edge
 
-/// An edge of the border, in the direction of its triangle.
-struct BorderEdge {
-  int from, to;
-};
+} // namespace
 
-/// Edges of the border of one sheet that are front, at least in part.
 std::vector<BorderEdge> front_edges(const Incision& incision, int sheet) {
   const SurfaceMesh& mesh = incision.sheets()[sheet];
   const auto neighbours = triangle_neighbours(mesh);
@@ -44,6 +40,8 @@ std::vector<BorderEdge> front_edges(const Incision& incision, int sheet) {
     }
   return edges;
 }
+
+namespace {
 
 /// Grows one sheet; its border edges and the motions of their ends change row by row.
 class SheetGrowth {

@@ -14,6 +14,14 @@ struct FrontGrowth {
   double area = 0;                 // m2, of these, parts outside the body included
 };
 
+/// An edge of the border of a sheet, in the direction of its triangle.
+struct BorderEdge {
+  int from, to;
+};
+
+/// Edges of the border of one sheet that are front, at least in part.
+std::vector<BorderEdge> front_edges(const Incision& incision, int sheet);
+
 /// Moves every vertex of the front by motion(frame of the front there), m, in the rest frame. Border vertices just
 /// outside the body move with the nearest point of the front, so that the sheet goes on reaching through the surface.
 /// New triangles have edges of about `edge` m: longer motions make several rows, vertices that come closer to one

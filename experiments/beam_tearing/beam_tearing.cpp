@@ -103,12 +103,13 @@ struct Run {
   double load_error = 0, straightness = 0, balance = 0;
 };
 
-Run tear(int nodes, double last_depth, std::uint64_t seed, const solvers::DiscretisationOptions& options) {
+Run tear(int nodes, double last_depth, std::uint64_t seed, const solvers::DiscretisationOptions& options,
+         const ExperimentContext& context) {
   const TiltedStrip strip = tilted_strip(length, 2 * arm, thickness, 0.4, StripSides::sliding);
   std::vector<topology::SurfaceMesh> sheets{cut_from_end(strip, first_depth, 0, 0.15)};
   Run run;
   double work = 0, dissipated = 0, stored = 0, last_area = 0;
-  constexpr int most_steps = 60;
+  constexpr int most_steps = 160;
   for (int step = 0; step < most_steps; ++step) {
     const Length at = solve_length(strip, sheets, nodes, seed, options);
     const double load = std::sqrt(toughness / at.release), opening = load * at.opening;
@@ -120,6 +121,9 @@ Run tear(int nodes, double last_depth, std::uint64_t seed, const solvers::Discre
       stored = 0.5 * load * opening;
     }
     last_area = at.area;
+    context.say(
+        fmt::format("depth {:.3f}, opening {:.2f}, load {:.5f} (beams {:.5f}), straight to {:.2f} % of the width",
+                    at.depth, opening, load, beam_load(opening), 100 * at.straightness / thickness));
     run.depth.push_back(at.depth);
     run.opening.push_back(opening);
     run.load.push_back(load);
@@ -150,7 +154,7 @@ std::vector<Check> run_beam_tearing(const ExperimentContext& context) {
     options.method = method;
     std::vector<double> load, straightness, balance, reached;
     for (int seed = 1; seed <= seeds; ++seed) {
-      const Run run = tear(nodes, last_depth, static_cast<std::uint64_t>(seed), options);
+      const Run run = tear(nodes, last_depth, static_cast<std::uint64_t>(seed), options, context);
       load.push_back(run.load_error);
       straightness.push_back(run.straightness);
       balance.push_back(run.balance);

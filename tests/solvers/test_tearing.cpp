@@ -133,3 +133,18 @@ TEST_CASE("A seed of a tear releases at the strength what its surface takes", "[
   CHECK(released == Approx(toughness * std::numbers::pi * a * a));
   CHECK(averaging_length(material, toughness, strength) < a);
 }
+
+TEST_CASE("The share of a load at which a front moves follows from intensities in proportion to it") {
+  const Material material{1e4, 0.3, 0};
+  const double modulus = material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
+  FrontState rest, tough;
+  rest.toughness = tough.toughness = 2;
+  FrontState pulled = rest;
+  pulled.intensities = Intensities(std::sqrt(4 * 2 * modulus), 0, 0); // G is four times the toughness
+  tough.intensities = Intensities(-1e6, 0, 0);                        // pressed together
+  CHECK(onset_share(material, {rest, tough}, {pulled, tough}, 1) == Approx(0.5).epsilon(1e-9));
+  CHECK(onset_share(material, {rest, tough}, {pulled, tough}, 2.25) == Approx(0.75).epsilon(1e-9));
+  CHECK(onset_share(material, {rest, tough}, {pulled, tough}, 4.1) == 1);
+  CHECK(onset_share(material, {pulled}, {rest}, 1) == 0); // it is there already
+  CHECK_THROWS_AS(onset_share(material, {rest}, {}, 1), InputError);
+}
