@@ -232,13 +232,13 @@ namespace {
 void check_blade_force(const Scenario& scenario, const Section& root, Offences& offences) {
   const Section section = root.table("blade");
   const BladeSettings& blade = *scenario.blade;
-  const bool resists = scenario.toughness > 0 && !scenario.tearing.enabled;
+  const bool resists = scenario.toughness > 0;
   for (const char* key : {"sharpness", "friction"})
     if (!resists && section.has(key))
       offences.add(section.line(key),
-                   fmt::format("blade.{} is given, but nothing resists the blade: {}", key,
-                               scenario.tearing.enabled ? "with tearing it cuts freely; allowed: one of the two"
-                                                        : "material.toughness is left out; allowed: both or neither"));
+                   fmt::format("blade.{} is given, but nothing resists the blade: material.toughness is left out; "
+                               "allowed: both or neither",
+                               key));
   if (resists && blade.advance > 0)
     offences.add(
         section.line("advance"),

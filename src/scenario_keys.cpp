@@ -59,8 +59,7 @@ constexpr std::array keys = {
     ScenarioKey{"material.toughness", number, "J/m2", "",
                 "Energy that new cut takes, G_c: the blade deforms the tissue until that energy is there, and feels a "
                 "force. Liver: 76 to 225. Left out: the blade cuts whatever its edge sweeps, without resistance. With "
-                "[tearing] "
-                "the energy at which a cut runs on by itself, and the blade cuts freely.",
+                "[tearing] also the energy at which a cut runs on by itself.",
                 above(0, 1e6)},
     ScenarioKey{"material.layer", array_of_tables, "", "",
                 "Parts of the tissue with a toughness of their own, for tearing: layers, a weak plane. Where several "
@@ -329,7 +328,7 @@ constexpr std::array keys = {
 
     ScenarioKey{"tearing", table, "", "",
                 "Cuts that run on by themselves where the energy they release reaches material.toughness "
-                "(docs/tearing.md). A blade then cuts without resistance. Left out: none does."},
+                "(docs/tearing.md). Left out: none does."},
     ScenarioKey{"tearing.enabled", boolean, "", "true", "False: as if the table were left out."},
     ScenarioKey{"tearing.step", number, "", "0.5",
                 "Longest way of the front in one increment, in node spacings at the front.", from(0.1, 2)},

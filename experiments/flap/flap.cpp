@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <fmt/format.h>
+#include <fstream>
 
 namespace spherecut::experiments {
 
@@ -30,6 +31,7 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
   std::vector<double> times;
   std::vector<app::TearReport> reports;
   app::StepResult last;
+  std::string increments(app::tear_columns());
   for (const app::StepSample& sample : session.steps()) {
     last = session.step(sample);
     const app::EnergyLedger& e = last.tear->ledger;
@@ -42,12 +44,14 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
     pull.y.push_back(last.force.norm());
     times.push_back(last.time);
     reports.push_back(*last.tear);
+    increments += app::tear_rows(*last.tear);
     context.say(fmt::format("t = {:.2f} s: {:.3g} N, {:.3g} cm2 torn in {} increments: {}", last.time,
                             last.force.norm(), 1e4 * last.tear->area, last.tear->increments.size() - 1,
                             last.tear->reason));
   }
   figure.series = {pull};
   table.write(context.out / "flap.csv");
+  std::ofstream(context.out / "tears.csv") << increments;
   app::write_png(figure, context.out / "pull.png");
   for (const auto& [name, drawn] : app::tear_figures(times, reports))
     app::write_png(drawn, context.out / name);
