@@ -38,7 +38,7 @@ class FemSplit final : public BackEnd {
       return std::min(grading(x), at_last(x));
     };
     MeshRequest request = mesh_request(scenario_, number_, grading);
-    request.label = [this](const Vector3& x) { return scenario_.domain->signed_distance(x) < 0 ? 1 : 0; };
+    request.label = [this](const Vector3& x) { return scenario_.contains(x) ? 1 : 0; };
     request.features = scenario_.sharp_edges;
     request.size = both;
     mesh_ = mesh_for(

@@ -72,8 +72,22 @@ std::vector<std::vector<Vector3>> mesh_features(const Scenario& scenario, int in
 
 MeshRequest mesh_request(const Scenario& scenario, int increment, const Grading& grading) {
   MeshRequest request;
-  request.label = [&scenario](const Vector3& x) {
-    return scenario.domain->signed_distance(x) >= 0 ? 0 : scenario.height(x) > 0 ? 1 : 2;
+  // Where the plane leaves a curved organ at a thin margin the faces meet at sharp angles, and refinement would not
+  // end: there the plane parts no more than a ball about the cut.
+  double reach = std::numeric_limits<double>::infinity();
+  Vector3 middle = Vector3::Zero();
+  if (scenario.sharp_edges.empty()) {
+    const std::vector<Vector3> front = front_of(scenario, increment).points;
+    middle = 0.5 * (front.front() + front.back()); // at the mouth
+    reach = 0;
+    for (const Vector3& x : front)
+      reach = std::max(reach, (x - middle).norm());
+    reach += std::max(4 * grading.fine, 0.3 * reach);
+  }
+  request.label = [&scenario, middle, reach](const Vector3& x) {
+    if (!scenario.contains(x))
+      return 0;
+    return scenario.height(x) < 0 && (x - middle).squaredNorm() < reach * reach ? 2 : 1;
   };
   const BoundingBox box = scenario.domain->bounds();
   request.centre = scenario.inner;

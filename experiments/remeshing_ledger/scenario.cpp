@@ -1,5 +1,7 @@
 #include "experiments/remeshing_ledger/scenario.hpp"
 
+#include "experiments/remeshing_ledger/organ_side.hpp"
+
 #include "topology/organs.hpp"
 
 #include <Eigen/Geometry>
@@ -261,6 +263,7 @@ Scenario growing_penny(int increments) {
   s.name = "penny";
   const Vector3 half(2, 2, 2);
   s.domain = topology::make_box_domain(-half, half, 0.5);
+  s.contains = [domain = s.domain](const Vector3& x) { return domain->signed_distance(x) < 0; };
   s.sharp_edges = box_edges(-half, half);
   s.material = {1, 0.3, 0};
   const CutFrame tilted = tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
@@ -324,6 +327,7 @@ Scenario edge_cut(int increments) {
   s.name = "edge";
   const Vector3 lower(-0.03, -0.03, -0.03), upper(0.03, 0.03, 0);
   s.domain = topology::make_box_domain(lower, upper, 0.004);
+  s.contains = [domain = s.domain](const Vector3& x) { return domain->signed_distance(x) < 0; };
   s.sharp_edges = box_edges(lower, upper);
   s.material = {5000, 0.4, 1000};
   // Off every axis and cell.
@@ -353,6 +357,7 @@ Scenario liver_incision(int increments) {
   Scenario s;
   s.name = "liver";
   s.domain = topology::make_organ_domain(topology::make_liver(5000));
+  s.contains = side_of_organ(s.domain, 0.001);
   s.material = {6000, 0.4, 1000};
   s.increments = increments;
   const BoundingBox box = s.domain->bounds();

@@ -20,7 +20,8 @@ using Vector2 = Eigen::Vector2d;
 struct Scenario {
   std::string name;
   std::shared_ptr<const topology::Domain> domain;
-  std::vector<std::vector<Vector3>> sharp_edges; // of the organ, as polylines, m
+  std::function<bool(const Vector3& x)> contains; // whether the organ does
+  std::vector<std::vector<Vector3>> sharp_edges;  // of the organ, as polylines, m
   solvers::Material material;
   CutFrame frame;
   int increments = 0; // the cut before the first of them is number 0

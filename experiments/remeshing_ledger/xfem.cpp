@@ -39,7 +39,7 @@ class XFem final : public BackEnd {
     for (int i = 0; i <= stations; ++i)
       fronts.push_back(front_of(scenario_, number_ + (scenario_.increments - number_) * i / stations).points);
     MeshRequest request = mesh_request(scenario_, number_, grading);
-    request.label = [this](const Vector3& x) { return scenario_.domain->signed_distance(x) < 0 ? 1 : 0; };
+    request.label = [this](const Vector3& x) { return scenario_.contains(x) ? 1 : 0; };
     request.features = scenario_.sharp_edges;
     request.size = [grading, fronts](const Vector3& x) {
       double least = grading.coarse;
