@@ -40,7 +40,11 @@ class FemLocalRemesh final : public BackEnd {
     }
     if (increment.quality = moved_quality(); increment.quality < worn * first_quality_)
       return anew(increment);
-    return solve(std::move(increment));
+    try {
+      return solve(increment);
+    } catch (const NumericalError&) { // a flat element at the front may leave the system indefinite
+      return anew(std::move(increment));
+    }
   }
 
   Opening opening() const override { return fem_opening(nodes_, scenario_, displacement_); }
@@ -127,7 +131,18 @@ class FemLocalRemesh final : public BackEnd {
     number_ = number;
   }
 
+  /// Another mesh, of slightly smaller elements, where one is of no use.
   Increment anew(Increment increment) {
+    for (const double share : {1.0, 0.97, 0.94}) {
+      increment.failure.clear();
+      increment = anew(std::move(increment), share);
+      if (increment.failure.empty())
+        break;
+    }
+    return increment;
+  }
+
+  Increment anew(Increment increment, double share) {
     increment.anew = true;
     increment.number = number_;
     base_ = number_;
@@ -138,9 +153,9 @@ class FemLocalRemesh final : public BackEnd {
       const StageClock clock(increment.times, Stage::topology);
       const Front front = front_of(scenario_, number_);
       front_closed_ = front.closed;
-      request = mesh_request(
-          scenario_, number_,
-          {resolution_.fine, resolution_.slope, resolution_.coarse_over_fine * resolution_.fine, front.points});
+      request = mesh_request(scenario_, number_,
+                             {share * resolution_.fine, resolution_.slope,
+                              share * resolution_.coarse_over_fine * resolution_.fine, front.points});
     }
     const TetMesh meshed = mesh_for(
         increment, [&] { return mesh_volume(request); }, limit_);
@@ -234,7 +249,7 @@ class FemLocalRemesh final : public BackEnd {
       const StageClock clock(increment.times, Stage::assembly);
       system = assemble(nodes_, scenario_.material, near_place_, near_count_ + between_count_, is_near_);
       if (system.folded > 0 && number_ != base_)
-        return anew(std::move(increment));
+        throw NumericalError(fmt::format("{} elements fold over", system.folded));
       const VectorX loads = face_loads(nodes_, scenario_);
       for (std::size_t i = 0; i < near_place_.size(); ++i)
         if (near_place_[i] >= 0)

@@ -4,6 +4,7 @@
 #include "src/figure.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <fstream>
@@ -159,26 +160,43 @@ app::Figure error_cost_figure(const std::vector<Run>& runs, const std::string& s
   return figure;
 }
 
-/// Stages on top of one another: every line is the sum up to its stage, one place on the axis a back end.
-app::Figure stages_figure(const std::vector<Run>& runs, const std::string& scenario) {
-  app::Figure figure{scenario + ": time an increment, stages summed up from below",
-                     "back end, in the order of the table, finest size",
-                     "processor time / ms",
-                     false,
-                     false,
-                     {}};
-  const std::vector<const Run*> chosen = finest_runs(runs, scenario);
-  std::vector<double> sum(chosen.size(), 0);
-  for (int s = 0; s < stage_count; ++s) {
-    app::Series series{"up to " + std::string(stage_names[static_cast<std::size_t>(s)]), {}, {}};
-    for (std::size_t i = 0; i < chosen.size(); ++i) {
-      sum[i] += std::isfinite(chosen[i]->mean_stage(s)) ? 1e3 * chosen[i]->mean_stage(s) : 0;
-      series.x.push_back(static_cast<double>(i) + 1);
-      series.y.push_back(sum[i]);
+/// Stages on top of one another: a bar for every back end at its finest size, mean over the increments, as SVG.
+void write_stages(const std::vector<Run>& runs, const std::string& scenario, const std::filesystem::path& file) {
+  constexpr std::array<const char*, stage_count> colours{"#CC79A7", "#E69F00", "#56B4E9",
+                                                         "#0072B2", "#D55E00", "#009E73"};
+  constexpr int left = 270, bar = 22, step = 32, width = 900, plot = width - left - 90, top = 70;
+  std::vector<const Run*> chosen = finest_runs(runs, scenario);
+  std::erase_if(chosen, [](const Run* run) { return !(run->mean_processor() > 0); });
+  double longest = 1e-9;
+  for (const Run* run : chosen)
+    longest = std::max(longest, run->mean_processor());
+  std::ofstream out(file);
+  out << fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" "
+                     "font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{0}\" height=\"{1}\" "
+                     "fill=\"white\"/>\n<text x=\"{2}\" y=\"22\" font-size=\"15\">{3}: processor time an "
+                     "increment by stage, finest size of each, ms</text>\n",
+                     width, top + step * std::ssize(chosen) + 10, 12, scenario);
+  for (std::size_t s = 0; s < stage_count; ++s)
+    out << fmt::format("<rect x=\"{}\" y=\"38\" width=\"14\" height=\"14\" fill=\"{}\"/><text x=\"{}\" "
+                       "y=\"50\">{}</text>\n",
+                       12 + 125 * s, colours[s], 31 + 125 * s, stage_names[s]);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const auto y = top + step * static_cast<int>(i);
+    out << fmt::format("<text x=\"{}\" y=\"{}\" text-anchor=\"end\">{} {:g} m, {:.1f} %</text>\n", left - 8, y + 16,
+                       chosen[i]->name, chosen[i]->fine, 100 * chosen[i]->error);
+    double from = left;
+    for (int s = 0; s < stage_count; ++s) {
+      const double seconds = chosen[i]->mean_stage(s), length = plot * seconds / longest;
+      if (!(length > 0))
+        continue;
+      out << fmt::format("<rect x=\"{:.2f}\" y=\"{}\" width=\"{:.2f}\" height=\"{}\" fill=\"{}\"/>\n", from, y, length,
+                         bar, colours[static_cast<std::size_t>(s)]);
+      from += length;
     }
-    figure.series.push_back(series);
+    out << fmt::format("<text x=\"{:.2f}\" y=\"{}\">{:.3g}</text>\n", from + 6, y + 16,
+                       1e3 * chosen[i]->mean_processor());
   }
-  return figure;
+  out << "</svg>\n";
 }
 
 app::Figure growth_figure(const std::vector<Run>& runs, const std::string& scenario, bool unknowns) {
@@ -209,7 +227,7 @@ void write_tables(const std::vector<Run>& runs, const std::vector<Ratio>& ratios
   write_markdown(runs, ratios, context.out / "tables.md");
   for (const std::string& scenario : distinct(runs, &Run::scenario, "")) {
     app::write_png(error_cost_figure(runs, scenario), context.out / (scenario + "_error_cost.png"));
-    app::write_png(stages_figure(runs, scenario), context.out / (scenario + "_stages.png"));
+    write_stages(runs, scenario, context.out / (scenario + "_stages.svg"));
     app::write_png(growth_figure(runs, scenario, false), context.out / (scenario + "_growth.png"));
     app::write_png(growth_figure(runs, scenario, true), context.out / (scenario + "_unknowns.png"));
   }

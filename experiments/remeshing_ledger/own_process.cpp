@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <fstream>
+#include <malloc.h>
 #include <poll.h>
 #include <string>
 #include <sys/resource.h>
@@ -109,6 +110,7 @@ double peak_memory() {
 }
 
 void reset_peak_memory() {
+  malloc_trim(0);                                // what was freed before goes back to the system and is not held
   std::ofstream("/proc/self/clear_refs") << "5"; // where it may not be written the peak stays that of the whole run
 }
 

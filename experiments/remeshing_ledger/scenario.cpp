@@ -377,21 +377,12 @@ Scenario liver_incision(int increments) {
   s.sheet = [frame = s.frame, step = s.advance](int k) {
     return columns_sheet(frame, column_places(0, first, step, k), -depth, above, 0.008);
   };
-  static constexpr double radius = 0.012;
+  // Spread by a pressure on its faces: pads that hold the skin would be met otherwise by every mesh.
   const double low = box.lower.z() + 0.3 * box.extent().z();
-  const Vector3 across = s.frame.normal;
-  const Vector3 left = s.domain->closest_surface_point(top + 0.03 * across),
-                right = s.domain->closest_surface_point(top - 0.03 * across);
-  s.held = [low, left, right](const Vector3& x, const Vector3&) {
-    return x.z() < low || (x - left).norm() < radius || (x - right).norm() < radius;
-  };
-  s.displacement = [low, left, across](const Vector3& x) -> Vector3 {
-    if (x.z() < low)
-      return Vector3::Zero();
-    return ((x - left).norm() < radius ? 0.002 : -0.002) * across;
-  };
-  s.tool = [left](const Vector3& x) { return (x - left).norm() < radius * 1.001; };
-  s.force_direction = across;
+  s.held = [low](const Vector3& x, const Vector3&) { return x.z() < low; };
+  s.displacement = [](const Vector3&) -> Vector3 { return Vector3::Zero(); };
+  s.tool = [](const Vector3&) { return false; };
+  s.pressure = 300;
   s.marked = s.in_space({0.5 * first, -0.004});
   return s;
 }

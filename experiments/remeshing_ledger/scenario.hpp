@@ -90,7 +90,7 @@ std::vector<FacePoint> face_points(const Scenario& scenario, int increment);
 Scenario growing_penny(int increments);
 /// A block of 60 x 60 x 30 mm is pulled apart at two faces; a cut 15 mm deep runs in from the side by 40 mm.
 Scenario edge_cut(int increments);
-/// An incision into the dome of a liver, held at its underside and drawn apart by two retractors.
+/// An incision into the dome of a liver, held at its underside and spread by a pressure on its faces.
 Scenario liver_incision(int increments);
 
 } // namespace spherecut::experiments::ledger
