@@ -51,10 +51,22 @@ bool intensities_at(const Discretisation& body, const Field& field, FrontState& 
   return false;
 }
 
+/// Whether faces are in contact behind the front where the tube of the integral passes.
+bool presses_behind(const Problem& problem, const FrontFrame& frame, const std::vector<Vector3>& closed) {
+  if (closed.empty())
+    return false;
+  const double reach = InteractionOptions{}.outer * spacing_near(problem, frame.point);
+  return std::any_of(closed.begin(), closed.end(), [&](const Vector3& x) {
+    const Vector3 d = x - frame.point;
+    return d.norm() < reach && d.dot(frame.ahead) < 0;
+  });
+}
+
 } // namespace
 
 std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
-                                     const std::function<double(const Vector3&)>& toughness, double spacing) {
+                                     const std::function<double(const Vector3&)>& toughness, double spacing,
+                                     const std::vector<Vector3>& closed) {
   const Problem& problem = body.problem();
   if (problem.incision == nullptr)
     throw InputError("tearing: the body has no cut");
@@ -67,7 +79,17 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
       throw InputError(fmt::format("tearing: the toughness at ({:.6g}, {:.6g}, {:.6g}) m is {} J/m2; it must be "
                                    "positive",
                                    frame.point.x(), frame.point.y(), frame.point.z(), state.toughness));
-    (intensities_at(body, field, state) ? states : without).push_back(state);
+    if (presses_behind(problem, frame, closed)) {
+      try {
+        state.intensities = displacement_correlation(body, field, frame);
+        state.by_integral = false;
+        states.push_back(state);
+      } catch (const InputError&) {
+        without.push_back(state);
+      }
+    } else {
+      (intensities_at(body, field, state) ? states : without).push_back(state);
+    }
   }
   const std::size_t known = states.size();
   for (FrontState& state : without) {

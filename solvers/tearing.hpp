@@ -29,10 +29,13 @@ struct FrontState {
 
 /// Intensities along the whole front at places about `spacing` m apart, by interaction integral. Where its tube does
 /// not fit (near the surface), those of the nearest place that has it within 3 node spacings, else by displacement
-/// correlation. `toughness` at a point of the body at rest, J/m2. Throws InputError when `spacing` or a toughness is
-/// not positive, NumericalError when the intensities cannot be had.
+/// correlation. Faces that press on one another carry tractions which the integral does not know: where pairs of lip
+/// nodes are in contact (`closed`, places of such pairs) behind the front within its tube, correlation it is.
+/// `toughness` at a point of the body at rest, J/m2. Throws InputError when `spacing` or a toughness is not positive,
+/// NumericalError when the intensities cannot be had.
 std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
-                                     const std::function<double(const Vector3&)>& toughness, double spacing);
+                                     const std::function<double(const Vector3&)>& toughness, double spacing,
+                                     const std::vector<Vector3>& closed = {});
 
 /// The states with intensities averaged along the front over about `length` m (standard deviation of the weight), and
 /// what follows from them. Intensities scatter from place to place with the nodes; a front that followed that would

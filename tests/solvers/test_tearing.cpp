@@ -1,7 +1,9 @@
 #include "solvers/tearing.hpp"
 
+#include "solvers/lip_contact.hpp"
 #include "solvers/tear_seed.hpp"
 #include "tests/support/bodies.hpp"
+#include "tests/support/cut_block.hpp"
 #include "topology/errors.hpp"
 
 #include <catch2/catch.hpp>
@@ -75,6 +77,46 @@ TEST_CASE("A front moves where the release reaches the toughness, most where it 
   CHECK(exact(states[0].frame).norm() == Approx(0.1));
   CHECK_THROWS_AS(tear_motion({}, 0.1, 1), InputError);
   CHECK_THROWS_AS(tear_motion(states, 0, 1), InputError);
+}
+
+TEST_CASE("A cut that is pressed together and sticks is not driven on", "[tearing]") {
+  const tests::CutBlock block = tests::cut_block(8, false, 2);
+  const tests::CutFrame& cut = block.frame;
+  Problem problem;
+  problem.domain = block.domain;
+  problem.incision = block.incision;
+  problem.nodes = block.nodes;
+  problem.material = {1000, 0.3, 0};
+  const Matrix3 shear = cut.normal * cut.ahead.transpose() + cut.ahead * cut.normal.transpose();
+  const Matrix3 strain = 1e-3 * (-2 * cut.normal * cut.normal.transpose() + shear); // pressed more than sheared
+  for (int i = 0; i < block.nodes.size(); ++i)
+    if (block.nodes.kinds[i] == NodeKind::surface || block.nodes.kinds[i] == NodeKind::edge)
+      problem.prescribed.push_back({i, {true, true, true}, strain * block.nodes.positions[i]});
+  problem.prescribed_region = [](const Vector3&, const Vector3&) { return true; };
+  problem.prescribed_field = [strain](const Vector3& x) -> Vector3 { return strain * x; };
+  const auto body = discretise(problem, {});
+  const std::vector<LipPair> pairs = lip_pairs(problem.nodes);
+  const auto release = [&](const Field& field, const std::vector<Vector3>& closed) {
+    double most = 0;
+    for (const FrontState& state : front_states(
+             *body, field, [](const Vector3&) { return 1.0; }, 0.1, closed))
+      if (state.frame.point.cwiseAbs().maxCoeff() < 0.3)
+        most = std::max(most, state.release);
+    return most;
+  };
+  const Field open = body->solve();
+  const LipPatch lips = condense_lips(*body, pairs, LipCondition::sticking, nullptr);
+  const LipState state = close_lips(lips, lips.base_opening, 1e-12);
+  std::vector<Vector3> closed;
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    if (state.closed[p] != 0)
+      closed.push_back(problem.nodes.positions[pairs[p].plus]);
+  REQUIRE(closed.size() == pairs.size());
+  const Field stuck = deform(open, lips, state);
+  const double sheared = release(open, {}); // faces pass through one another: K_II of the shear
+  CHECK(sheared > 0);
+  CHECK(release(stuck, closed) < 1e-3 * sheared);
+  CHECK(release(stuck, {}) > 0.1 * sheared); // what the integral makes of tractions it does not know
 }
 
 TEST_CASE("A front turns along a weak plane, and by hoop stress where the toughness is uniform", "[tearing]") {
