@@ -1,11 +1,11 @@
-// Pictures of the page for README and docs: node pictures.mjs BUILD_FOLDER SOURCE_FOLDER OUTPUT_FOLDER
+// Pictures of the page for README and docs: node pictures.mjs BUILD_FOLDER SOURCE_FOLDER OUTPUT_FOLDER [liver|flap]
 import { join } from 'node:path';
 import type { Page as Tab } from 'playwright-core';
 import { launch, openPage, until } from './browser';
 import { chooseMode, hover, look, ready, stroke } from './hand';
 import { serve } from './server';
 
-const [build = '.', source = '.', out = '.'] = process.argv.slice(2);
+const [build = '.', source = '.', out = '.', which = ''] = process.argv.slice(2);
 /** A picture with smooth edges, small enough to be kept: below 150 kB. */
 async function photograph(tab: Tab, name: string): Promise<void> {
   await tab.evaluate(() => globalThis.spherecut!.view.sharpen(2));
@@ -17,77 +17,122 @@ async function photograph(tab: Tab, name: string): Promise<void> {
 }
 
 // Nodes stay as fine as they are however long a cut takes.
-const served = await serve(build, join(source, 'scenarios/liver_live.toml'), (text) => text.replace(/^budget = .*$/m, 'budget = 60.0'));
-const browser = await launch();
-try {
-  const { tab, context } = await openPage(browser, served.address, { width: 1280, height: 800 });
-  await ready(tab);
-  const keep = async (name: string): Promise<void> => {
-    await tab.evaluate(() => document.getElementById('messages')!.replaceChildren());
-    await tab.waitForTimeout(700);
-    await photograph(tab, name);
-    console.log(name, JSON.stringify(await look(tab)));
-  };
-  await hover(tab, -0.03, -0.012);
-  await tab.mouse.down();
-  await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.05);
-  await tab.mouse.wheel(0, -800);
-  await tab.waitForTimeout(2500);
-  await keep('press');
-  await tab.selectOption('#colours', 'von_mises');
-  await tab.waitForTimeout(1200);
-  await keep('stress');
-  await tab.selectOption('#colours', 'none');
-  await tab.mouse.up();
-  await chooseMode(tab, '2', 'blade');
-  for (let i = 0; i < 6; ++i) await tab.keyboard.press('.', { delay: 150 });
-  await hover(tab, -0.06, 0.004);
-  await stroke(tab, [[-0.06, 0.004], [-0.035, 0.004], [-0.01, 0.001], [0.012, -0.002]], 2.5);
-  await until(tab, 'there is a cut', () => globalThis.spherecut!.frame!.cutArea > 1e-4, 120);
-  // Until the solver has caught up with the hand.
-  for (let area = -1, seen = await look(tab); seen.cutArea > area; seen = await look(tab)) {
-    area = seen.cutArea;
-    await tab.waitForTimeout(12_000);
+async function liver(): Promise<void> {
+  const served = await serve(build, join(source, 'scenarios/liver_live.toml'), (text) => text.replace(/^budget = .*$/m, 'budget = 60.0'));
+  const browser = await launch();
+  try {
+    const { tab, context } = await openPage(browser, served.address, { width: 1280, height: 800 });
+    await ready(tab);
+    const keep = async (name: string): Promise<void> => {
+      await tab.evaluate(() => document.getElementById('messages')!.replaceChildren());
+      await tab.waitForTimeout(700);
+      await photograph(tab, name);
+      console.log(name, JSON.stringify(await look(tab)));
+    };
+    await hover(tab, -0.03, -0.012);
+    await tab.mouse.down();
+    await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.05);
+    await tab.mouse.wheel(0, -800);
+    await tab.waitForTimeout(2500);
+    await keep('press');
+    await tab.selectOption('#colours', 'von_mises');
+    await tab.waitForTimeout(1200);
+    await keep('stress');
+    await tab.selectOption('#colours', 'none');
+    await tab.mouse.up();
+    await chooseMode(tab, '2', 'blade');
+    for (let i = 0; i < 6; ++i) await tab.keyboard.press('.', { delay: 150 });
+    await hover(tab, -0.06, 0.004);
+    await stroke(tab, [[-0.06, 0.004], [-0.035, 0.004], [-0.01, 0.001], [0.012, -0.002]], 2.5);
+    await until(tab, 'there is a cut', () => globalThis.spherecut!.frame!.cutArea > 1e-4, 120);
+    // Until the solver has caught up with the hand.
+    for (let area = -1, seen = await look(tab); seen.cutArea > area; seen = await look(tab)) {
+      area = seen.cutArea;
+      await tab.waitForTimeout(12_000);
+    }
+    await keep('cutting');
+    await tab.mouse.up();
+    await tab.keyboard.press('k');
+    await until(tab, 'the blade is away', () => globalThis.spherecut!.frame!.depth < -0.03);
+    await tab.waitForTimeout(3000);
+    await tab.evaluate(() => {
+      const orbit = globalThis.spherecut!.view.orbit;
+      orbit.turn(0, 0.35);
+      orbit.zoom(1.9);
+      orbit.pan(0.06, -0.13);
+      globalThis.spherecut!.view.change();
+    });
+    await keep('wound');
+    await tab.keyboard.press('n');
+    await hover(tab, -0.03, -0.004);
+    await tab.keyboard.press('p');
+    await until(tab, 'the supports of a node', () => /sees/.test(document.getElementById('support-state')!.textContent!));
+    await tab.keyboard.press('k');
+    await tab.waitForTimeout(2500);
+    await keep('nodes');
+    for (const key of ['n', 'o']) await tab.keyboard.press(key);
+    await tab.selectOption('#slice', 'cut');
+    await tab.selectOption('#slice-axis', '0');
+    await tab.evaluate(() => globalThis.spherecut!.home());
+    await tab.waitForTimeout(1500);
+    await keep('slice');
+    await context.close();
+    const phone = await openPage(browser, served.address, { width: 390, height: 760, touch: true });
+    await ready(phone.tab);
+    await phone.tab.getByText('Probe', { exact: true }).tap();
+    await phone.tab.waitForTimeout(2000);
+    await phone.tab.tap('#view', { position: { x: 170, y: 300 } });
+    await phone.tab.tap('#press-hold');
+    await phone.tab.waitForTimeout(3500);
+    await photograph(phone.tab, 'phone');
+  } catch (error) {
+    console.error(served.said());
+    throw error;
+  } finally {
+    await browser.close();
+    await served.stop();
   }
-  await keep('cutting');
-  await tab.mouse.up();
-  await tab.keyboard.press('k');
-  await until(tab, 'the blade is away', () => globalThis.spherecut!.frame!.depth < -0.03);
-  await tab.waitForTimeout(3000);
-  await tab.evaluate(() => {
-    const orbit = globalThis.spherecut!.view.orbit;
-    orbit.turn(0, 0.35);
-    orbit.zoom(1.9);
-    orbit.pan(0.06, -0.13);
-    globalThis.spherecut!.view.change();
-  });
-  await keep('wound');
-  await tab.keyboard.press('n');
-  await hover(tab, -0.03, -0.004);
-  await tab.keyboard.press('p');
-  await until(tab, 'the supports of a node', () => /sees/.test(document.getElementById('support-state')!.textContent!));
-  await tab.keyboard.press('k');
-  await tab.waitForTimeout(2500);
-  await keep('nodes');
-  for (const key of ['n', 'o']) await tab.keyboard.press(key);
-  await tab.selectOption('#slice', 'cut');
-  await tab.selectOption('#slice-axis', '0');
-  await tab.evaluate(() => globalThis.spherecut!.home());
-  await tab.waitForTimeout(1500);
-  await keep('slice');
-  await context.close();
-  const phone = await openPage(browser, served.address, { width: 390, height: 760, touch: true });
-  await ready(phone.tab);
-  await phone.tab.getByText('Probe', { exact: true }).tap();
-  await phone.tab.waitForTimeout(2000);
-  await phone.tab.tap('#view', { position: { x: 170, y: 300 } });
-  await phone.tab.tap('#press-hold');
-  await phone.tab.waitForTimeout(3500);
-  await photograph(phone.tab, 'phone');
-} catch (error) {
-  console.error(served.said());
-  throw error;
-} finally {
-  await browser.close();
-  await served.stop();
 }
+
+/** The flap held by the grasper, before and after it has torn on. */
+async function flap(): Promise<void> {
+  const served = await serve(build, join(source, 'scenarios/liver_flap.toml'), (text) =>
+    text
+      .replace('fine_spacing = 0.004', 'fine_spacing = 0.006')
+      .replace('coarse_spacing = 0.020', 'coarse_spacing = 0.026')
+      .replace('fine_radius = 0.006', 'fine_radius = 0.008'),
+  );
+  const browser = await launch();
+  try {
+    const { tab } = await openPage(browser, served.address, { width: 1280, height: 800 });
+    await ready(tab);
+    await hover(tab, -0.062, 0.003);
+    await tab.mouse.down();
+    await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3, 120);
+    await tab.keyboard.down(',');
+    await until(tab, 'the hand is far up', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber <= -15, 90);
+    await tab.keyboard.up(',');
+    const before = (await look(tab)).cutArea;
+    await tab.waitForFunction((area) => globalThis.spherecut!.frame!.cutArea >= 1.02 * area, Math.min(before, 1.72e-3), { timeout: 120_000 });
+    await tab.evaluate(() => {
+      const orbit = globalThis.spherecut!.view.orbit;
+      orbit.turn(0.5, -0.45);
+      orbit.zoom(1.7);
+      orbit.pan(0.12, -0.1);
+      document.getElementById('messages')!.replaceChildren();
+      globalThis.spherecut!.view.change();
+    });
+    await tab.waitForTimeout(6000);
+    await photograph(tab, 'tear');
+    console.log('tear', JSON.stringify(await look(tab)));
+  } catch (error) {
+    console.error(served.said());
+    throw error;
+  } finally {
+    await browser.close();
+    await served.stop();
+  }
+}
+
+if (which !== 'flap') await liver();
+if (which !== 'liver') await flap();
