@@ -11,7 +11,6 @@
 // node; the second vanishes for linear fields and gives the coercivity that is missing (gamma = 0 loses seeds at small
 // supports; 0.1 to 0.5 give the same errors within a third). Row i states that the fluxes and the applied force
 // balance, -sum_j t_ij = f_i, so all rows add up to the total force: every t_ij appears twice with opposite signs.
-//
 // Face fluxes are a small numerical integration (one point a face), which the paper's point collocation avoids; it buys
 // convergence and forces in newtons.
 //
@@ -21,7 +20,7 @@
 //   sum_f u_h(x_f) . A + u_h(x_b) . B_i + V_i p_i / lambda - alpha sum_f |A| |d| (p_j - p_i) / mu = 0,
 //
 // B_i the part of the body's surface that belongs to the cell, V_i its volume, and tr(e0) V_i on the right for an
-// initial strain e0.
+// initial strain e0. The system holds p h_i / E instead of p: its entries then are E h whatever the units.
 //
 // A cut: lip nodes stand 1e-4 h off the sheet, so the face between partners is the sheet. Faces between nodes that the
 // sheet keeps apart carry no flux but the traction tau on the lips, -sum_j t_ij = f_i + tau; G_f sees what the sight
@@ -99,9 +98,18 @@ class Collocation final : public ElasticBody {
   Field solve() const override { return solve_for(loads_, 1, prescribed_values(problem_)); }
   double load_work(const Field& field) const override {
     const VectorX displacements = nodal_displacements(field);
+    const auto of = [&](std::size_t node) { return displacements.segment<3>(3 * static_cast<Eigen::Index>(node)); };
     double work = 0;
     for (std::size_t i = 0; i < loads_.size(); ++i)
-      work += loads_[i].dot(displacements.segment<3>(3 * static_cast<Eigen::Index>(i)));
+      work += loads_[i].dot(of(i));
+    if (mixed_) { // what the continuity rows take of an initial strain: a pressure on the surface and the lips
+      double outflow = 0;
+      for (const topology::BoundaryFace& face : cells_.boundary)
+        outflow += face.area.dot(of(face.node));
+      for (const topology::LipFace& face : cells_.lips)
+        outflow += face.area.dot(of(face.node));
+      work += problem_.material.lame_lambda() * problem_.loads.initial_strain.trace() * outflow;
+    }
     return field.load_factor * work;
   }
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
@@ -131,6 +139,12 @@ class Collocation final : public ElasticBody {
   [[nodiscard]] double continuity_scale(int node) const {
     return problem_.material.shear_modulus() / problem_.nodes.spacings[node];
   }
+  [[nodiscard]] double pressure_scale(int node) const { // Pa per unit of the pressure's unknown, a length
+    return problem_.material.young_modulus / problem_.nodes.spacings[node];
+  }
+  [[nodiscard]] double expansion(int node, double load_factor) const { // right-hand side of the continuity, m3
+    return load_factor * problem_.loads.initial_strain.trace() * cells_.volumes[node];
+  }
   [[nodiscard]] VectorX right_hand_side(const std::vector<Vector3>& forces) const {
     VectorX right = VectorX::Zero(report_.unknowns);
     for (std::size_t i = 0; i < forces.size(); ++i)
@@ -142,10 +156,8 @@ class Collocation final : public ElasticBody {
   [[nodiscard]] Field solve_for(const std::vector<Vector3>& forces, double load_factor,
                                 const VectorX& prescribed) const {
     VectorX right = right_hand_side(forces);
-    const double dilation = mixed_ ? load_factor * problem_.loads.initial_strain.trace() : 0;
-    if (dilation != 0)
-      for (int i = 0; i < problem_.nodes.size(); ++i)
-        right[stride_ * i + 3] = dropped_[i] != 0 ? 0 : continuity_scale(i) * cells_.volumes[i] * dilation;
+    for (int i = 0; mixed_ && i < problem_.nodes.size(); ++i)
+      right[stride_ * i + 3] = dropped_[i] != 0 ? 0 : continuity_scale(i) * expansion(i, load_factor);
     for (std::size_t k = 0; k < problem_.prescribed.size(); ++k) {
       const Prescribed& entry = problem_.prescribed[k];
       for (int c = 0; c < 3; ++c)
@@ -166,7 +178,7 @@ class Collocation final : public ElasticBody {
     for (int i = 0; i < count; ++i) {
       field.coefficients.segment<3>(3 * i) = unknowns.segment<3>(stride_ * i);
       if (mixed_)
-        field.pressure[i] = unknowns[stride_ * i + 3];
+        field.pressure[i] = pressure_scale(i) * unknowns[stride_ * i + 3];
     }
     require_finite(field, report_);
     return field;
@@ -181,6 +193,14 @@ class Collocation final : public ElasticBody {
         force += blocks_[k].block<3, 1>(0, 3) * field.pressure[j];
     }
     return force;
+  }
+  /// What the continuity of cell i misses, m3.
+  [[nodiscard]] double discontinuity(int i, const Field& field) const {
+    double missing = -expansion(i, field.load_factor);
+    for (int k = row_start_[i]; k < row_start_[i + 1]; ++k)
+      missing += blocks_[k].block<1, 3>(3, 0).dot(field.coefficients.segment<3>(3 * columns_[k])) +
+                 blocks_[k](3, 3) * field.pressure[columns_[k]];
+    return missing;
   }
 
   bool mixed_;
@@ -391,7 +411,7 @@ SparseMatrix Collocation::constrained_system() const {
       const double scale = c == 3 ? continuity_scale(i) : 1;
       for (const auto& [column, k] : order)
         for (int e = 0; e < stride_; ++e)
-          rows.insert(row, stride_ * column + e) = scale * blocks_[k](c, e);
+          rows.insert(row, stride_ * column + e) = scale * (e == 3 ? pressure_scale(column) : 1) * blocks_[k](c, e);
     }
   }
   rows.makeCompressed();
@@ -456,6 +476,8 @@ double Collocation::residual(const Field& field, const std::vector<int>& loaded_
     for (int c = 0; c < 3; ++c)
       if (!constrained_[i][c])
         worst = std::max(worst, std::abs(force[c] - applied[i][c]));
+    if (mixed_ && dropped_[i] == 0)
+      worst = std::max(worst, continuity_scale(i) * std::abs(discontinuity(i, field)));
   }
   return largest > 0 ? worst / largest : 0;
 }
