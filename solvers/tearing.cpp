@@ -145,9 +145,18 @@ double onset_share(const Material& material, const std::vector<FrontState>& unlo
   if (unloaded.size() != loaded.size())
     throw InputError(fmt::format("tearing: {} places of the front without load, {} with it; the same are wanted",
                                  unloaded.size(), loaded.size()));
+  std::vector<Intensities> start; // where faces press on one another places may come in another order
+  for (std::size_t k = 0; k < loaded.size(); ++k) {
+    const Vector3& x = loaded[k].frame.point;
+    const FrontState* same = &unloaded[k];
+    for (const FrontState& other : unloaded)
+      if ((other.frame.point - x).squaredNorm() < (same->frame.point - x).squaredNorm())
+        same = &other;
+    start.push_back(same->intensities);
+  }
   const auto reached = [&](double share) {
     for (std::size_t k = 0; k < loaded.size(); ++k) {
-      const Intensities& from = unloaded[k].intensities;
+      const Intensities& from = start[k];
       if (driving_release_rate(material, from + share * (loaded[k].intensities - from)) >= drive * loaded[k].toughness)
         return true;
     }

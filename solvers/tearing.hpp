@@ -43,7 +43,7 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
 std::vector<FrontState> averaged(const Material& material, const std::vector<FrontState>& states, double length);
 
 /// First share (0 to 1) of a way of loading at which G / G_c is `drive` anywhere along the front, its intensities going
-/// evenly from those of `unloaded` to those of `loaded` (the same places in the same order), the toughness being that
+/// evenly from those of `unloaded` to those of `loaded` (the same places), the toughness being that
 /// of `loaded`: exact where the body answers in proportion to the load. 1 where it does not come to that. Throws
 /// InputError unless there are as many places in both.
 double onset_share(const Material& material, const std::vector<FrontState>& unloaded,
