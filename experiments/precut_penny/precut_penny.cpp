@@ -32,8 +32,7 @@ CutBody penny_body(int nodes, std::uint64_t seed, double nu) {
   CutBodyCase cut;
   cut.domain = topology::make_box_domain(-half_size, half_size, 0.5);
   cut.sheets = {topology::make_disc_sheet(crack.origin, crack.normal, radius, 0.1)};
-  cut.slope = 0.25 * std::cbrt(2400.0 / nodes); // one field of spacings, scaled: steeper ones cost accuracy // one
-                                                // field of spacings, scaled; steeper ones cost accuracy
+  cut.slope = 0.25 * std::cbrt(2400.0 / nodes); // one field of spacings, scaled: steeper ones cost accuracy
   cut.nodes = nodes;
   cut.seed = seed;
   CutBody body = cut_body(cut);
