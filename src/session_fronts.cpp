@@ -55,7 +55,12 @@ std::vector<solvers::FrontState> Session::front_states() const {
   if (model_.incision == nullptr || model_.incision->front().empty())
     return {};
   const double fine = zone_.spacing.fine;
-  std::vector<solvers::FrontState> states = solvers::front_states(*model_.body, model_.field, toughness_, fine);
+  std::vector<Vector3> closed;
+  if (model_.state)
+    for (std::size_t p = 0; p < model_.state->lips.closed.size(); ++p)
+      if (model_.state->lips.closed[p] != 0)
+        closed.push_back(model_.sprinkling.nodes.positions[model_.pairs[p].plus]);
+  std::vector<solvers::FrontState> states = solvers::front_states(*model_.body, model_.field, toughness_, fine, closed);
   std::erase_if(states, [&](const solvers::FrontState& state) {
     return !state.intensities.allFinite() || has_met(*model_.incision, state.frame, fine);
   });
