@@ -52,10 +52,13 @@ HalfSpaceBody half_space_body(const HalfSpaceCase& half_space) {
     problem.incision = std::make_shared<topology::Incision>(half_space.cut, problem.domain);
   const Stopwatch sprinkling;
   const double guess = contact_radius * 2.2 / std::cbrt(half_space.target_nodes);
-  CountedSprinkling cloud = sprinkle_to_count(
-      *problem.domain,
-      [&](double fine) { return sprinkle_options(*problem.domain, half_space, problem.incision, fine); },
-      half_space.target_nodes, guess);
+  const auto options_for = [&](double fine) {
+    return sprinkle_options(*problem.domain, half_space, problem.incision, fine);
+  };
+  CountedSprinkling cloud =
+      half_space.fine > 0
+          ? CountedSprinkling{solvers::sprinkle(*problem.domain, options_for(half_space.fine)), half_space.fine}
+          : sprinkle_to_count(*problem.domain, options_for, half_space.target_nodes, guess);
   result.sprinkle_seconds = sprinkling.seconds();
   result.fine = cloud.fine;
   problem.nodes = std::move(cloud.sprinkling.nodes);

@@ -27,6 +27,7 @@ struct HalfSpaceCase {
   int target_nodes = 1200;
   std::uint64_t seed = 1;
   std::vector<topology::SurfaceMesh> cut{}; // sheets of a buried cut
+  double fine = 0;                          // m, spacing at the contact; 0: what target_nodes asks for
 };
 
 /// The body and its condensed patch. Seconds are processor time.
@@ -38,7 +39,8 @@ struct HalfSpaceBody {
   [[nodiscard]] int nodes() const { return body->report().nodes; }
 };
 
-/// Sprinkles to within 3 % of the wanted number of nodes where that can be had, assembles and condenses.
+/// Sprinkles with the wanted spacing, or to within 3 % of the wanted number of nodes where that can be had, assembles
+/// and condenses.
 HalfSpaceBody half_space_body(const HalfSpaceCase& half_space);
 
 /// Displacement of the surface into the body at distance r from the axis: mean, and largest deviation from `exact`,
