@@ -39,6 +39,12 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
           if (entry.components[c])
             k(3 * held[p].nodes[i] + c, 3 * held[p].nodes[j] + c) += penalty * held[p].weights[i] * held[p].weights[j];
   }
+  for (const Anchor& anchor : s.anchors) {
+    const double spring = problem.material.young_modulus * problem.nodes.spacings[anchor.node];
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b <= a; ++b)
+        k(3 * anchor.node + a, 3 * anchor.node + b) += spring * anchor.direction[a] * anchor.direction[b];
+  }
   for (Eigen::Index i = 0; i < problem.nodes.size(); ++i)
     if (s.removed[i] != 0)
       k.diagonal().segment<3>(3 * i).setOnes();

@@ -1,8 +1,8 @@
 // Problem:   a blade cuts a block of 60 x 60 x 30 mm, 15 mm deep and 32 mm long, in 20 increments. At every increment
 //            the nodes near the cut are exchanged and the others kept, the wound's surface is grown, and the system is
 //            updated in its window. The block is held at its base and pulled apart at two faces.
-// Reference: the same cut made at once: nodes sprinkled around the finished cut, the surface cut once, the system built
-//            from scratch.
+// Reference: the same cut made at once: one sweep of the blade, nodes sprinkled around it, the surface cut once, the
+//            system built from scratch.
 // Command:   spherecut experiment run reprojection --out DIR
 #include "experiments/registered.hpp"
 #include "experiments/support/statistics.hpp"
@@ -21,7 +21,7 @@ namespace {
 
 using solvers::Method;
 
-constexpr double depth = 0.0153, step = 0.0016, spacing = 0.006;
+constexpr double depth = 0.0153, first_piece = 0.0125, step = 0.0016, spacing = 0.006;
 constexpr int increments = 20;
 const Vector3 start(-0.0419, 0.0013, 0);
 const Vector3 heading = Vector3(1, 0.083, 0).normalized();
@@ -69,21 +69,40 @@ std::vector<Vector3> sample_points() {
   return points;
 }
 
+/// Euler characteristic of a closed surface, times two.
+long twice_euler(const topology::SurfaceMesh& surface) {
+  return 2 * std::ssize(surface.vertices) - std::ssize(surface.triangles);
+}
+
 struct Grown {
   solvers::NodeCloud nodes; // without the removed ones
   std::shared_ptr<const topology::Incision> incision;
-  bool same_surface = false;
+  bool same_surface = false;  // as the grown sheet gives at once, triangle by triangle
+  bool same_topology = false; // as the sheet of a single sweep gives
   int condensed_anew = 0;
   double update_error = 0; // of the coefficients against a system from scratch
   int kept = 0;            // nodes of the first cloud that are still there
 };
 
-Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, int seed, bool update) {
-  topology::BladeSweep sweep({{{0, 0, -depth}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.0016});
+topology::BladeSweep blade(const std::shared_ptr<const topology::Domain>& domain) {
+  return topology::BladeSweep({{{0, 0, -depth}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.0016});
+}
+
+/// The whole way in one sweep of the blade.
+std::shared_ptr<const topology::Incision> cut_at_once(const std::shared_ptr<const topology::Domain>& domain) {
+  topology::BladeSweep sweep = blade(domain);
+  sweep.move_to({1, start});
+  sweep.move_to({2, start + (first_piece + increments * step) * heading});
+  return sweep.incision();
+}
+
+Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, const topology::Incision& at_once, int seed,
+               bool update) {
+  topology::BladeSweep sweep = blade(domain);
   double time = 0;
   const auto move_to = [&](double travelled) { sweep.move_to({time += 1, start + travelled * heading}); };
   move_to(0);
-  move_to(0.0125); // the first piece, at the side of the block
+  move_to(first_piece); // the first piece, at the side of the block
   solvers::NodeCloud nodes = solvers::sprinkle(*domain, sprinkle_options(sweep.incision(), seed)).nodes;
   const int first_count = nodes.size();
   std::vector<bool> retired(nodes.size(), false);
@@ -98,7 +117,7 @@ Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, int seed, 
   Grown grown;
   for (int k = 1; k <= increments; ++k) {
     const auto before = sweep.incision();
-    move_to(0.0125 + k * step);
+    move_to(first_piece + k * step);
     const solvers::SprinkleIncrement change =
         solvers::extend_sprinkling(*domain, sprinkle_options(sweep.incision(), seed), nodes, before.get(), retired);
     for (int node : change.removed)
@@ -122,6 +141,10 @@ Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, int seed, 
   grown.incision = sweep.incision();
   grown.same_surface = topology::surface_hash(wound.wound().surface) ==
                        topology::surface_hash(topology::cut_surface(domain->surface(), sweep.sheets()).surface);
+  const topology::Wound single = topology::cut_surface(domain->surface(), at_once.sheets());
+  grown.same_topology = twice_euler(single.surface) == twice_euler(wound.wound().surface) &&
+                        single.components.size() == wound.wound().components.size() &&
+                        single.pieces.size() == wound.wound().pieces.size();
   return grown;
 }
 
@@ -131,6 +154,7 @@ std::vector<Check> run_reprojection(const ExperimentContext& context) {
   const int seeds = context.quick ? 1 : 10;
   const auto domain = block();
   const std::vector<Vector3> points = sample_points();
+  const auto at_once = cut_at_once(domain);
   app::Table table({"method", "seed", "nodes_grown", "nodes_at_once", "kept", "difference"});
   app::Figure figure{"A cut grown in 20 increments against the cut made at once",
                      "seed",
@@ -139,18 +163,19 @@ std::vector<Check> run_reprojection(const ExperimentContext& context) {
                      false,
                      {}};
   std::vector<std::vector<double>> differences(2);
-  bool same_surface = true;
+  bool same_surface = true, same_topology = true;
   double update_error = 0;
   for (int seed = 1; seed <= seeds; ++seed) {
-    const Grown grown = grow_cut(domain, seed, seed == 1);
+    const Grown grown = grow_cut(domain, *at_once, seed, seed == 1);
     same_surface = same_surface && grown.same_surface;
+    same_topology = same_topology && grown.same_topology;
     update_error = std::max(update_error, grown.update_error);
-    const solvers::NodeCloud direct = solvers::sprinkle(*domain, sprinkle_options(grown.incision, seed)).nodes;
+    const solvers::NodeCloud direct = solvers::sprinkle(*domain, sprinkle_options(at_once, seed)).nodes;
     for (Method method : {Method::galerkin, Method::collocation}) {
       solvers::DiscretisationOptions options;
       options.method = method;
       const auto a = solvers::discretise(pulled(domain, grown.incision, grown.nodes), options);
-      const auto b = solvers::discretise(pulled(domain, grown.incision, direct), options);
+      const auto b = solvers::discretise(pulled(domain, at_once, direct), options);
       const solvers::Field field_a = a->solve(), field_b = b->solve();
       double difference = 0, size = 0;
       for (const Vector3& x : points) {
@@ -169,11 +194,11 @@ std::vector<Check> run_reprojection(const ExperimentContext& context) {
     const std::string name(solvers::to_string(m == 0 ? Method::galerkin : Method::collocation));
     context.say(fmt::format("{}: difference of the field {:.4f} (worst seed {:.4f})", name, median(differences[m]),
                             largest(differences[m])));
-    if (m == 0) {
+    if (m == 1 && context.quick) { // the full run holds it to the bound, which it misses
+      checks.push_back({"reprojection_" + name + "_no_worse", median(differences[m]), "<=", 0.06});
+    } else {
       checks.push_back({"reprojection_" + name, median(differences[m]), "<=", 0.02});
       checks.push_back({"reprojection_" + name + "_worst_seed", largest(differences[m]), "<=", 0.04});
-    } else { // beyond the bound: told, not demanded
-      checks.push_back({"reprojection_" + name + "_reported", median(differences[m]), ">=", 0});
     }
     app::Series series{name, {}, differences[m], app::SeriesStyle::points};
     for (int seed = 1; seed <= seeds; ++seed)
@@ -181,7 +206,8 @@ std::vector<Check> run_reprojection(const ExperimentContext& context) {
     figure.series.push_back(series);
   }
   checks.push_back({"reprojection_same_surface", same_surface ? 1.0 : 0.0, ">=", 1});
-  checks.push_back({"reprojection_update_equals_scratch", update_error, "<=", 1e-9});
+  checks.push_back({"reprojection_same_topology_as_one_sweep", same_topology ? 1.0 : 0.0, ">=", 1});
+  checks.push_back({"reprojection_update_equals_scratch", update_error, "<=", 1e-10});
   table.write(context.out / "runs.csv");
   app::write_png(figure, context.out / "difference.png");
   return checks;

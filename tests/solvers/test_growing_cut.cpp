@@ -217,6 +217,18 @@ TEST_CASE("Nodes finer than the cells they come into are not followed on those c
   CHECK(worst < 1e-6 * expected.lpNorm<Eigen::Infinity>());
 }
 
+TEST_CASE("A severed piece on springs is the same in the system built from scratch", "[growing_cut]") {
+  GrowingBlock block;
+  block.append_row(0.9); // across the whole block: nothing holds the upper part
+  GrowthOptions options;
+  options.way = block.way(-0.5, 0);
+  options.contact = block.contact();
+  options.method.unheld = UnheldPieces::hold;
+  const GrowingCut cut(block.problem(), options);
+  REQUIRE(cut.report().pieces.size() == 2);
+  check_against_scratch(cut, options.contact.size());
+}
+
 TEST_CASE("A growing cut refuses what it cannot update", "[growing_cut]") {
   GrowingBlock block;
   GrowthOptions options;
