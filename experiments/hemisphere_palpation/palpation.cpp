@@ -54,6 +54,8 @@ Vector3 displacement_at(const HemispherePalpation& run, double angle, int direct
     const Vector3 u = run.body->at(x, run.field).displacement;
     return {u.dot(radial), u.dot(around), u.z()};
   } catch (const InputError&) { // no sphere covers this point: the paper's local nodes know nothing of it
+    if (!run.local_nodes)
+      throw;
     return Vector3::Zero();
   }
 }
@@ -101,6 +103,7 @@ HemispherePalpation palpate_hemisphere(solvers::Method method, double poisson_ra
 
 HemispherePalpation palpate_with_pattern(double poisson_ratio, double reach) {
   HemispherePalpation run;
+  run.local_nodes = true;
   solvers::Problem problem;
   problem.domain = half_ball();
   problem.material = {1, poisson_ratio, 0};

@@ -11,7 +11,8 @@ namespace spherecut::experiments {
 struct HemispherePalpation {
   std::unique_ptr<solvers::Discretisation> body;
   solvers::Field field;
-  double force = 0; // N, push of the cap on the body
+  double force = 0;         // N, push of the cap on the body
+  bool local_nodes = false; // the nodes fill a neighbourhood of the tip alone, not the body
   double sprinkle_seconds = 0, build_seconds = 0, solve_seconds = 0;
   [[nodiscard]] int nodes() const { return body->report().nodes; }
 };
@@ -23,7 +24,7 @@ HemispherePalpation palpate_hemisphere(solvers::Method method, double poisson_ra
 HemispherePalpation palpate_with_pattern(double poisson_ratio, double reach);
 
 /// Displacement error of the surface at one angle from the pole (rad), the largest of several directions, m. A point
-/// that no sphere covers does not move.
+/// that no sphere covers does not move where the nodes are local; elsewhere it throws InputError.
 double surface_error(const HemispherePalpation& run, const HemisphereReference& reference, double angle);
 
 /// Mean displacement (radial, axial) of the surface at one angle, m.

@@ -1,4 +1,5 @@
 #include "experiments/analytic/half_space.hpp"
+#include "experiments/hemisphere_palpation/palpation.hpp"
 #include "experiments/hemisphere_palpation/reference.hpp"
 #include "experiments/reference/axisymmetric.hpp"
 
@@ -185,4 +186,14 @@ TEST_CASE("GetFEM's bricks and the axisymmetric elements agree on the hemisphere
     CHECK(bricks.displacement(0.2) == Vector2(0, -1));
   }
   CHECK_THROWS_WITH(load_hemisphere_reference(0.2), Catch::Contains("0.3, 0.45"));
+}
+
+TEST_CASE(
+    "A surface that no sphere covers stands still for the paper's local nodes and is an error for a whole organ") {
+  HemispherePalpation run = palpate_with_pattern(0.3, 0.3);
+  const double far = 0.5 * pi - 0.01;
+  CHECK(surface_displacement(run, far).norm() == 0);
+  CHECK(surface_displacement(run, 0.01).norm() > 0.1);
+  run.local_nodes = false;
+  CHECK_THROWS_AS(surface_displacement(run, far), InputError);
 }
