@@ -119,6 +119,11 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   result.softened = softened_;
   const double gain = softened_ * limits.gain;
   std::optional<double> stored = result.model.stored;
+  const double work = -result.tissue.dot(device.position - position_);
+  paid_ = result.model.found ? std::clamp(paid_ + work, 0.0, stored.value_or(0)) : 0;
+  position_ = device.position;
+  if (result.model.found)
+    stored = paid_;
   if (stored)
     *stored *= gain;
   Vector3 force = passivity_.control(device.position, gain * result.tissue, stored);

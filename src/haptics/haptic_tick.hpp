@@ -29,8 +29,9 @@ struct TickResult {
 /// tick(state); any other is tick(state). From arrive() on the snapshot before may go.
 ///
 /// At a new snapshot the force goes on from where the old one would have had it, by its last two ticks: the difference
-/// is added and fades linearly within HapticSettings::hand_over. When the contact leaves the candidates, the patch is
-/// taken along with the tool: the model is asked as if the tool were still at their rim. Of a grasper the force is
+/// is added and fades linearly within HapticSettings::hand_over. Energy behind a blade counts as stored once the hand
+/// has put it in: a solve that finds more of it is no reason to damp. When the contact leaves the candidates, the patch
+/// is taken along with the tool: the model is asked as if the tool were still at their rim. Of a grasper the force is
 /// that of the last solve; just after the hand has changed what it holds there is none. A device that does not
 /// answer brings the force to zero at the slew limit.
 class HapticTick {
@@ -63,6 +64,8 @@ class HapticTick {
   Vector3 last_model_ = Vector3::Zero(), model_before_ = Vector3::Zero(); // N, of the last two ticks
   Vector3 difference_ = Vector3::Zero();                                  // N, still to fade
   Vector3 fading_ = Vector3::Zero();                                      // N, per tick
+  double paid_ = 0;                    // J, of what is stored behind a force that solves find: put in by the hand
+  Vector3 position_ = Vector3::Zero(); // m, of the last tick
   double softened_ = 1;
   Vector3 sent_ = Vector3::Zero();
 };

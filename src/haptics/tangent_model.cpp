@@ -105,9 +105,9 @@ bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
   return false;
 }
 
-ModelForce TangentModel::at(const topology::ToolPose& pose, double /*time*/) noexcept {
+ModelForce TangentModel::at(const topology::ToolPose& pose, double time) noexcept {
   if (blade_.pressing())
-    return blade_.at(pose.point);
+    return blade_.at(pose.point, time);
   if (snapshot_ == nullptr || snapshot_->count == 0)
     return {.stored = 0.0};
   return snapshot_->condition == solvers::ContactCondition::bonded ? follow(pose) : press(pose);
