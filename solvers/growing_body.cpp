@@ -61,6 +61,15 @@ GrowingBody::GrowingBody(Problem problem, GrowthOptions options)
     report_.pieces = pieces_of(problem_);
 }
 
+GrowingBody::GrowingBody(const GrowingBody& other)
+    : Discretisation(other), problem_(other.problem_), report_(other.report_),
+      cut_(std::make_unique<GrowingCut>(*other.cut_)), id_(other.id_), compact_(other.compact_),
+      supports_(other.supports_) {}
+
+std::unique_ptr<GrowingBody> GrowingBody::copy() const {
+  return std::unique_ptr<GrowingBody>(new GrowingBody(*this));
+}
+
 void GrowingBody::number_nodes() {
   id_.clear();
   compact_.clear();
@@ -75,7 +84,7 @@ void GrowingBody::number_nodes() {
 }
 
 BodyGrowth GrowingBody::grow(const SprinkleIncrement& change, Problem grown,
-                             const std::function<topology::SurfaceMesh()>& way_ahead) {
+                             const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) {
   const int count = problem_.nodes.size();
   for (const int node : change.removed)
     if (node < 0 || node >= count)
@@ -105,7 +114,11 @@ BodyGrowth GrowingBody::grow(const SprinkleIncrement& change, Problem grown,
   for (Prescribed& entry : *by_id.prescribed)
     entry.node = id[entry.node];
   by_id.loads = grown.loads;
-  BodyGrowth growth{"", cut_->grow(by_id, grown.incision, way_ahead)};
+  BodyGrowth growth{"", cut_->grow(by_id, grown.incision, way_ahead, only_update)};
+  if (growth.update.declined) {
+    growth.uncovered = growth.update.reason;
+    return growth;
+  }
   problem_ = std::move(grown);
   number_nodes();
   report_.nodes = problem_.nodes.size();

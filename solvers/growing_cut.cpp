@@ -282,6 +282,10 @@ GrowingCut::GrowingCut(Problem problem, GrowthOptions options)
 
 GrowingCut::~GrowingCut() = default;
 
+GrowingCut::GrowingCut(const GrowingCut& other) : state_(std::make_unique<State>(*other.state_)) {
+  state_->window = std::make_shared<SchurWindow>(*state_->window);
+}
+
 GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
   const Stopwatch watch;
   auto fresh = std::make_unique<State>(state_->problem, state_->options);
@@ -298,7 +302,7 @@ GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
 }
 
 GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
-                              const std::function<topology::SurfaceMesh()>& way_ahead) {
+                              const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) {
   const Stopwatch total;
   GrowthReport report;
   State& s = *state_;
@@ -309,6 +313,11 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
       throw InputError(fmt::format("node {} cannot be removed: it is not there", node));
 
   const auto anew = [&](const char* reason, Problem problem, std::vector<char> removed, bool is_overwritten = false) {
+    report.reason = reason;
+    if (only_update && !is_overwritten) {
+      report.declined = true;
+      return report;
+    }
     auto fresh = std::make_unique<State>(std::move(problem), s.options);
     fresh->removed = std::move(removed);
     if (way_ahead && !is_overwritten) // it may look at the body as it was
@@ -317,7 +326,6 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     fresh->condense_all();
     state_ = std::move(fresh);
     report.condensed_anew = true;
-    report.reason = reason;
     report.window_nodes = state_->window->slots() / 3 - state_->options.room;
     report.total_seconds = total.seconds();
     return report;

@@ -39,7 +39,8 @@ double window_share(const Problem& problem, const DiscretisationOptions& method,
 /// What one increment took. Seconds are wall clock.
 struct GrowthReport {
   bool condensed_anew = false;
-  const char* reason = ""; // why it had to be
+  bool declined = false;   // it was to be an update alone and cannot be one; all is as it was
+  const char* reason = ""; // why it had to be, or cannot
   int boxes = 0;           // background boxes exchanged
   int window_nodes = 0;    // nodes in the dense system
   bool prepared = false;   // what prepare() had eliminated ahead could stay
@@ -53,15 +54,18 @@ class GrowingCut {
   /// is empty, else as discretise() does.
   GrowingCut(Problem problem, GrowthOptions options);
   ~GrowingCut();
-  GrowingCut(const GrowingCut&) = delete;
+  /// The system as it stands, to grow on its own; what lies outside the window is shared, so that both are for the same
+  /// thread.
+  GrowingCut(const GrowingCut& other);
   GrowingCut& operator=(const GrowingCut&) = delete;
 
   /// The cut becomes `incision`, whose sheets continue those before it triangle by triangle (as topology::BladeSweep
   /// appends them), and the nodes change with it. Whatever the window does not cover is condensed anew and said. Throws
   /// as the constructor when the new body cannot be solved; the state is then the one before. `way_ahead` is asked for
-  /// the predicted way when the window has to be condensed anew; null: it stays what it was.
+  /// the predicted way when the window has to be condensed anew; null: it stays what it was. With `only_update` it is
+  /// declined instead where the window is seen not to cover it.
   GrowthReport grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
-                    const std::function<topology::SurfaceMesh()>& way_ahead = {});
+                    const std::function<topology::SurfaceMesh()>& way_ahead = {}, bool only_update = false);
 
   /// Work ahead of the next increment, whose new faces are expected along `next`: eliminates the part of the window
   /// that it will not touch. Returns the seconds it took (those of the background, not of the increment). A wrong guess

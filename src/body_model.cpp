@@ -12,7 +12,6 @@ namespace {
 constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
 constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
 constexpr double largest_share = 0.8;  // of the nodes in a window that is worth its while
-constexpr int room = 150;              // nodes that increments may add before the window is condensed anew
 constexpr double rim = 1e-2; // of its spacing: a lip node so near to the surface stands on the rim of its wound
 
 bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& nodes, int node) {
@@ -26,6 +25,14 @@ bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& n
     return true;
   }
   return true;
+}
+
+solvers::DiscretisationOptions method_of(const Scenario& scenario) {
+  solvers::DiscretisationOptions options = scenario.method;
+  options.unheld = scenario.cut.unheld;
+  if (scenario.cut.sight)
+    options.sight = *scenario.cut.sight;
+  return options;
 }
 
 solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
@@ -129,22 +136,36 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
 
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
               const topology::SurfaceMesh& way_ahead, const std::vector<int>& candidates) {
-  solvers::DiscretisationOptions options = scenario.method;
-  options.unheld = scenario.cut.unheld;
-  if (scenario.cut.sight)
-    options.sight = *scenario.cut.sight;
+  const solvers::DiscretisationOptions options = method_of(scenario);
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
   solvers::Problem problem = problem_of(scenario, domain, model);
   model.not_following = way_ahead.triangles.empty() ? "the body was built without a cut ahead"
                         : solvers::window_share(problem, options, way_ahead) > largest_share
                             ? "the cut concerns most of the body"
                             : "";
-  if (model.not_following[0] != '\0')
+  model.window_way = {};
+  model.added_nodes = 0;
+  if (model.not_following[0] != '\0') {
     model.body = solvers::discretise(std::move(problem), options);
-  else
-    model.body = std::make_unique<solvers::GrowingBody>(
-        std::move(problem),
-        solvers::GrowthOptions{.method = options, .way = way_ahead, .contact = candidates, .room = room});
+    return;
+  }
+  model.body = std::make_unique<solvers::GrowingBody>(
+      std::move(problem),
+      solvers::GrowthOptions{.method = options, .way = way_ahead, .contact = candidates, .room = growth_room});
+  model.window_way = way_ahead;
+}
+
+bool can_follow(const Scenario& scenario, const BodyModel& model, const topology::SurfaceMesh& way_ahead) {
+  return solvers::window_share(model.body->problem(), method_of(scenario), way_ahead) <= largest_share;
+}
+
+std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyModel& model,
+                                         const topology::SurfaceMesh& way_ahead, std::unique_ptr<Recondensing> after) {
+  return std::make_unique<Recondensing>(
+      model.body->problem(),
+      solvers::GrowthOptions{
+          .method = method_of(scenario), .way = way_ahead, .contact = model.patch.nodes, .room = growth_room},
+      model.patch.nodes, std::move(after));
 }
 
 std::string hindrance_to_growth(const Scenario& scenario, bool severed) {
@@ -188,14 +209,23 @@ solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const 
 solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                                const solvers::SprinkleIncrement& change,
                                const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
-                               BodyModel& after) {
+                               BodyModel& after, bool only_update) {
   auto* body = dynamic_cast<solvers::GrowingBody*>(before.body.get());
   if (body == nullptr)
     return {before.body == nullptr ? "the first cut" : before.not_following, {}};
-  solvers::BodyGrowth growth = body->grow(change, problem_of(scenario, domain, after), way_ahead);
+  topology::SurfaceMesh way = before.window_way;
+  const auto new_way = [&] {
+    topology::SurfaceMesh ahead = way_ahead();
+    if (!ahead.triangles.empty())
+      way = ahead;
+    return ahead;
+  };
+  solvers::BodyGrowth growth = body->grow(change, problem_of(scenario, domain, after), new_way, only_update);
   if (growth.uncovered[0] != '\0')
     return growth;
   after.pairs = solvers::lip_pairs(after.sprinkling.nodes);
+  after.window_way = std::move(way);
+  after.added_nodes = growth.update.condensed_anew ? 0 : before.added_nodes + change.added.size();
   after.body = std::move(before.body);
   return growth;
 }

@@ -4,6 +4,7 @@
 
 #include "solvers/growing_body.hpp"
 #include "solvers/lip_contact.hpp"
+#include "src/recondensing.hpp"
 #include "src/scenario.hpp"
 
 namespace spherecut::app {
@@ -20,6 +21,8 @@ struct BodyModel {
   std::vector<solvers::LipPair> pairs;
   std::unique_ptr<solvers::Discretisation> body; // null before the first load, touch or cut
   const char* not_following = "";                // why the body cannot follow a cut; empty: it can
+  topology::SurfaceMesh window_way;              // of the cut, for which a body that follows it was condensed
+  int added_nodes = 0;                           // by updates since then
   solvers::Field base;                           // without tool and contact
   solvers::ContactPatch patch;                   // no nodes: the tool is far
   std::optional<solvers::LipPatch> lips;         // empty: no pair has had to be held yet
@@ -49,6 +52,17 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
               const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
 
+/// Nodes that updates may add before a body is condensed anew.
+inline constexpr int growth_room = 150;
+
+/// Whether the window of a body that follows its cut along that way is worth its while.
+bool can_follow(const Scenario& scenario, const BodyModel& model, const topology::SurfaceMesh& way_ahead);
+
+/// Begins to condense the model's body anew on a thread of its own, as assemble() would for that way ahead. `after`: as
+/// Recondensing.
+std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyModel& model,
+                                         const topology::SurfaceMesh& way_ahead, std::unique_ptr<Recondensing> after);
+
 /// Why no body of this scenario can follow its cut; empty: one can.
 std::string hindrance_to_growth(const Scenario& scenario, bool severed);
 
@@ -58,12 +72,12 @@ solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const 
                                           const BodyModel& before, solvers::Sprinkling& after);
 
 /// The body of `before` follows the cut to the nodes and incision of `after` and goes over to it; only what the cut
-/// touched is computed. Where it cannot, both models stay as they are and the growth says why. Throws as
-/// solvers::GrowingBody::grow does, and all stays as it was.
+/// touched is computed. Where it cannot (with `only_update`: not by an update alone), both models stay as they are and
+/// the growth says why. Throws as solvers::GrowingBody::grow does, and all stays as it was.
 solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                                const solvers::SprinkleIncrement& change,
                                const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
-                               BodyModel& after);
+                               BodyModel& after, bool only_update = false);
 
 /// Condenses the model onto tool candidates; none: the tool is far. Forgets the state.
 void condense(const std::vector<int>& candidates, BodyModel& model);

@@ -24,6 +24,8 @@ std::string_view to_string(SystemUpdate update) {
     return "";
   case SystemUpdate::updated:
     return "updated";
+  case SystemUpdate::taken_over:
+    return "taken over";
   case SystemUpdate::condensed_anew:
     return "condensed anew";
   case SystemUpdate::rebuilt:

@@ -193,6 +193,8 @@ void IncisionBuilder::take_back() {
 topology::SurfaceMesh IncisionBuilder::way_through(const std::vector<topology::BladePose>& poses,
                                                    const topology::RestMap& to_rest) const {
   topology::SurfaceMesh way;
+  if (!sweep_)
+    return way;
   topology::BladeSweep ahead = *sweep_;
   try {
     for (const topology::BladePose& pose : poses)

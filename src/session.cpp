@@ -121,6 +121,7 @@ StepResult Session::step(const StepSample& sample) {
     without_blade_.reset();
   }
   const bool released = handle_grasper(sample);
+  const std::optional<topology::BladePose> last_blade = last_blade_;
   const bool solved = incisions_ != nullptr && blade_force_ == nullptr && move_blade(sample, *result.cut);
   if (sample.blade)
     last_blade_ = sample.blade;
@@ -144,6 +145,8 @@ StepResult Session::step(const StepSample& sample) {
       loading.cut_surface = press_blade(sample, *result.cut);
     if (tears())
       tear(sample, loading, result);
+    if (recondensing_on_ && sample.blade)
+      watch_window(sample, last_blade, result);
     evaluate(result);
   }
   if (result.cut)
@@ -264,6 +267,7 @@ void Session::build(BodyModel& model) {
 
 void Session::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near) {
   const StageTimer timer(profile_.discretise);
+  drop_recondensing();
   app::assemble(scenario_, organ_.domain, model, way_ahead, near);
   const solvers::SprinkleReport& report = model.sprinkling.report;
   say_(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",

@@ -42,6 +42,9 @@ struct SessionProfile {
   double organ = 0, sprinkle = 0, discretise = 0, condense = 0, press = 0, evaluate = 0, topology = 0, level_sets = 0;
 };
 
+/// Fine spacings ahead of the blade for which a body is condensed: in the step that needs it.
+inline constexpr double way_spacings = 3;
+
 class Session {
  public:
   /// Builds and checks organ, motion, precuts and fixed regions; sprinkles when something touches or cuts the organ.
@@ -94,6 +97,18 @@ class Session {
   /// by.
   void set_updating(bool on) { updating_ = on; }
 
+  /// On: a body that follows its cut by updates is condensed anew beside them, on a thread of its own, when its window
+  /// runs out or it has drifted, and so is one that a blade comes near to for the first time. It takes over where an
+  /// update needs it, which waits for it, or at swap_body(). Cuts then give their residual. When it begins, and what
+  /// it becomes, depends on the steps alone.
+  void set_recondensing(bool on);
+  /// Whether such a body is under way; and whether it is there and has followed all that was cut meanwhile.
+  [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr; }
+  [[nodiscard]] bool recondensed() const { return recondensing_ != nullptr && recondensing_->ready(); }
+  /// Takes it over, after waiting for it where need be; the next step solves with it. False: there is none, or it could
+  /// not follow.
+  bool swap_body();
+
   /// Spacings `factor` times the scenario's from the next sprinkling on. Throws InputError unless it is positive.
   void coarsen(double factor);
 
@@ -135,8 +150,17 @@ class Session {
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
   bool move_blade(const StepSample& sample, CutReport& report);
   bool cut(const StepSample& sample, CutReport& report);
-  void build_cut(const StepSample& sample, const topology::RestMap& to_rest, BodyModel& next, CutReport& report);
-  [[nodiscard]] std::vector<topology::BladePose> blade_ahead(const StepSample& sample) const;
+  void build_cut(const StepSample& sample, const topology::RestMap& to_rest, bool keep, BodyModel& next,
+                 CutReport& report);
+  [[nodiscard]] std::vector<topology::BladePose>
+  blade_ahead(const StepSample& sample, const std::optional<topology::BladePose>& last, double length) const;
+  [[nodiscard]] solvers::BodyGrowth follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, bool keep,
+                                               BodyModel& next, CutReport& report);
+  void watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last, StepResult& result);
+  [[nodiscard]] double way_into_body(const StepSample& sample) const;
+  bool take_recondensed(BodyModel& into, solvers::ContactPatch& patch);
+  void lead_recondensing(const StepSample& sample, const topology::RestMap& to_rest);
+  void drop_recondensing();
   [[nodiscard]] Vector3 rest_position(const Vector3& x) const { return rest_position(x, model_); }
   [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
   void make_blade_force();
@@ -222,6 +246,11 @@ class Session {
   bool tear_gradually_ = false;
   bool force_only_ = false;
   bool updating_ = true;
+  bool recondensing_on_ = false;
+  std::unique_ptr<Recondensing> recondensing_, given_up_; // null: none
+  topology::SurfaceMesh recondensing_way_;                // for which it is condensed
+  std::optional<solvers::SprinkleIncrement> followed_;    // by the body of the last cut
+  std::optional<solvers::SprinkleIncrement> proposed_;    // by that of the blade's proposal
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;
 };

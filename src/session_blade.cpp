@@ -79,6 +79,7 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
       if (std::optional<BodyModel> next = propose_cut(poses, sample, report)) {
         triangles += report.triangles;
         const double drawn = drawn_open(model_, *next->incision);
+        proposed_ = std::move(followed_);
         blade_force_->propose(std::move(*next), poses.size(), drawn);
       } else if (!blade_force_->proposed()) {
         mark_.reset();
@@ -91,6 +92,8 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
       break;
     surface += blade_force_->proposed_surface();
     model_ = blade_force_->take();
+    followed_ = std::move(proposed_);
+    lead_recondensing(sample, to_rest);
     mark_.reset();
     shown_wound_.reset();
   }
@@ -120,7 +123,6 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
     }
     BodyModel next;
     next.incision = incisions_->incision();
-    next.coarseness = coarseness_;
     require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
     check_pieces(sample.time);
     if (hand_led_)
@@ -129,18 +131,9 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();
     }
-    {
-      const StageTimer timer(report.seconds.sprinkling);
-      sprinkle(&model_.sprinkling.nodes, next);
-    }
-    {
-      const StageTimer timer(report.seconds.assembly);
-      build(next);
-    }
+    build_cut(sample, to_rest, true, next, report);
     const StageTimer timer(report.seconds.solve);
     solve(sample, next);
-    report.update = SystemUpdate::rebuilt;
-    report.update_reason = "the blade is resisted";
     const std::vector<int>& from = next.sprinkling.kept_from;
     report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
     return next;

@@ -14,7 +14,6 @@ namespace {
 constexpr double rest_tolerance = 1e-4;   // of the fine spacing: of a place carried back to rest
 constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a little, as ahead of a front
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
-constexpr double way_spacings = 3;        // fine spacings: so far ahead of the blade a cut is prepared for
 constexpr double same_place = 1e-6;       // of the fine spacing: nearer to its path a blade is on it
 
 /// Farthest way of a point of the edge between two poses, m.
@@ -51,9 +50,10 @@ Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
   return x;
 }
 
-// Poses on the next way of the blade, about way_spacings long: those of its path, or straight on where something else
+// Poses on the next way of the blade, of about this length, m: those of its path, or straight on where something else
 // leads it.
-std::vector<topology::BladePose> Session::blade_ahead(const StepSample& sample) const {
+std::vector<topology::BladePose>
+Session::blade_ahead(const StepSample& sample, const std::optional<topology::BladePose>& last, double length) const {
   const std::vector<Vector3>& edge = scenario_.blade->edge;
   const double fine = zone_.spacing.fine;
   const topology::BladePose& here = *sample.blade;
@@ -62,27 +62,31 @@ std::vector<topology::BladePose> Session::blade_ahead(const StepSample& sample) 
   if (scripted && travel(edge, *scripted, here) < same_place * fine) {
     double way = 0;
     for (const StepSample& step : steps_)
-      if (step.blade && step.time > sample.time && way < way_spacings * fine) {
+      if (step.blade && step.time > sample.time && way < length) {
         way += travel(edge, poses.empty() ? here : poses.back(), *step.blade);
         poses.push_back(*step.blade);
       }
-  } else if (last_blade_) {
-    const Vector3 motion = here.position - last_blade_->position;
-    for (int k = 1; k <= static_cast<int>(way_spacings) && motion.norm() > 0; ++k)
+  } else if (last) {
+    const Vector3 motion = here.position - last->position;
+    for (int k = 1; k <= static_cast<int>(std::lround(length / fine)) && motion.norm() > 0; ++k)
       poses.push_back({here.time + k, here.position + k * fine * motion.normalized(), here.orientation});
   }
   return poses;
 }
 
-// Nodes and system of the body with the new cut: of what was there, what the cut did not touch stays.
-void Session::build_cut(const StepSample& sample, const topology::RestMap& to_rest, BodyModel& next,
+// Nodes and system of the body with the new cut: of what was there, what the cut did not touch stays. `keep`: the body
+// as it is stays beside it.
+void Session::build_cut(const StepSample& sample, const topology::RestMap& to_rest, bool keep, BodyModel& next,
                         CutReport& report) {
-  const auto way_ahead = [&] { return incisions_->way_through(blade_ahead(sample), to_rest); };
+  const auto way_ahead = [&] {
+    return incisions_->way_through(blade_ahead(sample, last_blade_, way_spacings * zone_.spacing.fine), to_rest);
+  };
   const std::string hindrance =
       model_.coarseness != coarseness_
           ? "the spacing has changed"
           : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
-  std::optional<solvers::SprinkleIncrement> change;
+  std::optional<solvers::SprinkleIncrement>& change = followed_;
+  change.reset();
   report.update = SystemUpdate::rebuilt;
   report.update_reason = hindrance;
   {
@@ -104,12 +108,8 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
     const StageTimer timer(report.seconds.assembly);
     if (change && updating_) {
       const StageTimer growth_timer(profile_.discretise);
-      const solvers::BodyGrowth growth = follow_cut(scenario_, organ_.domain, *change, way_ahead, model_, next);
-      report.update_reason = growth.uncovered;
-      if (next.body != nullptr) {
-        report.update = growth.update.condensed_anew ? SystemUpdate::condensed_anew : SystemUpdate::updated;
-        report.update_reason = growth.update.reason;
-      }
+      const solvers::BodyGrowth growth = follow_cut(way_ahead, keep, next, report);
+      report.update_reason = next.body == nullptr ? growth.uncovered : growth.update.reason;
     }
     if (next.body == nullptr)
       assemble(next, change && updating_ ? way_ahead() : topology::SurfaceMesh{}, near);
@@ -167,7 +167,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
   if (model_.state)
     to_rest = [this](const Vector3& x) { return rest_position(x); };
   topology::SweepResult swept;
-  const bool had_body = model_.body != nullptr;
+  const solvers::Discretisation* const body = model_.body.get();
   const auto refuse = [&](const char* why) {
     report.triangles = 0;
     report.refused = true;
@@ -207,7 +207,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();
     }
-    build_cut(sample, to_rest, next, report);
+    build_cut(sample, to_rest, false, next, report);
     {
       const StageTimer timer(report.seconds.solve);
       solve(sample, next);
@@ -217,6 +217,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     profile_.topology += report.seconds.topology;
     profile_.level_sets += report.seconds.level_sets;
     model_ = std::move(next);
+    lead_recondensing(sample, to_rest);
     return true;
   } catch (const InputError& error) {
     refuse(error.what());
@@ -224,8 +225,12 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     refuse(error.what());
   }
   incisions_->take_back();
-  if (had_body && model_.body == nullptr) // it had followed the cut before that was refused
+  if (body != nullptr && model_.body == nullptr) { // it had followed the cut before that was refused
+    drop_recondensing();
     app::assemble(scenario_, organ_.domain, model_);
+  } else if (model_.body.get() != body) { // another took over before that
+    condense(std::vector<int>(model_.patch.nodes), model_);
+  }
   return false;
 }
 

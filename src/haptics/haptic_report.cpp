@@ -53,15 +53,17 @@ void write_solves(const std::filesystem::path& file, const std::vector<SolveReco
   OutputFile out(file);
   std::string text = "sequence,pose_tick,arrival_tick,degradation,failed,resprinkled,cut_triangles,nodes,candidates,"
                      "active,asymmetry,force_N,cut_area_m2,blade_N,edge_N,release_J_m2,edge_pieces,work_J,surface_J,"
-                     "seconds\n";
+                     "update,residual,swapped,seconds\n";
   for (const SolveRecord& solve : solves)
     text += fmt::format(
-        "{},{},{},{},{:d},{:d},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{:.6g}\n",
+        "{},{},{},{},{:d},{:d},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{},{:.2g},{:d},{:"
+        ".6g}\n",
         solve.event.sequence, solve.event.pose_tick,
         solve.event.arrival_tick == SolveEvent::never ? "" : fmt::format("{}", solve.event.arrival_tick),
         solve.event.degradation, solve.failed, solve.resprinkled, solve.cut_triangles, solve.nodes, solve.candidates,
         solve.active, solve.asymmetry, solve.force.norm(), solve.cut_area, solve.blade_force.norm(), solve.blade_edge,
-        solve.blade_release, solve.blade_contacts, solve.blade_work, solve.blade_surface, solve.seconds);
+        solve.blade_release, solve.blade_contacts, solve.blade_work, solve.blade_surface, solve.update, solve.residual,
+        solve.event.swaps, solve.seconds);
   out.write(text);
   out.close();
 }
@@ -157,6 +159,7 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
   for (const SolveRecord& record : records.solves) {
     findings.failed += record.failed ? 1 : 0;
     findings.resprinkled += record.resprinkled ? 1 : 0;
+    findings.swaps += record.event.swaps ? 1 : 0;
     findings.increments += record.cut_triangles > 0 ? 1 : 0;
     findings.blade_peak = std::max(findings.blade_peak, record.blade_force.norm());
     if (!record.failed) {
@@ -231,6 +234,7 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
       {"failed_solves", f.failed},
       {"cut_increments", f.increments},
       {"resprinkles", f.resprinkled},
+      {"background_swaps", f.swaps},
       {"highest_degradation", f.highest_degradation},
       {"peak_force_N", f.peak},
       {"largest_step_N",

@@ -40,7 +40,7 @@ struct HapticFindings {
   ModelError error;
   double peak = 0;                      // N, on the hand
   double energy = 0, lowest_energy = 0; // J, at the port
-  std::uint64_t failed = 0, resprinkled = 0, increments = 0, outside = 0, unconverged = 0, limited = 0;
+  std::uint64_t failed = 0, resprinkled = 0, swaps = 0, increments = 0, outside = 0, unconverged = 0, limited = 0;
   std::uint64_t softened = 0;               // ticks
   double blade_peak = 0;                    // N, of the solves
   double blade_work = 0, blade_surface = 0; // J

@@ -30,6 +30,7 @@ struct SolveEvent {
   std::uint64_t pose_tick = 0;
   std::uint64_t arrival_tick = never; // tick that first used it; never: overtaken by a newer one, failed, or too late
   int degradation = 0;
+  bool swaps = false; // it takes over the body that has been condensed anew in the background
 };
 
 /// One solve, and what it did.
@@ -45,7 +46,9 @@ struct SolveRecord {
   double blade_edge = 0, blade_release = 0; // N, of its edge alone; J/m2, of that on the front
   double blade_work = 0, blade_surface = 0; // J since the start: all, and on new surface
   int blade_contacts = 0;                   // pieces of the edge that press
+  double residual = 0;                      // of a body that has followed its cut by an update
   double cut_area = 0;                      // m2
+  std::string_view update;                  // how the system came to the cut of this solve; empty: nothing was cut
   Vector3 force = Vector3::Zero();          // N, of the solve
   double seconds = 0;                       // wall clock
 };

@@ -117,7 +117,7 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
       continue;
     }
     solved = state;
-    const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level()};
+    const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level(), simulation.recondensed()};
     ContactSnapshot& snapshot = shared.snapshots.back();
     const long long began = clock_now(CLOCK_MONOTONIC);
     const SolveRecord record = solve_recording(simulation, state, event, snapshot);

@@ -56,6 +56,7 @@ HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const s
     : session_(std::move(scenario), std::move(say)) {
   session_.set_force_only(true);
   session_.set_tear_gradually(true);
+  session_.set_recondensing(true);
   static_cast<void>(path());
   parked_ = parked_tool();
 }
@@ -164,6 +165,8 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     return record;
   };
   try {
+    if (event.swaps)
+      simulation.swap_body();
     simulation.solve(device, event.degradation, snapshot);
   } catch (const NumericalError& error) {
     return failed(error);
@@ -174,6 +177,8 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
   SolveRecord record = record_of(event, snapshot);
   if (const auto& cut = simulation.result().cut) {
     record.cut_area = cut->area;
+    record.residual = simulation.result().residual;
+    record.update = to_string(cut->update);
     record.blade_force = cut->blade.force;
     record.blade_edge = cut->blade.edge_force;
     record.blade_release = cut->blade.release;

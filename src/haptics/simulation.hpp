@@ -41,6 +41,11 @@ class HapticSimulation {
   /// NumericalError or InputError as Session::step; the snapshot is then as before.
   void solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot);
 
+  /// Whether a body that has been condensed anew in the background waits to be taken over; and takes it over, after
+  /// waiting for it where need be (Session::set_recondensing).
+  [[nodiscard]] bool recondensed() const { return session_.recondensed(); }
+  void swap_body() { session_.swap_body(); }
+
   /// Result of the last solve.
   [[nodiscard]] const StepResult& result() const { return result_; }
   [[nodiscard]] const Session& session() const { return session_; }

@@ -1,0 +1,45 @@
+// A body condensed anew on a thread of its own, while the one it will replace goes on following its cut by updates.
+#pragma once
+
+#include "solvers/contact_solver.hpp"
+#include "solvers/growing_body.hpp"
+
+#include <memory>
+
+namespace spherecut::app {
+
+/// The new body, and it condensed onto the tool's candidates.
+struct Recondensed {
+  std::unique_ptr<solvers::GrowingBody> body; // null: it could not be made, or could not follow
+  solvers::ContactPatch patch;                // without candidates only its base is there
+};
+
+/// What the new body becomes does not depend on when: it is assembled from what it was begun with, and then follows the
+/// same increments in the same order. So a session that takes it over at the same step has the same bits.
+class Recondensing {
+ public:
+  /// Begins to assemble and condense, once `after` (given up; null: none) has come to its end: so one of them computes
+  /// at a time. `candidates`: of the tool, nodes of the problem.
+  Recondensing(solvers::Problem problem, solvers::GrowthOptions options, std::vector<int> candidates,
+               std::unique_ptr<Recondensing> after);
+  /// Waits for what is being computed.
+  ~Recondensing();
+  Recondensing(const Recondensing&) = delete;
+  Recondensing& operator=(const Recondensing&) = delete;
+
+  /// The cut has grown since: as GrowingBody::grow, when the body is there. `candidates` are those from then on.
+  void follow(solvers::SprinkleIncrement change, solvers::Problem grown, topology::SurfaceMesh way_ahead,
+              std::vector<int> candidates);
+  /// Nobody will take it: it stops as soon as it can.
+  void give_up();
+  /// Whether nothing is left to compute.
+  [[nodiscard]] bool ready() const;
+  /// Waits until it is ready and gives what it has become, once.
+  Recondensed take();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+} // namespace spherecut::app

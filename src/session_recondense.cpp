@@ -1,0 +1,161 @@
+// Condensing a body anew beside the updates by which it follows its cut, so that no step has to do it.
+#include "src/session.hpp"
+#include "src/stage_timer.hpp"
+
+#include <algorithm>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double background_spacings = 5; // fine spacings ahead of the blade for which it is condensed beside the steps
+constexpr double drifted = 1e-8;          // residual of an updated body from which it is condensed anew
+
+/// Whether every corner of `way` is within `reach` m of one of `window`.
+bool covers(const topology::SurfaceMesh& window, const topology::SurfaceMesh& way, double reach) {
+  return std::all_of(way.vertices.begin(), way.vertices.end(), [&](const Vector3& x) {
+    return std::any_of(window.vertices.begin(), window.vertices.end(),
+                       [&](const Vector3& y) { return (x - y).squaredNorm() <= reach * reach; });
+  });
+}
+
+} // namespace
+
+void Session::set_recondensing(bool on) {
+  recondensing_on_ = on;
+  if (!on)
+    drop_recondensing();
+}
+
+// By an update alone where a replacement is on its way; where that cannot be, the replacement takes over and follows.
+// `keep`: a copy does, and the body stays as it is.
+solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, bool keep,
+                                        BodyModel& next, CutReport& report) {
+  const auto* body = dynamic_cast<const solvers::GrowingBody*>(model_.body.get());
+  const bool follows = body != nullptr;
+  BodyModel beside;
+  if (keep) {
+    beside.body = follows ? body->copy() : nullptr;
+    beside.window_way = model_.window_way;
+    beside.added_nodes = model_.added_nodes;
+  }
+  BodyModel& from = keep ? beside : model_;
+  const auto grow = [&](bool only_update) {
+    if (from.body == nullptr)
+      return solvers::BodyGrowth{model_.body == nullptr ? "the first cut" : model_.not_following, {}};
+    return app::follow_cut(scenario_, organ_.domain, *followed_, way_ahead, from, next, only_update);
+  };
+  solvers::BodyGrowth growth = grow(recondensing_ != nullptr);
+  bool taken = false;
+  if (next.body == nullptr && recondensing_ != nullptr && (growth.update.declined || !follows)) {
+    solvers::ContactPatch unused;
+    taken = take_recondensed(from, unused);
+    if (taken || follows)
+      growth = grow(false);
+  }
+  if (next.body != nullptr)
+    report.update = growth.update.condensed_anew ? SystemUpdate::condensed_anew
+                    : taken                      ? SystemUpdate::taken_over
+                                                 : SystemUpdate::updated;
+  return growth;
+}
+
+// What one that follows the blade's cut is condensed anew for: its window has not much left of what lies ahead, it is
+// running out of room, or rounding has added up. One that does not follow is made to as the blade comes near.
+void Session::watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last,
+                           StepResult& result) {
+  if (recondensing_ != nullptr || model_.coarseness != coarseness_ || !result.cut)
+    return;
+  const double fine = zone_.spacing.fine;
+  const auto to_rest = [this](const Vector3& x) { return rest_position(x); };
+  const auto way_of = [&](double length) {
+    return incisions_->way_through(blade_ahead(sample, last, length), to_rest);
+  };
+  double entry = 0; // m, from the blade to the body
+  if (dynamic_cast<const solvers::GrowingBody*>(model_.body.get()) != nullptr) {
+    if (result.cut->update == SystemUpdate::none)
+      return;
+    result.residual = residual(model_);
+    if (2 * model_.added_nodes < growth_room && result.residual < drifted &&
+        covers(model_.window_way, way_of(way_spacings * fine), fine))
+      return;
+  } else {
+    entry = way_into_body(sample);
+    if (result.cut->triangles > 0 || model_.not_following == std::string_view("the cut concerns most of the body") ||
+        entry > way_spacings * fine ||
+        !hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty())
+      return;
+  }
+  for (const double spacings : {background_spacings, way_spacings}) {
+    topology::SurfaceMesh way = way_of(entry + spacings * fine);
+    if (std::none_of(way.vertices.begin(), way.vertices.end(),
+                     [&](const Vector3& x) { return organ_.domain->signed_distance(x) < 0; }))
+      return;
+    if (!can_follow(scenario_, model_, way))
+      continue;
+    recondensing_ = recondense(scenario_, model_, way, std::move(given_up_));
+    recondensing_way_ = std::move(way);
+    return;
+  }
+}
+
+// m, from the edge to the surface at rest; 0 inside.
+double Session::way_into_body(const StepSample& sample) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Vector3& x : scenario_.blade->edge)
+    nearest = std::min(nearest, organ_.domain->signed_distance(sample.blade->orientation * x + sample.blade->position));
+  return std::max(0.0, nearest);
+}
+
+// The one under way goes with the cut that the body has just followed.
+void Session::lead_recondensing(const StepSample& sample, const topology::RestMap& to_rest) {
+  if (recondensing_ == nullptr)
+    return;
+  const double length = way_spacings * zone_.spacing.fine;
+  if (followed_)
+    recondensing_->follow(*followed_, model_.body->problem(),
+                          incisions_->way_through(blade_ahead(sample, last_blade_, length), to_rest),
+                          model_.patch.nodes);
+  else
+    drop_recondensing();
+}
+
+void Session::drop_recondensing() {
+  if (recondensing_ == nullptr)
+    return;
+  recondensing_->give_up();
+  given_up_ = std::move(recondensing_);
+}
+
+// Waits for it; false: it could not follow.
+bool Session::take_recondensed(BodyModel& into, solvers::ContactPatch& patch) {
+  Recondensed made = recondensing_->take();
+  recondensing_.reset();
+  if (made.body == nullptr)
+    return false;
+  into.body = std::move(made.body);
+  into.not_following = "";
+  into.window_way = std::move(recondensing_way_);
+  into.added_nodes = 0;
+  patch = std::move(made.patch);
+  return true;
+}
+
+bool Session::swap_body() {
+  if (recondensing_ == nullptr)
+    return false;
+  solvers::ContactPatch patch;
+  if (!take_recondensed(model_, patch))
+    return false;
+  model_.lips.reset();
+  if (patch.nodes != model_.patch.nodes) {
+    std::optional<solvers::CutContactState> state = std::move(model_.state); // of the same nodes
+    condense(std::vector<int>(model_.patch.nodes), model_);
+    model_.state = std::move(state);
+    return true;
+  }
+  model_.base = patch.base;
+  model_.patch = std::move(patch);
+  return true;
+}
+
+} // namespace spherecut::app

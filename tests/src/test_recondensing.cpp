@@ -1,0 +1,153 @@
+// A body condensed anew in the background and taken over at a definite step.
+#include "src/haptics/virtual_loop.hpp"
+#include "src/session.hpp"
+#include "tests/src/scenario_text.hpp"
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+
+namespace {
+
+// A stretched bar that is cut at one end in many small increments, so that a window does not last.
+const std::string bar =
+    replaced(replaced(replaced(replaced(cut_block, "0.06, 0.06, 0.03]", "0.24, 0.03, 0.03]"), "0.005", "0.004"),
+                      "0.012", "0.01"),
+             "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]") +
+    R"([blade]
+edge = [[0, -0.006, 0], [0, 0.006, 0.001]]
+step = 0.125
+[[blade.path]]
+time = 0
+position = [-0.042, 0.001, 0.033]
+[[blade.path]]
+time = 1
+position = [-0.043, 0.001, 0.010]
+)";
+
+Scenario scenario_of(const std::string& text) {
+  const TemporaryFolder folder;
+  return read_scenario(write_file(folder.path() / "case.toml", text));
+}
+
+std::unique_ptr<solvers::Discretisation> from_scratch(const Session& session) {
+  solvers::DiscretisationOptions method = session.scenario().method;
+  method.unheld = session.scenario().cut.unheld;
+  return solvers::discretise(session.body()->problem(), method);
+}
+
+/// Coefficients after every step; the body that is under way is taken over before every second step that could.
+std::vector<VectorX> run(Session& session, bool early, std::chrono::milliseconds pause, int& taken) {
+  std::vector<VectorX> fields;
+  int under_way = 0;
+  for (const StepSample& sample : session.steps()) {
+    under_way += session.recondensing() ? 1 : 0;
+    if (early && session.recondensing() && under_way % 2 == 0)
+      taken += session.swap_body() ? 1 : 0;
+    const StepResult result = session.step(sample);
+    CHECK_FALSE(result.cut->refused);
+    CHECK(result.residual < 1e-9);
+    taken += result.cut->update == SystemUpdate::taken_over ? 1 : 0;
+    fields.push_back(session.field().coefficients);
+    std::this_thread::sleep_for(pause);
+  }
+  return fields;
+}
+
+} // namespace
+
+TEST_CASE("A body that takes over from the background is the one built from scratch, and follows what is cut later") {
+  Session session(scenario_of(bar));
+  session.set_recondensing(true);
+  int taken = 0, followed = 0;
+  for (const StepSample& sample : session.steps()) {
+    const StepResult result = session.step(sample);
+    CHECK(result.residual < 1e-9);
+    followed += result.cut->update == SystemUpdate::updated || result.cut->update == SystemUpdate::taken_over ? 1 : 0;
+    if (!session.recondensing())
+      continue;
+    const solvers::Field before = session.body()->solve();
+    REQUIRE(session.swap_body()); // nothing has been cut since it was begun
+    ++taken;
+    CHECK_FALSE(session.recondensing());
+    CHECK_FALSE(session.swap_body());
+    const solvers::Field now = session.body()->solve(), scratch = from_scratch(session)->solve();
+    CHECK((now.coefficients - scratch.coefficients).norm() <= 1e-9 * scratch.coefficients.norm());
+    CHECK((now.coefficients - before.coefficients).norm() < 2e-3 * scratch.coefficients.norm()); // finer cells
+  }
+  CHECK(taken >= 1);
+  CHECK(followed >= 3);
+  REQUIRE(session.incision() != nullptr);
+  Session rebuilt(scenario_of(bar));
+  for (const StepSample& sample : rebuilt.steps())
+    rebuilt.step(sample);
+  CHECK(session.incision()->area() == Approx(rebuilt.incision()->area()).epsilon(2e-3));
+}
+
+TEST_CASE("A cut during condensing is repeated on the new body, and when a thread runs does not change a bit") {
+  const bool early = GENERATE(false, true);
+  int taken = 0, taken_slowly = 0;
+  Session quick(scenario_of(bar)), slow(scenario_of(bar));
+  quick.set_recondensing(true);
+  slow.set_recondensing(true);
+  const std::vector<VectorX> a = run(quick, early, std::chrono::milliseconds(0), taken);
+  const std::vector<VectorX> b = run(slow, early, std::chrono::milliseconds(60), taken_slowly);
+  CHECK(taken >= 1);
+  CHECK(taken == taken_slowly);
+  CHECK(a == b);
+  // It has followed: its nodes are those of the session, and it is near to a body built anew on them.
+  const solvers::Field now = quick.body()->solve(), scratch = from_scratch(quick)->solve();
+  CHECK(quick.body()->problem().nodes.positions == quick.sprinkling().nodes.positions);
+  CHECK((now.coefficients - scratch.coefficients).norm() < 2e-3 * scratch.coefficients.norm());
+}
+
+TEST_CASE("What is condensed in the background and given up leaves no trace, at any moment") {
+  Session plain(scenario_of(bar)), other(scenario_of(bar));
+  for (const StepSample& sample : plain.steps()) {
+    plain.step(sample);
+    other.set_recondensing(true);
+    other.step(sample);
+    other.set_recondensing(false); // in the middle of it
+    CHECK_FALSE(other.recondensing());
+  }
+  CHECK(other.field().coefficients == plain.field().coefficients);
+  Session left(scenario_of(bar));
+  left.set_recondensing(true);
+  bool begun = false;
+  for (std::size_t i = 0; i < left.steps().size() && !begun; ++i) {
+    left.step(left.steps()[i]);
+    begun = left.recondensing();
+  }
+  CHECK(begun); // and the session ends while it runs
+}
+
+TEST_CASE("In the loop a body from the background is taken over at the recorded solve, with the same bits") {
+  const Scenario scenario = scenario_of(bar);
+  HapticSettings settings;
+  const auto loop = [&](std::vector<SolveEvent> events) {
+    HapticSimulation simulation(scenario);
+    ScriptedPath device(simulation.path(), settings.rate);
+    return run_virtual(settings, simulation, device, events, 1000);
+  };
+  std::vector<SolveEvent> events = regular_solves(1000, 125, 20);
+  for (std::size_t i = 3; i < events.size(); i += 2)
+    events[i].swaps = true;
+  const LoopRecords first = loop(events), second = loop(events);
+  REQUIRE(first.solves.size() == second.solves.size());
+  int updates = 0;
+  for (std::size_t i = 0; i < first.solves.size(); ++i) {
+    CHECK_FALSE(first.solves[i].failed);
+    CHECK(first.solves[i].event.swaps == events[i].swaps);
+    CHECK(first.solves[i].topology == second.solves[i].topology);
+    CHECK(first.solves[i].residual == second.solves[i].residual);
+    CHECK(first.solves[i].update == second.solves[i].update);
+    updates += first.solves[i].update.empty() ? 0 : 1;
+  }
+  CHECK(updates >= 3);
+}
