@@ -82,9 +82,9 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
     return incisions_->way_through(blade_ahead(sample, last_blade_, way_spacings * zone_.spacing.fine), to_rest);
   };
   const std::string hindrance =
-      model_.coarseness != coarseness_
-          ? "the spacing has changed"
-          : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+      model_.coarseness != coarseness_ ? "the spacing has changed"
+      : keep && tears()                ? "the cut tears on"
+                        : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
   std::optional<solvers::SprinkleIncrement>& change = followed_;
   change.reset();
   report.update = SystemUpdate::rebuilt;

@@ -63,7 +63,7 @@ solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMes
 // running out of room, or rounding has added up. One that does not follow is made to as the blade comes near.
 void Session::watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last,
                            StepResult& result) {
-  if (recondensing_ != nullptr || model_.coarseness != coarseness_ || !result.cut)
+  if (recondensing_ != nullptr || model_.coarseness != coarseness_ || !result.cut || tears())
     return;
   const double fine = zone_.spacing.fine;
   const auto to_rest = [this](const Vector3& x) { return rest_position(x); };
