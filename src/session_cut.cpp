@@ -81,10 +81,13 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
   const auto way_ahead = [&] {
     return incisions_->way_through(blade_ahead(sample, last_blade_, way_spacings * zone_.spacing.fine), to_rest);
   };
+  const bool follows =
+      recondensing_ != nullptr || dynamic_cast<const solvers::GrowingBody*>(model_.body.get()) != nullptr;
   const std::string hindrance =
       model_.coarseness != coarseness_ ? "the spacing has changed"
-      : keep && tears()                ? "the cut tears on"
-                        : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+      : keep && (tears() || !follows)
+          ? "the blade is resisted"
+          : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
   std::optional<solvers::SprinkleIncrement>& change = followed_;
   change.reset();
   report.update = SystemUpdate::rebuilt;
