@@ -123,15 +123,7 @@ TEST_CASE("The hand feels a blade indent and cut at toughness times width, witho
   for (std::size_t i = 1; i < records.solves.size(); ++i)
     steepest = std::max(steepest, (records.solves[i].force - records.solves[i - 1].force).norm() / 10);
   const ForceSteps steps = force_steps(records);
-<<<<<<< HEAD
-<<<<<<< HEAD
   CHECK(steepest < 0.06 * peak);
-=======
-  CHECK(steepest < 0.04 * peak);
->>>>>>> e4adef2 (Condensing anew in the background, proposals of a resisted blade by update, blade's onset without a step)
-=======
-  CHECK(steepest < 0.06 * peak);
->>>>>>> 5c9f36b (Onset of a blade against the issue's own bar)
   CHECK(steps.any < 0.02 * peak + steepest); // the onset, that a solve finds, too
   double damped = 0;
   for (const TickRecord& tick : records.ticks)
