@@ -136,6 +136,7 @@ std::vector<int> cells_by_place(const BackgroundCells& cells) {
     return code;
   };
   std::vector<std::pair<std::uint64_t, int>> by_code;
+  by_code.reserve(cells.boxes.size());
   for (int b = 0; b < std::ssize(cells.boxes); ++b)
     by_code.emplace_back(code_of(cells.boxes[b].centre), b);
   std::sort(by_code.begin(), by_code.end());

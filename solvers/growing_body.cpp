@@ -61,15 +61,6 @@ GrowingBody::GrowingBody(Problem problem, GrowthOptions options)
     report_.pieces = pieces_of(problem_);
 }
 
-GrowingBody::GrowingBody(const GrowingBody& other)
-    : Discretisation(other), problem_(other.problem_), report_(other.report_),
-      cut_(std::make_unique<GrowingCut>(*other.cut_)), id_(other.id_), compact_(other.compact_),
-      supports_(other.supports_) {}
-
-std::unique_ptr<GrowingBody> GrowingBody::copy() const {
-  return std::unique_ptr<GrowingBody>(new GrowingBody(*this));
-}
-
 void GrowingBody::number_nodes() {
   id_.clear();
   compact_.clear();

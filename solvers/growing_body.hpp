@@ -19,9 +19,6 @@ class GrowingBody final : public Discretisation {
   /// InputError where a severed piece leaves the computation (UnheldPieces::drop).
   GrowingBody(Problem problem, GrowthOptions options);
 
-  /// The body as it stands, to grow on its own: a cut that may not be taken. For the same thread (growing_cut.hpp).
-  [[nodiscard]] std::unique_ptr<GrowingBody> copy() const;
-
   /// The body follows the cut to `grown`: what problem() becomes when `change` (ids as they are now, added nodes at the
   /// end) and the new incision are put in. A piece that comes free is not covered. Throws as GrowingCut::grow; the body
   /// is then as it was. With `only_update` what the window does not cover is uncovered too, and not condensed anew.
@@ -56,7 +53,6 @@ class GrowingBody final : public Discretisation {
                                 const std::vector<Vector3>& nodal_forces) const override;
 
  private:
-  GrowingBody(const GrowingBody& other);
   void number_nodes();
   /// Between coefficients of the present nodes and those of all the system knows.
   [[nodiscard]] MatrixX expanded(const MatrixX& present) const;

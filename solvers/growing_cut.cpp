@@ -282,10 +282,6 @@ GrowingCut::GrowingCut(Problem problem, GrowthOptions options)
 
 GrowingCut::~GrowingCut() = default;
 
-GrowingCut::GrowingCut(const GrowingCut& other) : state_(std::make_unique<State>(*other.state_)) {
-  state_->window = std::make_shared<SchurWindow>(*state_->window);
-}
-
 GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
   const Stopwatch watch;
   auto fresh = std::make_unique<State>(state_->problem, state_->options);

@@ -54,9 +54,7 @@ class GrowingCut {
   /// is empty, else as discretise() does.
   GrowingCut(Problem problem, GrowthOptions options);
   ~GrowingCut();
-  /// The system as it stands, to grow on its own; what lies outside the window is shared, so that both are for the same
-  /// thread.
-  GrowingCut(const GrowingCut& other);
+  GrowingCut(const GrowingCut&) = delete;
   GrowingCut& operator=(const GrowingCut&) = delete;
 
   /// The cut becomes `incision`, whose sheets continue those before it triangle by triangle (as topology::BladeSweep

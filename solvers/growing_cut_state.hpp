@@ -43,20 +43,20 @@ struct GrowingCut::State {
   GrowthOptions options;
   double rho = 2;
   std::vector<char> removed;
-  std::shared_ptr<const Spheres> spheres;
+  std::unique_ptr<Spheres> spheres;
   std::vector<Box> boxes;
   std::vector<DisplacementMean> held;
-  std::shared_ptr<SchurWindow> window; // of this state alone
-  std::vector<int> far_order;          // node of every far rank
-  std::vector<int> slot;               // block of three slots of every node in the window, -1 outside
-  std::vector<int> window_node;        // node of every block of slots, -1 for room
+  std::unique_ptr<SchurWindow> window;
+  std::vector<int> far_order;   // node of every far rank
+  std::vector<int> slot;        // block of three slots of every node in the window, -1 outside
+  std::vector<int> window_node; // node of every block of slots, -1 for room
   int next_room = 0;
-  VectorX cell_loads;                           // 3N: body force and initial strain
-  VectorX first_loads;                          // 3N at condensation, all loads
-  VectorX external;                             // 3N as they stand, without those of prescribed displacements
-  VectorX loads;                                // 3N as they stand
-  MatrixX reduced_first;                        // by slots
-  mutable std::shared_ptr<const Shares> shares; // null: not needed so far
+  VectorX cell_loads;                     // 3N: body force and initial strain
+  VectorX first_loads;                    // 3N at condensation, all loads
+  VectorX external;                       // 3N as they stand, without those of prescribed displacements
+  VectorX loads;                          // 3N as they stand
+  MatrixX reduced_first;                  // by slots
+  mutable std::unique_ptr<Shares> shares; // null: not needed so far
   mutable std::unordered_map<int, DisplacementMean> means; // by node, as they are asked for
   AssemblyReport report;                                   // of the condensation
   std::vector<Anchor> anchors;                             // by ids

@@ -16,7 +16,6 @@
 
 namespace spherecut::solvers {
 
-/// Copies share the factor of the far unknowns; they are for the same thread.
 class SchurWindow {
  public:
   /// `lower`: lower triangle of K in elimination order, its last `changing + contact` unknowns the window. `room`:
@@ -87,12 +86,12 @@ class SchurWindow {
   [[nodiscard]] MatrixX recover_from(MatrixX halfway, const MatrixX& window) const;
 
   int far_, changing_, room_, contact_;
-  double norm_;                                     // of K
-  std::shared_ptr<const OrderedCholesky> cholesky_; // of copies too
-  MatrixX trailing_;                                // L_WW at construction
-  MatrixX schur_;                                   // lower triangle, by slots
-  std::vector<char> active_;                        // by slot
-  std::vector<char> changed_;                       // by slot, since prepare()
+  double norm_; // of K
+  std::unique_ptr<OrderedCholesky> cholesky_;
+  MatrixX trailing_;          // L_WW at construction
+  MatrixX schur_;             // lower triangle, by slots
+  std::vector<char> active_;  // by slot
+  std::vector<char> changed_; // by slot, since prepare()
   // Done ahead: S of the slots `ahead_` is ahead_factor_ squared; coupling_ (kept x ahead) are the rows of the kept
   // slots below it, and their own part of S is to be less by coupling_ coupling_^T, `eliminated_`.
   std::vector<int> ahead_, kept_, kept_place_; // slots; place of a slot in kept_, -1 outside

@@ -154,8 +154,8 @@ class Session {
                  CutReport& report);
   [[nodiscard]] std::vector<topology::BladePose>
   blade_ahead(const StepSample& sample, const std::optional<topology::BladePose>& last, double length) const;
-  [[nodiscard]] solvers::BodyGrowth follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, bool keep,
-                                               BodyModel& next, CutReport& report);
+  [[nodiscard]] solvers::BodyGrowth follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& next,
+                                               CutReport& report);
   void watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last, StepResult& result);
   [[nodiscard]] double way_into_body(const StepSample& sample) const;
   bool take_recondensed(BodyModel& into, solvers::ContactPatch& patch);
@@ -250,7 +250,6 @@ class Session {
   std::unique_ptr<Recondensing> recondensing_, given_up_; // null: none
   topology::SurfaceMesh recondensing_way_;                // for which it is condensed
   std::optional<solvers::SprinkleIncrement> followed_;    // by the body of the last cut
-  std::optional<solvers::SprinkleIncrement> proposed_;    // by that of the blade's proposal
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;
 };

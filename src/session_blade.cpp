@@ -79,7 +79,6 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
       if (std::optional<BodyModel> next = propose_cut(poses, sample, report)) {
         triangles += report.triangles;
         const double drawn = drawn_open(model_, *next->incision);
-        proposed_ = std::move(followed_);
         blade_force_->propose(std::move(*next), poses.size(), drawn);
       } else if (!blade_force_->proposed()) {
         mark_.reset();
@@ -92,7 +91,6 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
       break;
     surface += blade_force_->proposed_surface();
     model_ = blade_force_->take();
-    followed_ = std::move(proposed_);
     lead_recondensing(sample, to_rest);
     mark_.reset();
     shown_wound_.reset();

@@ -81,13 +81,10 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
   const auto way_ahead = [&] {
     return incisions_->way_through(blade_ahead(sample, last_blade_, way_spacings * zone_.spacing.fine), to_rest);
   };
-  const bool follows =
-      recondensing_ != nullptr || dynamic_cast<const solvers::GrowingBody*>(model_.body.get()) != nullptr;
   const std::string hindrance =
       model_.coarseness != coarseness_ ? "the spacing has changed"
-      : keep && (tears() || !follows)
-          ? "the blade is resisted"
-          : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+      : keep                           ? "the blade is resisted"
+             : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
   std::optional<solvers::SprinkleIncrement>& change = followed_;
   change.reset();
   report.update = SystemUpdate::rebuilt;
@@ -111,7 +108,7 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
     const StageTimer timer(report.seconds.assembly);
     if (change && updating_) {
       const StageTimer growth_timer(profile_.discretise);
-      const solvers::BodyGrowth growth = follow_cut(way_ahead, keep, next, report);
+      const solvers::BodyGrowth growth = follow_cut(way_ahead, next, report);
       report.update_reason = next.body == nullptr ? growth.uncovered : growth.update.reason;
     }
     if (next.body == nullptr)

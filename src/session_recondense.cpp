@@ -27,28 +27,18 @@ void Session::set_recondensing(bool on) {
 }
 
 // By an update alone where a replacement is on its way; where that cannot be, the replacement takes over and follows.
-// `keep`: a copy does, and the body stays as it is.
-solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, bool keep,
-                                        BodyModel& next, CutReport& report) {
+solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& next,
+                                        CutReport& report) {
   const auto* body = dynamic_cast<const solvers::GrowingBody*>(model_.body.get());
   const bool follows = body != nullptr;
-  BodyModel beside;
-  if (keep) {
-    beside.body = follows ? body->copy() : nullptr;
-    beside.window_way = model_.window_way;
-    beside.added_nodes = model_.added_nodes;
-  }
-  BodyModel& from = keep ? beside : model_;
   const auto grow = [&](bool only_update) {
-    if (from.body == nullptr)
-      return solvers::BodyGrowth{model_.body == nullptr ? "the first cut" : model_.not_following, {}};
-    return app::follow_cut(scenario_, organ_.domain, *followed_, way_ahead, from, next, only_update);
+    return app::follow_cut(scenario_, organ_.domain, *followed_, way_ahead, model_, next, only_update);
   };
   solvers::BodyGrowth growth = grow(recondensing_ != nullptr);
   bool taken = false;
   if (next.body == nullptr && recondensing_ != nullptr && (growth.update.declined || !follows)) {
     solvers::ContactPatch unused;
-    taken = take_recondensed(from, unused);
+    taken = take_recondensed(model_, unused);
     if (taken || follows)
       growth = grow(false);
   }
