@@ -46,7 +46,7 @@ struct Maker {
 
 Organ make_organ(const OrganSettings& settings) {
   // A liver is what its settings say and never changes: a session that is made beside another of the same (a reset)
-  // shares it with its level set, which take three quarters of the time to make one.
+  // shares it with its level set, which take most of the time to make one.
   struct Kept {
     int triangles = 0;
     double voxel_size = 0;

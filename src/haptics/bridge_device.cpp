@@ -48,8 +48,9 @@ struct BridgeDevice::Socket {
   /// From now on `held` takes what comes from there alone.
   void connect_to(const sockaddr_in& peer) const noexcept {
     const sockaddr_in nobody{.sin_family = AF_UNSPEC, .sin_port = 0, .sin_addr = {}, .sin_zero = {}};
-    ::connect(held, reinterpret_cast<const sockaddr*>(&nobody), sizeof nobody); // forgets the address of the last
-    ::connect(held, reinterpret_cast<const sockaddr*>(&peer), sizeof peer);
+    // A bound datagram socket only keeps the address. The first call forgets that of the last client.
+    static_cast<void>(::connect(held, reinterpret_cast<const sockaddr*>(&nobody), sizeof nobody));
+    static_cast<void>(::connect(held, reinterpret_cast<const sockaddr*>(&peer), sizeof peer));
   }
   void close() const noexcept {
     for (const int descriptor : {open, held})
