@@ -123,6 +123,7 @@ TEST_CASE("The hand feels a blade indent and cut at toughness times width, witho
   for (std::size_t i = 1; i < records.solves.size(); ++i)
     steepest = std::max(steepest, (records.solves[i].force - records.solves[i - 1].force).norm() / 10);
   const ForceSteps steps = force_steps(records);
+  CHECK(steps.hand_over < 0.05 * peak);
   CHECK(steepest < 0.06 * peak);
   CHECK(steps.any < 0.02 * peak + steepest); // the onset, that a solve finds, too
   double damped = 0;

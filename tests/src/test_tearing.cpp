@@ -189,8 +189,11 @@ TEST_CASE("A cut that a blade starts under tension runs on by itself") {
   CHECK(steps.front().tear->area == 0);
   CHECK(steps.back().tear->area > 1e-5);
   const double cut_alone = 0.0065 * 0.01;
-  CHECK(steps.back().cut->area > cut_alone);
-  CHECK(steps.back().cut->area > 0.9 * steps.back().tear->area);
+  // Resisted, the blade has cut no more than its path when the front leaves it behind and parts the bar.
+  const double section = 0.016 * 0.01;
+  CHECK(steps.back().tear->area > section - cut_alone);
+  CHECK(steps.back().cut->area >= steps.back().tear->area);
+  CHECK(steps.back().cut->area == Approx(section).epsilon(0.05));
   CHECK(steps.back().tear->ledger.dissipation >= 0);
   require_sound(session);
 }
