@@ -3,9 +3,11 @@
 //
 //   w = q + N^T C N lambda >= 0,  lambda >= 0,  lambda . w = 0,   q_c = g_c + n_c . (u0_c - u_c),
 //
-// and the linearisation is repeated until u stands still.
+// and the linearisation is repeated until u stands still. With friction f_c = lambda_c n_c + t_c, where the forces t_c
+// along the surface are relaxed for the lambda of the round (friction.hpp) and C t counts as part of u0.
 #include "solvers/contact_solver.hpp"
 
+#include "solvers/friction.hpp"
 #include "solvers/half_space.hpp"
 #include "solvers/linear_complementarity.hpp"
 #include "solvers/tool_gap.hpp"
@@ -59,6 +61,7 @@ ContactState resting(const ContactPatch& patch, const topology::ToolPose& pose) 
   const std::size_t count = patch.nodes.size();
   state.nodal_forces.assign(count, Vector3::Zero());
   state.active.assign(count, 0);
+  state.along.assign(count, Vector3::Zero());
   state.bond.assign(count, Vector3::Zero());
   state.displacement = patch.base_displacement;
   state.pose = pose;
@@ -86,8 +89,11 @@ void hold(const ContactPatch& patch, const std::vector<int>& held, const std::ve
   state.displacement = displacement_of(patch, state.nodal_forces);
 }
 
-void press_frictionless(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
-                        ContactState& state) {
+/// Rounds of the linearised contact until the displacements stand still. `tangential(normals, pressures, active,
+/// displacement)` may change the forces along the surface after each round of pressures, and says whether they stand.
+template <typename Tangential>
+void press_normally(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
+                    const std::vector<Vector3>& along, ContactState& state, Tangential&& tangential) {
   const int count = size_of(patch);
   MatrixX condensed(count, count);
   VectorX gaps(count);
@@ -97,23 +103,25 @@ void press_frictionless(const ContactPatch& patch, const PressingTool& tool, con
   VectorX last_step;
   for (int iteration = 0; iteration < options.maximum_iterations; ++iteration) {
     ++state.iterations;
+    const VectorX base = displacement_of(patch, along);
     for (int c = 0; c < count; ++c) {
       const Vector3 u = state.displacement.segment<3>(3 * c);
       const Gap gap = contact_gap(tool, patch.rest[c] + u);
       normals[c] = gap.normal;
-      gaps[c] = gap.distance + gap.normal.dot(patch.base_displacement.segment<3>(3 * c) - u);
+      gaps[c] = gap.distance + gap.normal.dot(base.segment<3>(3 * c) - u);
     }
     for (int c = 0; c < count; ++c)
       for (int d = 0; d < count; ++d)
         condensed(c, d) = normals[c].dot(patch.compliance.block<3, 3>(3 * c, 3 * d) * normals[d]);
     const ComplementaritySolution solution =
         solve_complementarity(condensed, gaps, state.active, 0.1 * options.gap_tolerance);
-    for (int c = 0; c < count; ++c)
-      state.nodal_forces[c] = solution.forces[c] * normals[c];
     state.active = solution.active;
+    const bool stands = tangential(normals, solution.forces, state);
+    for (int c = 0; c < count; ++c)
+      state.nodal_forces[c] = solution.forces[c] * normals[c] + along[c];
     const VectorX displacement = displacement_of(patch, state.nodal_forces);
     const VectorX step = displacement - state.displacement;
-    if (step.lpNorm<Eigen::Infinity>() < options.gap_tolerance && solution.converged) {
+    if (step.lpNorm<Eigen::Infinity>() < options.gap_tolerance && solution.converged && stands) {
       state.displacement = displacement;
       state.converged = true;
       break;
@@ -128,6 +136,117 @@ void press_frictionless(const ContactPatch& patch, const PressingTool& tool, con
     last_step = step;
     state.displacement += relaxation * step;
   }
+}
+
+void press_frictionless(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
+                        ContactState& state) {
+  press_normally(patch, tool, options, std::vector<Vector3>(patch.nodes.size(), Vector3::Zero()), state,
+                 [](const std::vector<Vector3>&, const VectorX&, const ContactState&) { return true; });
+}
+
+/// Where nodes stick to the tool, taken along from the state's pose to the tool's. A node that was free sticks where
+/// the tool meets it: at the share of the way at which its gap is used up.
+void carry_bonds(const ContactPatch& patch, const PressingTool& before, const PressingTool& tool, ContactState& state) {
+  for (int c = 0; c < size_of(patch); ++c) {
+    const Vector3 x = patch.rest[c] + state.displacement.segment<3>(3 * c);
+    double rest_of_way = 1;
+    if (!state.active[c]) {
+      state.bond[c] = state.displacement.segment<3>(3 * c);
+      const double start = contact_gap(before, x).distance;
+      const double end = contact_gap(tool, x).distance;
+      rest_of_way = start > end ? std::clamp(-end / (start - end), 0.0, 1.0) : 0;
+    }
+    state.bond[c] += rest_of_way * tool_motion(before.pose, tool.pose, patch.rest[c] + state.bond[c]);
+  }
+}
+
+void press_frictional(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
+                      ContactState& state) {
+  constexpr int rounds = 20; // of friction for the pressures of one linearisation
+  const int count = size_of(patch);
+  const PressingTool before = pressing(tool.shape, state.pose, patch.rest, patch.normals);
+  carry_bonds(patch, before, tool, state);
+  std::vector<Vector3>& along = state.along;
+  std::vector<Vector3> slip(count, Vector3::Zero());
+  std::vector<double> limits(count, 0);
+  std::vector<Vector3> last_normals;
+  std::vector<int> touching;
+  press_normally(patch, tool, options, along, state,
+                 [&](const std::vector<Vector3>& normals, const VectorX& pressures, const ContactState& now) {
+                   touching.clear();
+                   for (int c = 0; c < count; ++c)
+                     if (now.active[c])
+                       touching.push_back(c);
+                     else
+                       along[c].setZero();
+                   std::vector<Vector3> forces = along;
+                   for (const int c : touching) {
+                     forces[c] += pressures[c] * normals[c];
+                     limits[c] = options.friction * std::max(pressures[c], 0.0);
+                   }
+                   const VectorX displacement = displacement_of(patch, forces);
+                   for (const int c : touching)
+                     slip[c] = displacement.segment<3>(3 * c) - state.bond[c];
+                   const SlidingContact contact{touching, patch.compliance.data(),
+                                                static_cast<std::size_t>(patch.compliance.rows()), normals, limits};
+                   last_normals = normals;
+                   double moved = 0;
+                   for (int round = 0; round < rounds; ++round) {
+                     moved = relax_friction(contact, slip, along);
+                     if (moved < 0.1 * options.gap_tolerance)
+                       break;
+                   }
+                   return moved < options.gap_tolerance;
+                 });
+  // What has slipped sticks from here on; what has not keeps its place along the surface.
+  for (int c = 0; c < count; ++c) {
+    const Vector3 u = state.displacement.segment<3>(3 * c);
+    if (state.active[c] && !slips(along[c], limits[c])) {
+      state.bond[c] += last_normals[c].dot(u - state.bond[c]) * last_normals[c];
+      continue;
+    }
+    if (state.active[c])
+      state.friction_work -= along[c].dot(u - state.bond[c]);
+    state.bond[c] = u;
+  }
+}
+
+/// The contact that a memory tells of, on the nodes of this patch: pressures as they come out here, and along the
+/// surface the remembered share of the limit, from the nearest nodes of then. So a node set that changes does not let
+/// go of what sticks, and what slipped goes on slipping with the same force.
+ContactState recalled(const ContactPatch& patch, const topology::ToolShape& shape, const ContactOptions& options,
+                      const GripMemory& memory) {
+  ContactState state = resting(patch, memory.pose);
+  const int count = size_of(patch);
+  std::vector<Vector3> shares(count, Vector3::Zero());
+  for (int c = 0; c < count; ++c) {
+    double weights = 0;
+    for (std::size_t k = 0; k < memory.rest.size(); ++k) {
+      const double distance = (patch.rest[c] - memory.rest[k]).squaredNorm() / (patch.spacings[c] * patch.spacings[c]);
+      const double weight = 1 / (distance * distance + 1e-12);
+      weights += weight;
+      shares[c] += weight * memory.share[k];
+    }
+    if (weights > 0)
+      shares[c] /= weights;
+  }
+  std::vector<Vector3>& along = state.along;
+  press_normally(patch, pressing(shape, memory.pose, patch.rest, patch.normals), options, along, state,
+                 [&](const std::vector<Vector3>& normals, const VectorX& pressures, const ContactState& now) {
+                   double change = 0;
+                   double largest = 0;
+                   for (int c = 0; c < count; ++c) {
+                     const double limit = now.active[c] ? options.friction * std::max(pressures[c], 0.0) : 0;
+                     const Vector3 force = limit * along_surface(shares[c], normals[c]);
+                     change = std::max(change, (force - along[c]).norm());
+                     largest = std::max(largest, limit);
+                     along[c] = force;
+                   }
+                   return change <= 1e-6 * largest;
+                 });
+  for (int c = 0; c < count; ++c)
+    state.bond[c] = state.displacement.segment<3>(3 * c);
+  return state;
 }
 
 void press_bonded(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
@@ -208,19 +327,28 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
 
 ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
                    const ContactOptions& options, const ContactState* previous) {
+  const bool frictional = options.condition == ContactCondition::frictional;
+  if (!(options.friction >= 0) || !std::isfinite(options.friction))
+    throw InputError(fmt::format("a coefficient of friction of {:g}; allowed: 0 or more", options.friction));
   topology::ToolPose from = pose;
-  if (previous != nullptr) {
-    from = previous->pose;
+  ContactState state;
+  if (previous != nullptr && previous->memory) {
+    state = recalled(patch, tool, options, *previous->memory);
+    from = state.pose;
+  } else if (previous != nullptr) {
+    state = *previous;
+    from = state.pose;
   } else {
     double deepest = 0;
     for (int c = 0; c < size_of(patch); ++c)
       deepest =
           std::max(deepest, (patch.rest[c] + patch.base_displacement.segment<3>(3 * c) - pose.point).dot(pose.axis));
     from.point += deepest * pose.axis;
+    state = resting(patch, from);
   }
-  ContactState state = previous != nullptr ? *previous : resting(patch, from);
   state.iterations = 0;
-  const double stride = 0.5 * topology::tip_radius(tool);
+  state.friction_work = 0;
+  const double stride = (frictional ? 0.1 : 0.5) * topology::tip_radius(tool);
   const int steps = std::max(1, static_cast<int>(std::ceil((pose.point - from.point).norm() / stride)));
   for (int step = 1; step <= steps; ++step) {
     const double t = static_cast<double>(step) / steps;
@@ -229,10 +357,13 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
       at.point = from.point + t * (pose.point - from.point);
       at.axis = (from.axis + t * (pose.axis - from.axis)).normalized();
     }
+    const PressingTool now = pressing(tool, at, patch.rest, patch.normals);
     if (options.condition == ContactCondition::frictionless)
-      press_frictionless(patch, pressing(tool, at, patch.rest, patch.normals), options, state);
+      press_frictionless(patch, now, options, state);
+    else if (frictional)
+      press_frictional(patch, now, options, state);
     else
-      press_bonded(patch, pressing(tool, at, patch.rest, patch.normals), options, state);
+      press_bonded(patch, now, options, state);
     state.pose = at;
   }
   state.largest_penetration = 0;
@@ -243,6 +374,21 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
                  -contact_gap(pressed, patch.rest[c] + state.displacement.segment<3>(3 * c)).distance);
   summarise(patch, state);
   return state;
+}
+
+std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState& state, double friction) {
+  if (state.active_nodes == 0)
+    return std::nullopt;
+  GripMemory memory;
+  memory.pose = state.pose;
+  for (int c = 0; c < size_of(patch); ++c) {
+    if (!state.active[c])
+      continue;
+    const double limit = friction * (state.nodal_forces[c] - state.along[c]).norm();
+    memory.rest.push_back(patch.rest[c]);
+    memory.share.push_back(limit > 0 ? Vector3(state.along[c] / limit) : Vector3::Zero());
+  }
+  return memory;
 }
 
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements) {

@@ -30,12 +30,21 @@ struct ContactPatch {
 ContactPatch condense(const Discretisation& body, const std::vector<int>& candidates,
                       const std::optional<HalfSpaceCoupling>& coupling = std::nullopt);
 
-enum class ContactCondition { frictionless, bonded };
+enum class ContactCondition { frictionless, frictional, bonded };
 
 struct ContactOptions {
   ContactCondition condition = ContactCondition::frictionless;
+  double friction = 0;         // frictional: Coulomb's coefficient
   int maximum_iterations = 60; // re-linearisations of the tool's surface per sub-step
   double gap_tolerance = 1e-9; // m
+};
+
+/// What friction leaves behind of a contact on other nodes than those of the next patch: how much of its limit the
+/// force along the tool's surface uses, where, and the tool's pose.
+struct GripMemory {
+  topology::ToolPose pose;
+  std::vector<Vector3> rest;  // m, nodes that were in contact
+  std::vector<Vector3> share; // force along the surface over its limit, at most 1 long
 };
 
 /// Outcome of pressing the tool into the patch.
@@ -43,23 +52,32 @@ struct ContactState {
   std::vector<Vector3> nodal_forces; // N on the body, one per candidate
   std::vector<char> active;          // candidates in contact
   VectorX displacement;              // 3m, m: of the candidates
-  std::vector<Vector3> bond;         // bonded: displacement at which each active node was caught, relative to the tool
-  topology::ToolPose pose;           // of the tool in this state
+  std::vector<Vector3> along;        // N, frictional: part of the nodal forces that acts along the tool's surface
+  std::vector<Vector3> bond;         // m, displacement at which an active node sticks to the tool at `pose`
+  std::optional<GripMemory> memory; // set where a contact goes on with other nodes: the rest of the state is then empty
+  topology::ToolPose pose;          // of the tool in this state
   Vector3 tool_force = Vector3::Zero(); // N, force of the body on the tool
   Vector3 centre = Vector3::Zero();     // m, rest position of the contact: mean weighted by normal force
   double contact_radius = 0;            // m, outermost active node's distance from the centre plus half its spacing
   double largest_penetration = 0;       // m, left over at convergence
+  double friction_work = 0;             // J, taken by friction on the way from the state before
   int active_nodes = 0;
   int iterations = 0;
   bool converged = true;
 };
 
 /// Finds the active set and the forces: no penetration, no tension. Frictionless: forces along the tool's normals.
-/// Bonded: a node that has been touched moves with the tool. The tool advances from `previous` (or, without one, from
-/// where it is clear of the patch along its axis) in sub-steps shorter than its tip radius, so that deep presses find
-/// the right side.
+/// Frictional: besides, forces along the tool's surface of at most `friction` times the normal force; below that limit
+/// a node keeps its place on the tool, at it the node slips against the force. Bonded: a node that has been touched
+/// moves with the tool. The tool advances from `previous` (or, without one, from where it is clear of the patch along
+/// its axis) in sub-steps shorter than its tip radius, so that deep presses find the right side; with friction, which
+/// remembers its way, of a tenth of that radius at most. Where `previous` is but a memory, the contact it tells of is
+/// first set up on these nodes.
 ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
                    const ContactOptions& options = {}, const ContactState* previous = nullptr);
+
+/// What friction needs to go on with other nodes than those of this patch; nothing without contact.
+std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState& state, double friction);
 
 /// Nodes of the patch with given displacements (bonded cap): solves for their forces.
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements);

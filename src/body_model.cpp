@@ -254,11 +254,15 @@ void bond(const std::vector<Vector3>& displacements, const topology::ToolPose& p
 } // namespace
 
 void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
-                   const std::vector<Vector3>* grasped) {
-  const solvers::ContactOptions options{
-      .condition = scenario.contact.condition, .maximum_iterations = most_iterations, .gap_tolerance = lip_tolerance};
+                   const std::vector<Vector3>* grasped, const std::optional<solvers::GripMemory>& memory) {
+  const solvers::ContactOptions options{.condition = scenario.contact.condition,
+                                        .friction = scenario.contact.friction,
+                                        .maximum_iterations = most_iterations,
+                                        .gap_tolerance = lip_tolerance};
   const bool in_reach = tool != nullptr && !model.patch.nodes.empty();
-  const solvers::CutContactState* previous = model.state ? &*model.state : nullptr;
+  solvers::CutContactState remembered;
+  remembered.tool.memory = memory;
+  const solvers::CutContactState* previous = model.state ? &*model.state : memory ? &remembered : nullptr;
   if (!model.lips) { // lips that stay apart by themselves need no contact
     solvers::CutContactState state;
     if (in_reach)
@@ -279,11 +283,11 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
   }
   solvers::CutContactState state;
   if (in_reach) {
-    const bool same_lips =
-        grasped == nullptr && previous != nullptr && previous->lips.closed.size() == model.pairs.size();
+    const bool goes_on = previous != nullptr && (previous->lips.closed.size() == model.pairs.size() ||
+                                                 options.condition == solvers::ContactCondition::frictional);
     state = grasped != nullptr
                 ? solvers::prescribe(model.patch, *model.lips, *grasped, lip_tolerance)
-                : solvers::press(model.patch, *model.lips, tool->shape, *pose, options, same_lips ? previous : nullptr);
+                : solvers::press(model.patch, *model.lips, tool->shape, *pose, options, goes_on ? previous : nullptr);
     if (grasped != nullptr)
       bond(*grasped, *pose, state.tool);
     model.field = solvers::deform(model.patch, *model.lips, state);

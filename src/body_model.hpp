@@ -84,9 +84,11 @@ void condense(const std::vector<int>& candidates, BodyModel& model);
 
 /// Solves for tool and lips in contact; `tool` null: the tool is far, and candidates there are none. Starts from the
 /// model's state where it has one. With `grasped`, one displacement (m) a node of the patch, the tool does not press:
-/// it holds the patch there.
+/// it holds the patch there. A model without state goes on from the `memory` of friction on other nodes, if there is
+/// one.
 void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
-                   const std::vector<Vector3>* grasped = nullptr);
+                   const std::vector<Vector3>* grasped = nullptr,
+                   const std::optional<solvers::GripMemory>& memory = std::nullopt);
 
 /// Largest unbalanced force over the largest force.
 double residual(const BodyModel& model);

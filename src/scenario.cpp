@@ -305,8 +305,12 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   if (root.has("tool"))
     scenario.tool = tool(root.table("tool"), offences);
   const Section contact = root.table("contact");
-  if (contact.text("condition") == "bonded")
+  if (const std::string condition = contact.text("condition"); condition == "bonded") {
     scenario.contact.condition = solvers::ContactCondition::bonded;
+  } else if (condition == "frictional") {
+    scenario.contact.condition = solvers::ContactCondition::frictional;
+    scenario.contact.friction = contact.number("friction");
+  }
   scenario.contact.candidate_radius = contact.optional_number("candidate_radius").value_or(0);
   scenario.contact.follow_fraction = contact.number("follow_fraction");
   for (const Section& section : root.tables("precut"))

@@ -96,6 +96,7 @@ struct ToolSettings {
 
 struct ContactSettings {
   solvers::ContactCondition condition = solvers::ContactCondition::frictionless;
+  double friction = 0;         // coefficient
   double candidate_radius = 0; // m, 0: derived
   double follow_fraction = 0.5;
 };

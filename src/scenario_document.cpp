@@ -266,8 +266,10 @@ class Checker {
       return true;
     const auto equals = key.when.find(" = ");
     const std::string_view sibling = key.when.substr(0, equals);
-    const std::optional<std::string_view> value = table[sibling].value<std::string_view>();
+    std::optional<std::string_view> value = table[sibling].value<std::string_view>();
     const ScenarioKey* entry = find_scenario_key(join(path, sibling));
+    if (!table.contains(sibling) && entry != nullptr && entry->fallback.size() > 2 && entry->fallback.front() == '"')
+      value = entry->fallback.substr(1, entry->fallback.size() - 2); // left out: its default, within quotes
     if (!value || entry == nullptr || !in_list(entry->choices, *value))
       return std::nullopt;
     return in_list(key.when.substr(equals + 3), *value);

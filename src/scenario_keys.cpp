@@ -201,13 +201,18 @@ constexpr std::array keys = {
     ScenarioKey{"tool.path[].position", vector, "m", "required", "The tool's reference point: the end of its tip."},
 
     ScenarioKey{"contact", table, "", "", "How tool and organ touch; left out: all defaults."},
-    ScenarioKey{"contact.condition",
-                choice,
-                "",
-                "\"frictionless\"",
-                "Frictionless: the tool slides freely. Bonded: what has been touched moves with the tool.",
-                {},
-                "frictionless, bonded"},
+    ScenarioKey{
+        "contact.condition",
+        choice,
+        "",
+        "\"frictionless\"",
+        "Frictionless: the tool slides freely. Frictional: what is touched sticks to the tool until Coulomb's limit "
+        "is reached, and slips at it. Bonded: what has been touched moves with the tool.",
+        {},
+        "frictionless, frictional, bonded"},
+    ScenarioKey{"contact.friction", number, "", "0.3",
+                "Coefficient of friction between tool and tissue. Wet organs: 0.05 to 0.3; a dry glove: up to 1.",
+                from(0, 2), "", "condition = frictional"},
     ScenarioKey{"contact.candidate_radius", number, "m", "",
                 "Surface nodes so near to the first contact may touch the tool; left out: fine radius + 2 fine "
                 "spacings. Grows by itself when the tool reaches farther.",

@@ -116,6 +116,10 @@ StepResult Session::step(const StepSample& sample) {
   }
   if (cuts())
     result.cut.emplace();
+  grip_memory_.reset();
+  if (scenario_.contact.condition == solvers::ContactCondition::frictional && model_.state && !grasps() &&
+      !model_.patch.nodes.empty())
+    grip_memory_ = solvers::remember(model_.patch, model_.state->tool, scenario_.contact.friction);
   if (without_blade_) {
     model_.field = std::move(*without_blade_);
     without_blade_.reset();
@@ -294,7 +298,7 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
   for (int growth = 0; growth <= patch_growths; ++growth) {
     {
       const StageTimer timer(profile_.press);
-      solve_contact(tool, pose, scenario_, model);
+      solve_contact(tool, pose, scenario_, model, nullptr, grip_memory_);
     }
     if (model.patch.nodes.empty())
       return;

@@ -246,6 +246,7 @@ class Session {
   bool tear_gradually_ = false;
   bool force_only_ = false;
   bool updating_ = true;
+  std::optional<solvers::GripMemory> grip_memory_; // friction at the start of the step, should its nodes change
   bool recondensing_on_ = false;
   std::unique_ptr<Recondensing> recondensing_, given_up_; // null: none
   topology::SurfaceMesh recondensing_way_;                // for which it is condensed

@@ -111,7 +111,9 @@ void Session::book_loading(const StepSample& sample, const Loading& loading) {
     ledger.tool += work;
     ledger.loads += loads;
     ledger.elastic += elastic;
-    const double released = std::max(0.0, work + loads - elastic);
+    const double friction = model_.state->tool.friction_work;
+    ledger.dissipation += friction;
+    const double released = std::max(0.0, work + loads - elastic - friction);
     if (loading.cut_surface > 0)
       ledger.surface += std::min(released, loading.cut_surface);
     if (loading.releases || loading.cut_surface > 0)

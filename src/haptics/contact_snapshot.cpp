@@ -7,7 +7,7 @@ namespace spherecut::app {
 
 ContactSnapshot::ContactSnapshot()
     : rest(most_candidates), normals(most_candidates), base(most_candidates), displacement(most_candidates),
-      forces(most_candidates), bond(most_candidates), active(most_candidates),
+      forces(most_candidates), along(most_candidates), bond(most_candidates), active(most_candidates),
       compliance(static_cast<std::size_t>(3 * most_candidates) * (3 * most_candidates)) {}
 
 void clear(ContactSnapshot& snapshot) {
@@ -54,6 +54,7 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
     snapshot.base[k] = patch.base_displacement.segment<3>(3 * c);
     snapshot.displacement[k] = state.displacement.segment<3>(3 * c);
     snapshot.forces[k] = state.nodal_forces[c];
+    snapshot.along[k] = state.along.empty() ? Vector3::Zero() : state.along[c];
     snapshot.bond[k] = state.bond.empty() ? Vector3::Zero() : state.bond[c];
     snapshot.active[k] = state.active[c];
     snapshot.reach = std::max(snapshot.reach, (patch.rest[c] - contact.point).norm());

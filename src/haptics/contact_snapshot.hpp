@@ -29,6 +29,7 @@ struct ContactSnapshot {
   Vector3 force = Vector3::Zero();  // N, of the body on tool or blade in the hand, of the solve as it is
   topology::SurfaceContact contact; // deepest point on the surface at rest
   solvers::ContactCondition condition = solvers::ContactCondition::frictionless;
+  double friction = 0; // coefficient, frictional
 
   int count = 0;                           // candidates; 0: the tool is far
   std::vector<Vector3> rest;               // m
@@ -36,7 +37,8 @@ struct ContactSnapshot {
   std::vector<Vector3> base;               // m, displacement without tool
   std::vector<Vector3> displacement;       // m, in the solve
   std::vector<Vector3> forces;             // N on the body, in the solve
-  std::vector<Vector3> bond;               // m, bonded: displacement of an active node that moves with the tool
+  std::vector<Vector3> along;              // N, frictional: part of the forces that acts along the tool's surface
+  std::vector<Vector3> bond;               // m, displacement at which an active node sticks to the tool
   std::vector<char> active;                // in contact
   std::vector<double> compliance;          // m/N, column-major 3 count x 3 count
   double asymmetry = 0;                    // |C - C^T| / |C + C^T| of the compliance before it was made symmetric

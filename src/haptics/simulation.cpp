@@ -120,6 +120,7 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
     session_.set_grip(mode_ == HandMode::grasper && (device.buttons & 1U) != 0);
   result_ = session_.step(sample(device));
   const BodyModel& model = session_.model();
+  snapshot.friction = session_.scenario().contact.friction;
   const solvers::ContactCondition condition =
       session_.grasps() ? solvers::ContactCondition::bonded : session_.scenario().contact.condition;
   if (model.patch.nodes.empty() || !model.state) {

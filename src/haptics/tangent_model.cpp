@@ -1,8 +1,10 @@
 // Notation: candidate c at rest at x_c with displacement u_c = b_c + sum_d C_cd f_d. Frictionless: f_c = p_c n_c with
 // the tool's normal n_c, gap w_c = q_c + n_c . (u_c - b_c), q_c = g_c + n_c . (b_c - u_c at which g_c was taken), and
-// w >= 0, p >= 0, p w = 0. Bonded: u_c = bond_c + motion of the tool on the caught candidates.
+// w >= 0, p >= 0, p w = 0. Frictional: f_c = p_c n_c + t_c, where C t counts as part of b. Bonded: u_c = bond_c +
+// motion of the tool on the caught candidates.
 #include "src/haptics/tangent_model.hpp"
 
+#include "solvers/friction.hpp"
 #include "solvers/tool_gap.hpp"
 
 #include <algorithm>
@@ -18,6 +20,7 @@ constexpr int most_rounds = 4;       // in a tick
 constexpr int most_pivots = 16;      // in a tick, over all rounds
 constexpr double singular = 1e-12;   // pivot over diagonal at which a block is not positive definite
 constexpr int patience_of_block = 4; // pivots of many candidates at once without progress
+constexpr int most_rubs = 3;         // rounds of friction for the pressures of one round
 constexpr double margin = 0.15;      // of the tip radius: candidates farther from the tool are not looked at
 constexpr double lever = 0.05;       // m, about the tool's point, over which a turn of its axis counts as motion
 constexpr int ld = 3 * most_candidates;
@@ -51,7 +54,7 @@ SPHERECUT_VECTORS void combine(double* __restrict y, const double* __restrict co
 } // namespace
 
 TangentModel::TangentModel(const topology::ToolShape& tool)
-    : tool_(tool), factor_(static_cast<std::size_t>(ld) * ld), right_(ld + 1),
+    : tool_(tool), factor_(static_cast<std::size_t>(ld) * ld), right_(ld + 1), share_(ld),
       response_(static_cast<std::size_t>(most_candidates) * ld) {
   displacement_.fill(Vector3::Zero());
   moved_.fill(Vector3::Zero());
@@ -59,6 +62,10 @@ TangentModel::TangentModel(const topology::ToolShape& tool)
   gap_.fill(0);
   pressure_.fill(0);
   active_.fill(0);
+  bare_.fill(Vector3::Zero());
+  along_.fill(Vector3::Zero());
+  slip_.fill(Vector3::Zero());
+  limit_.fill(0);
   bond_.fill(Vector3::Zero());
   bond_force_.fill(Vector3::Zero());
   chosen_.fill(0);
@@ -96,6 +103,7 @@ bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
     displacement_[c] = snapshot.displacement[c];
     active_[c] = snapshot.active[c];
     bond_[c] = snapshot.bond[c];
+    along_[c] = snapshot.along[c];
     bond_force_[c].setZero();
   }
   if (bonded)
@@ -135,7 +143,7 @@ bool TangentModel::solve_active() noexcept {
     double* column = &factor_[a * most_candidates];
     for (std::size_t b = a; b < size; ++b)
       column[b] = normal_[chosen_[b]].dot(Eigen::Map<const Vector3>(response + 3 * chosen_[b]));
-    right_[a] = -gap_[c];
+    right_[a] = -gap_[c] - normal_[c].dot(bare_[c] - snapshot_->base[c]);
   }
   for (std::size_t a = 0; a < size; ++a) {
     double* column = &factor_[a * most_candidates];
@@ -166,18 +174,21 @@ bool TangentModel::solve_active() noexcept {
 }
 
 // Of the contact as it stands against a motion of the tool along the force on it: v^T A^-1 v = |L^-1 v|^2, with the
-// factor L of the active block and what each of its gaps (bonded: its three displacements) changes by per metre.
+// factor L of the active block and what each of its gaps (bonded: its three displacements) changes by per metre. With
+// friction all gaps close at the full rate whatever the way: what sticks is no stiffer along the surface than against
+// it.
 double TangentModel::stiffness_along(const Vector3& force) noexcept {
   const double size = force.norm();
   if (!(size > 0))
     return 0;
   const Vector3 way = force / size;
   const bool bonded = snapshot_->condition == solvers::ContactCondition::bonded;
+  const bool frictional = snapshot_->condition == solvers::ContactCondition::frictional;
   const int rows = bonded ? 3 * chosen_count_ : chosen_count_;
   double sum = 0;
   for (int r = 0; r < rows; ++r) {
     const auto row = static_cast<std::size_t>(r);
-    double value = bonded ? way[r % 3] : normal_[chosen_[r]].dot(way);
+    double value = bonded ? way[r % 3] : frictional ? 1 : normal_[chosen_[r]].dot(way);
     for (std::size_t k = 0; k < row; ++k) // bonded: the factor lies by rows
       value -= (bonded ? factor_[row * ld + k] : factor_[k * most_candidates + row]) * right_[k];
     right_[row] = value / factor_[row * (bonded ? ld : most_candidates) + row];
@@ -192,7 +203,10 @@ void TangentModel::displace() noexcept {
   const bool bonded = snapshot_->condition == solvers::ContactCondition::bonded;
   double* u = moved_[0].data(); // Vector3 is three doubles without padding
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
-  std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, moved_.begin());
+  if (bonded)
+    std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, moved_.begin());
+  else
+    std::copy(bare_.begin(), bare_.begin() + snapshot_->count, moved_.begin());
   for (int a = 0; a < chosen_count_; ++a) {
     const auto c = static_cast<std::size_t>(chosen_[a]);
     double* response = &response_[c * ld];
@@ -200,6 +214,56 @@ void TangentModel::displace() noexcept {
       combine(response, &snapshot_->compliance[3 * c * rows], bond_force_[c].data(), rows);
     add_scaled(u, response, bonded ? 1 : pressure_[c], rows);
   }
+}
+
+// Displacements under friction alone: `bare_` = b + C t.
+void TangentModel::drag_along() noexcept {
+  const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
+  std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, bare_.begin());
+  if (snapshot_->condition != solvers::ContactCondition::frictional)
+    return;
+  for (int k = 0; k < near_count_; ++k) {
+    const auto c = static_cast<std::size_t>(near_[k]);
+    if (along_[c].isZero(0))
+      continue;
+    combine(share_.data(), &snapshot_->compliance[3 * c * rows], along_[c].data(), rows);
+    add_scaled(bare_[0].data(), share_.data(), 1, rows);
+  }
+}
+
+// Friction for the pressures as they are, and the displacements with it. Whether it stands still.
+bool TangentModel::rub() noexcept {
+  for (int k = 0; k < near_count_; ++k)
+    if (active_[near_[k]] == 0)
+      along_[near_[k]].setZero();
+  for (int a = 0; a < chosen_count_; ++a) {
+    const int c = chosen_[a];
+    limit_[c] = snapshot_->friction * std::max(pressure_[c], 0.0);
+    slip_[c] = moved_[c] - bond_[c];
+  }
+  const solvers::SlidingContact contact{{chosen_.data(), static_cast<std::size_t>(chosen_count_)},
+                                        snapshot_->compliance.data(),
+                                        3 * static_cast<std::size_t>(snapshot_->count),
+                                        normal_,
+                                        limit_};
+  double moved = 0;
+  for (int i = 0; i < most_rubs; ++i) {
+    moved = solvers::relax_friction(contact, slip_, along_);
+    if (moved < 0.1 * still)
+      break;
+  }
+  drag_along();
+  displace();
+  return moved < still;
+}
+
+// What slips, and what is free, sticks from where it is now.
+void TangentModel::settle_bonds() noexcept {
+  for (int c = 0; c < snapshot_->count; ++c)
+    if (active_[c] == 0 || solvers::slips(along_[c], limit_[c]))
+      bond_[c] = displacement_[c];
+    else
+      bond_[c] += normal_[c].dot(displacement_[c] - bond_[c]) * normal_[c];
 }
 
 // Candidates near enough to the tool to meet it in this tick. The others were farther when last looked at than tool and
@@ -221,7 +285,13 @@ void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
 ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
   const int count = snapshot_->count;
   const solvers::PressingTool tool = solvers::pressing(tool_, pose, rest(), normals());
+  const bool frictional = snapshot_->condition == solvers::ContactCondition::frictional;
+  if (frictional)
+    for (int c = 0; c < count; ++c)
+      if (active_[c] != 0)
+        bond_[c] += solvers::tool_motion(pose_, pose, snapshot_->rest[c] + bond_[c]);
   look_around(tool);
+  drag_along();
   ModelForce result;
   result.converged = false;
   int pivots = 0;
@@ -273,6 +343,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
         if (const int c = near_[k]; patience > 0 ? wrong_[c] != 0 : c == last)
           active_[c] = static_cast<char>(active_[c] == 0);
     }
+    const bool stands = !frictional || rub();
     double largest = 0;
     double square = 0;
     double product = 0;
@@ -284,7 +355,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       step_[c] = now;
     }
     went += largest;
-    if (largest < still && complementary) {
+    if (largest < still && complementary && stands) {
       for (int c = 0; c < count; ++c)
         displacement_[c] = moved_[c];
       result.converged = true;
@@ -307,10 +378,13 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     const double pressure = std::max(pressure_[c], 0.0);
     if (pressure > 0) {
       ++result.active;
-      result.force -= pressure * normal_[c];
-      stored += 0.5 * pressure * normal_[c].dot(moved_[c] - snapshot_->base[c]);
+      const Vector3 on_body = frictional ? Vector3(pressure * normal_[c] + along_[c]) : Vector3(pressure * normal_[c]);
+      result.force -= on_body;
+      stored += 0.5 * on_body.dot(moved_[c] - snapshot_->base[c]);
     }
   }
+  if (frictional)
+    settle_bonds();
   result.stored = stored;
   result.stiffness = stiffness_along(result.force);
   for (int k = 0; k < near_count_; ++k) {

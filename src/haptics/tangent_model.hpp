@@ -12,9 +12,9 @@
 namespace spherecut::app {
 
 /// While the body behind the snapshot stands, this is the solve itself in fewer rounds, warm from the last tick: onset,
-/// spreading, sliding and loss of contact are followed; a bonded contact goes with the tool and catches what the tool
-/// overtakes. A blade in the hand follows the condensed contact of its edge (blade_model.hpp). Rounds and pivots have a
-/// fixed budget; what is left over continues in the next tick.
+/// spreading, sliding and loss of contact are followed, friction too (solvers/friction.hpp); a bonded contact goes with
+/// the tool and catches what the tool overtakes. A blade in the hand follows the condensed contact of its edge
+/// (blade_model.hpp). Rounds and pivots have a fixed budget; what is left over continues in the next tick.
 class TangentModel : public ForceModel {
  public:
   explicit TangentModel(const topology::ToolShape& tool);
@@ -29,6 +29,9 @@ class TangentModel : public ForceModel {
   ModelForce follow(const topology::ToolPose& pose) noexcept;
   [[nodiscard]] bool solve_active() noexcept;
   void displace() noexcept;
+  void drag_along() noexcept;
+  [[nodiscard]] bool rub() noexcept;
+  void settle_bonds() noexcept;
   [[nodiscard]] double stiffness_along(const Vector3& force) noexcept;
   void look_around(const solvers::PressingTool& tool) noexcept;
   [[nodiscard]] bool catch_node(int candidate) noexcept;
@@ -47,7 +50,11 @@ class TangentModel : public ForceModel {
   PerCandidate<char> active_;
   PerCandidate<char> wrong_;         // candidates that change sides in a pivot
   PerCandidate<Vector3> step_;       // m, of the last round
-  PerCandidate<Vector3> bond_;       // m, bonded: displacement when the tool was at pose_
+  PerCandidate<Vector3> bare_;       // m, displacement without the tool's pressure: under its friction alone
+  PerCandidate<Vector3> along_;      // N, friction, along the tool's surface
+  PerCandidate<Vector3> slip_;       // m, from where a candidate stuck to the tool
+  PerCandidate<double> limit_;       // N, of friction
+  PerCandidate<Vector3> bond_;       // m, displacement at which it sticks to the tool, when the tool was at pose_
   PerCandidate<Vector3> bond_force_; // N
   PerCandidate<int> chosen_;         // active candidates, in the order of the factor's rows
   int chosen_count_ = 0;
@@ -60,6 +67,7 @@ class TangentModel : public ForceModel {
   double rest_sum_ = 0, compliance_sum_ = 0;
   std::vector<double> factor_;   // Cholesky factor of the active block: by columns; bonded: by rows
   std::vector<double> right_;    // right-hand sides of it
+  std::vector<double> share_;    // m, of one candidate's friction in the displacements
   std::vector<double> response_; // displacement of all candidates to a force on one, m per N, or m
 };
 

@@ -88,6 +88,49 @@ TEST_CASE("Between solves the tangent model gives the force that a solve would g
   CHECK(worst < bound * peak);
 }
 
+TEST_CASE("With friction the tangent model gives the force that solves give along the way, and takes energy") {
+  const auto [method, bound] =
+      GENERATE(std::pair<std::string, double>{"galerkin", 0.02}, std::pair<std::string, double>{"collocation", 0.04});
+  HapticSimulation simulation(small(method, "frictional"));
+  HapticSimulation plain(small(method));
+  ContactSnapshot now;
+  ContactSnapshot without;
+  for (HapticSimulation* each : {&simulation, &plain}) {
+    each->prepare(device_at(0, around(0)));
+    each->solve(device_at(0, around(0)), 0, each == &plain ? without : now);
+  }
+  CHECK(now.friction == 0.3);
+  const ContactSnapshot first = now;
+  const auto model = make_force_model(ForceModelKind::tangent, simulation.tool());
+  model->solved(first);
+  double peak = 0;
+  double worst = 0;
+  double apart = 0; // from the force without friction
+  double work = 0;  // of the hand, J
+  Vector3 last_place = around(0);
+  Vector3 last_force = first.force;
+  for (std::uint64_t tick = 1; tick <= 800; ++tick) {
+    const DeviceState device = device_at(tick, around(tick));
+    const ModelForce force = model->at(tool_pose(simulation.tool(), device), device.time);
+    if (tick > 400) // the second time around the contact has come to a cycle
+      work -= 0.5 * (force.force + last_force).dot(device.position - last_place);
+    last_place = device.position;
+    last_force = force.force;
+    simulation.solve(device, 0, now); // friction remembers its way: solved at every tick too
+    if (tick % 20 != 0)
+      continue;
+    plain.solve(device, 0, without);
+    REQUIRE_FALSE(now.resprinkled);
+    peak = std::max(peak, now.force.norm());
+    worst = std::max(worst, (now.force - force.force).norm());
+    apart = std::max(apart, (now.force - without.force).norm());
+  }
+  CHECK(peak > 0.05);
+  CHECK(worst < bound * peak);
+  CHECK(apart > 0.1 * peak);
+  CHECK(work > 1e-6);
+}
+
 TEST_CASE("The tangent model follows onset and loss of contact") {
   HapticSimulation simulation(small("galerkin"));
   const auto height = [](double depth) { return Vector3(0, 0, 0.03 - depth); };
@@ -179,7 +222,7 @@ TEST_CASE("The linear model goes on along the line through the last two solves, 
 
 TEST_CASE("A tick allocates nothing, with or without a new solve, in every model") {
   const auto kind = GENERATE(ForceModelKind::hold, ForceModelKind::linear_in_time, ForceModelKind::tangent);
-  const auto condition = GENERATE(as<std::string>(), "frictionless", "bonded");
+  const auto condition = GENERATE(as<std::string>(), "frictionless", "frictional", "bonded");
   HapticSimulation simulation(small("galerkin", condition));
   simulation.prepare(device_at(0, around(0)));
   std::array<ContactSnapshot, 2> snapshots;

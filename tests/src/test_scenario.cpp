@@ -62,6 +62,13 @@ TEST_CASE("A scenario is read with its values and the documented defaults") {
   CHECK_FALSE(scenario.output.figures);
 }
 
+TEST_CASE("Friction of the tool is read, with 0.3 where only the condition is given") {
+  const Scenario said = read(small_scenario + "[contact]\ncondition = \"frictional\"\n");
+  CHECK(said.contact.condition == solvers::ContactCondition::frictional);
+  CHECK(said.contact.friction == 0.3);
+  CHECK(read(small_scenario + "[contact]\ncondition = \"frictional\"\nfriction = 0.15\n").contact.friction == 0.15);
+}
+
 TEST_CASE("Fixed regions hold the points inside them") {
   const Scenario scenario = read(small_scenario + R"(
 [[fixed]]
@@ -117,6 +124,10 @@ TEST_CASE("Every offence of a scenario names file, line, key, value and what is 
       {"step = 0.25\n",
        "step = 0.25\npath = [{time = 0, position = [0,0,1]}, {time = 1, position = [0,0,0]}]\n",
        {":18:", "both approach and path", "one of the two"}},
+      {"[output]", "[contact]\nfriction = 0.2\n[output]", {":28:", "contact.friction", "condition = frictional"}},
+      {"[output]",
+       "[contact]\ncondition = \"frictional\"\nfriction = -0.1\n[output]",
+       {":29:", "contact.friction", "-0.1", "0 <= value <= 2"}},
       {"title = \"small\"", "title = \"small\"\ngravity = 3", {":2:", "gravity = 3: must be a table"}},
   };
   for (const Case& c : cases) {
