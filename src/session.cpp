@@ -57,7 +57,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
   if (!touch_ && !cuts())
     return;
   if (touch_)
-    zone_contact_ = centre_of(touch_->contact, touch_->pose);
+    zone_contact_ = first_zone_ = centre_of(touch_->contact, touch_->pose);
   lay_out_zone();
   sprinkle(nullptr, model_);
   static_cast<void>(fixed_nodes(scenario_, *organ_.domain, model_.sprinkling.nodes));
@@ -185,11 +185,26 @@ bool Session::must_follow(const topology::SurfaceContact& contact) const {
   return away > scenario_.contact.follow_fraction * zone_.spacing.radius;
 }
 
+// Centres of the fine zone lie on a lattice about the first one, as far apart as the contact may leave a centre. So the
+// zone goes through the same places, with the same nodes, however often the way is looked at: a session that solves now
+// and then has the body of one that solves all the time. A flat punch wants its rings where it is.
+topology::SurfaceContact Session::next_zone(const topology::SurfaceContact& contact) const {
+  if (std::holds_alternative<topology::FlatPunch>(scenario_.tool->shape))
+    return contact;
+  const double pitch = scenario_.contact.follow_fraction * zone_.spacing.radius;
+  const Vector3 cell = ((contact.point - first_zone_->point) / pitch).array().round();
+  topology::SurfaceContact zone = contact;
+  zone.point = organ_.domain->closest_surface_point(first_zone_->point + pitch * cell);
+  zone.normal = organ_.domain->normal(zone.point);
+  const bool near = (zone.point - contact.point).norm() < 0.9 * pitch && zone.normal.dot(contact.normal) > 0.5;
+  return near ? zone : contact;
+}
+
 void Session::follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result) {
   const Vector3 before = model_.state->tool.tool_force;
   say_(fmt::format("the fine zone follows the tool, t = {:g} s", sample.time));
-  zone_contact_ = centre;
-  zone_.spacing.centres = {centre.point};
+  zone_contact_ = next_zone(centre);
+  zone_.spacing.centres = {zone_contact_->point};
   BodyModel next;
   next.incision = model_.incision;
   sprinkle(&model_.sprinkling.nodes, next);

@@ -138,6 +138,7 @@ class Session {
   [[nodiscard]] topology::SurfaceContact centre_of(const topology::SurfaceContact& contact,
                                                    const topology::ToolPose& pose) const;
   [[nodiscard]] bool must_follow(const topology::SurfaceContact& contact) const;
+  [[nodiscard]] topology::SurfaceContact next_zone(const topology::SurfaceContact& contact) const;
   void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
   [[nodiscard]] solvers::SprinkleOptions sprinkle_options(const BodyModel& model) const;
   void sprinkle(const solvers::NodeCloud* previous, BodyModel& model);
@@ -225,6 +226,7 @@ class Session {
   std::vector<std::array<Vector3, 2>> tracks_; // of the blade, where fine nodes belong
   std::vector<StepSample> steps_;
   std::optional<topology::SurfaceContact> zone_contact_; // centre of the fine zone; empty: no tool touches
+  std::optional<topology::SurfaceContact> first_zone_;   // the first of these
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
   BodyModel model_;
   std::unique_ptr<BladeForce> blade_force_;     // null: nothing resists the blade

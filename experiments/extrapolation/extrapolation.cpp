@@ -1,7 +1,7 @@
-// Problem:   a ball presses, taps, slides and swings on a block, and swings on one while a blade cuts into its side.
-// The
-//            body is solved 30, 100 and 300 times a second, each solve taking the whole interval; between, the force is
-//            held, extrapolated in time (the paper), or taken from the condensed contact at every tick.
+// Problem:   a ball presses, taps, slides with and without friction, and swings on a block, and swings on one while a
+//            blade cuts into its side. The body is solved 30, 100 and 300 times a second, each solve taking the whole
+//            interval; between, the force is held, extrapolated in time (the paper), or taken from the condensed
+//            contact at every tick.
 // Reference: the body solved at every tick of 1 ms.
 // Command:   spherecut experiment run extrapolation --out DIR
 #include "experiments/registered.hpp"

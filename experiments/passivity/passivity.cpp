@@ -35,7 +35,7 @@ double modulus(double wanted) {
 }
 
 Outcome run_hand(Method method, double wanted, bool controlled) {
-  HapticMotion motion{"hand", 1.5, {}, false};
+  HapticMotion motion{"hand", 1.5, {}};
   const double top = 0.030;
   const auto pose = [&](double time, double height) {
     return app::PathPose{time, Vector3(0, 0, top + height), Eigen::Quaterniond::Identity()};

@@ -19,7 +19,7 @@ double ease(double t) {
 }
 
 HapticMotion motion_of(const std::string& name, double duration, const std::function<Vector3(double)>& below) {
-  HapticMotion motion{name, duration, {}, false};
+  HapticMotion motion{name, duration, {}};
   const int samples = static_cast<int>(std::lround(duration / sample));
   for (int i = 0; i <= samples; ++i)
     motion.path.push_back({i * sample, Vector3(0, 0, top) + below(i * sample), Eigen::Quaterniond::Identity()});
@@ -47,6 +47,9 @@ std::vector<HapticMotion> haptic_motions() {
   motions.push_back(motion_of("slide", 0.9, [](double t) {
     return Vector3(-0.008 + 0.016 * ease((t - 0.1) / 0.5), 0.001 * std::sin(20 * t), entered(t, 0.003));
   }));
+  motions.push_back(motions.back());
+  motions.back().name = "drag";
+  motions.back().friction = 0.3;
   motions.push_back(motion_of("sine", 1.6, [](double t) { // frequency rises from 1 to 5 Hz; 3.2 mm at 5 Hz are 0.1 m/s
     const double s = std::max(0.0, t - 0.1);
     const double phase = 2 * pi * (s + 0.5 * 4 * s * s / 1.5);
@@ -73,6 +76,10 @@ app::Scenario haptic_block(const HapticMotion& motion, solvers::Method method) {
   for (const app::PathPose& pose : motion.path)
     path.push_back({pose.time, pose.position});
   tool.motion = path;
+  if (motion.friction > 0) {
+    scenario.contact.condition = solvers::ContactCondition::frictional;
+    scenario.contact.friction = motion.friction;
+  }
   if (motion.cut) { // an upright edge, 10 mm deep, comes in from the side of the block at 10 mm/s
     app::BladeSettings& blade = scenario.blade.emplace();
     blade.edge = {{0, 0, 0}, {0, 0, 0.014}};

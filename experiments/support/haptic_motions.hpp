@@ -14,11 +14,13 @@ struct HapticMotion {
   double duration = 1;             // s
   std::vector<app::PathPose> path; // of the ball's lowest point
   bool cut = false;
+  double friction = 0; // coefficient; 0: the ball slides freely
 };
 
 /// press: 4 mm deep in 0.4 s and out. tap: three times in and out of contact at 0.1 m/s. slide: 3 mm deep, 16 mm along
-/// the surface at up to 50 mm/s. sine: 1 to 5 Hz about 3.5 mm of depth, up to 0.1 m/s. cut: 4 Hz about 2.5 mm of depth
-/// while a blade cuts into a side of the block at 10 mm/s; it is the first.
+/// the surface at up to 50 mm/s. drag: the same with a coefficient of friction of 0.3. sine: 1 to 5 Hz about 3.5 mm of
+/// depth, up to 0.1 m/s. cut: 4 Hz about 2.5 mm of depth while a blade cuts into a side of the block at 10 mm/s; it is
+/// the first.
 std::vector<HapticMotion> haptic_motions();
 
 /// A ball of 10 mm radius on a block of 60 x 60 x 30 mm with E = 10 kPa on its base, about 300 nodes; nu = 0.3.
