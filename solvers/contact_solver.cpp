@@ -284,10 +284,8 @@ void press_bonded(const ContactPatch& patch, const PressingTool& tool, const Con
   }
 }
 
-} // namespace
-
-ContactPatch condense(const Discretisation& body, const std::vector<int>& candidates,
-                      const std::optional<HalfSpaceCoupling>& coupling) {
+/// A patch with all but its compliance and fields.
+ContactPatch bare_patch(const Discretisation& body, const std::vector<int>& candidates) {
   const Problem& problem = body.problem();
   if (candidates.empty())
     throw InputError("no candidate contact nodes: the tool's patch holds no surface node");
@@ -306,6 +304,28 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
     patch.spacings.push_back(problem.nodes.spacings[node]);
   }
   patch.base = body.solve();
+  patch.base_displacement = body.contact_displacements(candidates, {patch.base}).col(0);
+  return patch;
+}
+
+} // namespace
+
+ContactPatch condense_without_fields(const Discretisation& body, const std::vector<int>& candidates) {
+  ContactPatch patch = bare_patch(body, candidates);
+  patch.compliance = body.contact_compliance(candidates);
+  return patch;
+}
+
+void extend_responses(const Discretisation& body, int nodes, ContactPatch& patch) {
+  const auto first = patch.nodes.begin() + std::ssize(patch.responses) / 3;
+  const auto last = first + std::min<std::ptrdiff_t>(nodes, patch.nodes.end() - first);
+  for (Field& field : body.force_responses({first, last}))
+    patch.responses.push_back(std::move(field));
+}
+
+ContactPatch condense(const Discretisation& body, const std::vector<int>& candidates,
+                      const std::optional<HalfSpaceCoupling>& coupling) {
+  ContactPatch patch = bare_patch(body, candidates);
   patch.responses = body.force_responses(candidates);
   if (coupling) {
     // The far boundary moves as the half-space would under the tool's force: u_far = sum_a F_a B_a, F the sum of all
@@ -313,14 +333,13 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<Vector3> values;
       for (const Vector3& point : body.constraint_points())
-        values.push_back(
-            half_space_displacement(problem.material, Vector3::Unit(axis), coupling->origin, coupling->inward, point));
+        values.push_back(half_space_displacement(body.problem().material, Vector3::Unit(axis), coupling->origin,
+                                                 coupling->inward, point));
       const Field far = body.prescribed_response(values);
       for (std::size_t c = 0; c < candidates.size(); ++c)
         patch.responses[3 * c + axis].add(1, far);
     }
   }
-  patch.base_displacement = body.contact_displacements(candidates, {patch.base}).col(0);
   patch.compliance = body.contact_displacements(candidates, patch.responses);
   return patch;
 }
@@ -404,7 +423,26 @@ ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& di
   return state;
 }
 
+Field deform(const Discretisation& body, const ContactPatch& patch, const ContactState& state) {
+  if (std::ssize(patch.responses) == 3 * std::ssize(patch.nodes))
+    return deform(patch, state);
+  Field field = patch.base;
+  std::vector<int> nodes;
+  std::vector<Vector3> forces;
+  for (int c = 0; c < size_of(patch); ++c)
+    if (!state.nodal_forces[c].isZero(0)) {
+      nodes.push_back(patch.nodes[c]);
+      forces.push_back(state.nodal_forces[c]);
+    }
+  if (!nodes.empty())
+    field.add(1, body.force_response(nodes, forces));
+  return field;
+}
+
 Field deform(const ContactPatch& patch, const ContactState& state) {
+  if (std::ssize(patch.responses) != 3 * std::ssize(patch.nodes))
+    throw InputError(fmt::format("a patch of {} candidates with {} fields of unit forces; allowed: three each",
+                                 patch.nodes.size(), patch.responses.size()));
   Field field = patch.base;
   for (int c = 0; c < size_of(patch); ++c)
     for (int axis = 0; axis < 3; ++axis)

@@ -22,13 +22,20 @@ struct ContactPatch {
   std::vector<Vector3> normals; // outward surface normals
   MatrixX compliance;           // 3m x 3m, m/N
   VectorX base_displacement;    // 3m, m: displacement without tool
-  std::vector<Field> responses; // 3m fields for unit forces (with the far field of the coupling included)
+  std::vector<Field> responses; // 3m fields for unit forces (with the far field of the coupling included), or fewer
   Field base;                   // field without tool
 };
 
 /// Condenses the discretisation onto the candidates [De 2001, Eq. 5 and after, in compliance form].
 ContactPatch condense(const Discretisation& body, const std::vector<int>& candidates,
                       const std::optional<HalfSpaceCoupling>& coupling = std::nullopt);
+
+/// The same without the fields of the unit forces, which most of the time goes into: for a body that the next cut
+/// changes before many a press. deform() then takes a solution each; extend_responses() makes the fields by and by.
+ContactPatch condense_without_fields(const Discretisation& body, const std::vector<int>& candidates);
+
+/// Fields of the next `nodes` candidates of a patch that lacks some.
+void extend_responses(const Discretisation& body, int nodes, ContactPatch& patch);
 
 enum class ContactCondition { frictionless, frictional, bonded };
 
@@ -82,7 +89,9 @@ std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState
 /// Nodes of the patch with given displacements (bonded cap): solves for their forces.
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements);
 
-/// Field of the body for given nodal forces on the patch.
+/// Field of the body for given nodal forces on the patch, by its fields, or by a solution where it lacks them.
+Field deform(const Discretisation& body, const ContactPatch& patch, const ContactState& state);
+/// Of a patch with all its fields; throws InputError where it lacks some.
 Field deform(const ContactPatch& patch, const ContactState& state);
 
 } // namespace spherecut::solvers

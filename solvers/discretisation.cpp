@@ -16,6 +16,19 @@ void Field::add(double factor, const Field& other) {
   prescribed += factor * other.prescribed;
 }
 
+Field Discretisation::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
+  const std::vector<Field> units = force_responses(nodes);
+  Field sum = units.front();
+  sum.add(forces.front().x() - 1, units.front());
+  for (std::size_t k = 1; k < units.size(); ++k)
+    sum.add(forces[k / 3][static_cast<Eigen::Index>(k % 3)], units[k]);
+  return sum;
+}
+
+MatrixX Discretisation::contact_compliance(const std::vector<int>& candidates) const {
+  return contact_displacements(candidates, force_responses(candidates));
+}
+
 std::vector<Field> Discretisation::pattern_responses(const std::vector<ForcePattern>&) const {
   throw InputError(fmt::format("method {} has no forces in newtons to spread over points", to_string(method())));
 }

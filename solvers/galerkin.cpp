@@ -75,11 +75,26 @@ class Galerkin final : public ElasticBody {
   double load_work(const Field& field) const override { return field.load_factor * loads_.dot(field.coefficients); }
 
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
-    MatrixX right = MatrixX::Zero(report_.unknowns, 3 * static_cast<Eigen::Index>(candidates.size()));
-    for (std::size_t c = 0; c < candidates.size(); ++c)
-      for (int axis = 0; axis < 3; ++axis)
-        add_force(contact_mean(candidates[c]), Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
-    return fields_of(solve_ordered(right));
+    return fields_of(solve_ordered(unit_forces(candidates)));
+  }
+
+  Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const override {
+    MatrixX right = MatrixX::Zero(report_.unknowns, 1);
+    for (std::size_t c = 0; c < nodes.size(); ++c)
+      add_force(contact_mean(nodes[c]), forces[c], right.col(0));
+    return fields_of(solve_ordered(right)).front();
+  }
+
+  // B^T A^-1 B = (L^-1 B)^T (L^-1 B): half the way of a solution.
+  MatrixX contact_compliance(const std::vector<int>& candidates) const override {
+    MatrixX right = unit_forces(candidates);
+    clear_dropped(right);
+    const MatrixX half = factorisation_->forward(ordered(right));
+    MatrixX compliance(half.cols(), half.cols());
+    compliance.setZero();
+    compliance.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose());
+    compliance.triangularView<Eigen::StrictlyUpper>() = compliance.transpose();
+    return compliance;
   }
 
   std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override {
@@ -136,6 +151,14 @@ class Galerkin final : public ElasticBody {
     for (Eigen::Index i = 0; i < std::ssize(rank_); ++i)
       by_node.middleRows<3>(3 * i) = by_rank.middleRows<3>(3 * static_cast<Eigen::Index>(rank_[i]));
     return by_node;
+  }
+  /// One column per unit force along x, y, z on every candidate.
+  [[nodiscard]] MatrixX unit_forces(const std::vector<int>& candidates) const {
+    MatrixX right = MatrixX::Zero(report_.unknowns, 3 * static_cast<Eigen::Index>(candidates.size()));
+    for (std::size_t c = 0; c < candidates.size(); ++c)
+      for (int axis = 0; axis < 3; ++axis)
+        add_force(contact_mean(candidates[c]), Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
+    return right;
   }
   [[nodiscard]] MatrixX solve_ordered(MatrixX right) const {
     clear_dropped(right);
@@ -227,7 +250,7 @@ class Galerkin final : public ElasticBody {
   SparseMatrix stiffness_;                      // lower triangle (diagonal blocks full), in ranks
   std::vector<double> elastic_;                 // entries of stiffness_ without the penalties of the prescribed means
   VectorX loads_;
-  std::unique_ptr<Factorisation> factorisation_;
+  std::unique_ptr<OrderedCholesky> factorisation_;
 };
 
 void Galerkin::evaluate_cells() {

@@ -191,14 +191,54 @@ std::vector<Field> GrowingBody::responses_to(const MatrixX& forces) const {
   return responses;
 }
 
-std::vector<Field> GrowingBody::force_responses(const std::vector<int>& candidates) const {
-  MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), 3 * std::ssize(candidates));
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    const DisplacementMean& mean = cut_->mean(id_[candidates[c]]);
+MatrixX GrowingBody::unit_forces(const std::vector<int>& nodes) const {
+  MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), 3 * std::ssize(nodes));
+  for (std::size_t c = 0; c < nodes.size(); ++c) {
+    const DisplacementMean& mean = cut_->mean(id_[nodes[c]]);
     for (int axis = 0; axis < 3; ++axis)
       add_force(mean, Vector3::Unit(axis), right.col(3 * static_cast<Eigen::Index>(c) + axis));
   }
-  return responses_to(right);
+  return right;
+}
+
+std::vector<Field> GrowingBody::force_responses(const std::vector<int>& candidates) const {
+  return responses_to(unit_forces(candidates));
+}
+
+Field GrowingBody::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
+  MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), 1);
+  for (std::size_t c = 0; c < nodes.size(); ++c)
+    add_force(cut_->mean(id_[nodes[c]]), forces[c], right.col(0));
+  return responses_to(right).front();
+}
+
+MatrixX GrowingBody::contact_compliance(const std::vector<int>& candidates) const {
+  const std::vector<int>& known = cut_->candidates();
+  std::vector<int> place(compact_.size(), -1); // of a node the system knows, in its compliance
+  for (int k = 0; k < std::ssize(known); ++k)
+    place[known[k]] = k;
+  std::vector<int> others;
+  for (const int node : candidates)
+    if (place[id_[node]] < 0)
+      others.push_back(node);
+  MatrixX columns;
+  if (!others.empty())
+    columns = contact_displacements(candidates, responses_to(unit_forces(others)));
+  const auto count = std::ssize(candidates);
+  MatrixX compliance(3 * count, 3 * count);
+  Eigen::Index next = 0;
+  for (Eigen::Index d = 0; d < count; ++d) {
+    const int there = place[id_[candidates[d]]];
+    if (there >= 0) {
+      for (Eigen::Index c = 0; c < count; ++c)
+        if (const int here = place[id_[candidates[c]]]; here >= 0)
+          compliance.block<3, 3>(3 * c, 3 * d) = cut_->compliance().block<3, 3>(3 * here, 3 * there);
+      continue;
+    }
+    compliance.middleCols<3>(3 * d) = columns.middleCols<3>(3 * next++);
+    compliance.middleRows<3>(3 * d) = compliance.middleCols<3>(3 * d).transpose();
+  }
+  return compliance;
 }
 
 std::vector<Field> GrowingBody::pattern_responses(const std::vector<ForcePattern>& patterns) const {

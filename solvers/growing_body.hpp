@@ -35,6 +35,9 @@ class GrowingBody final : public Discretisation {
   [[nodiscard]] Field solve() const override;
   [[nodiscard]] double load_work(const Field& field) const override;
   [[nodiscard]] std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
+  [[nodiscard]] Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const override;
+  /// That of the candidates in GrowthOptions::contact is there after every increment; others cost a solution each.
+  [[nodiscard]] MatrixX contact_compliance(const std::vector<int>& candidates) const override;
   [[nodiscard]] std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;
   [[nodiscard]] MatrixX pattern_displacements(const std::vector<ForcePattern>& patterns,
                                               const std::vector<Field>& fields) const override;
@@ -61,6 +64,7 @@ class GrowingBody final : public Discretisation {
   [[nodiscard]] Vector3 constraint_force(std::size_t k, const VectorX& coefficients, const VectorX& prescribed) const;
   [[nodiscard]] VectorX holding_forces(const VectorX& coefficients, const VectorX& prescribed) const;
   [[nodiscard]] std::vector<Field> responses_to(const MatrixX& forces) const;
+  [[nodiscard]] MatrixX unit_forces(const std::vector<int>& nodes) const;
 
   Problem problem_;
   AssemblyReport report_;

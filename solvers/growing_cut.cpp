@@ -654,6 +654,9 @@ bool GrowingCut::is_anchored(int node) const {
   return std::any_of(state_->anchors.begin(), state_->anchors.end(),
                      [&](const Anchor& anchor) { return anchor.node == node; });
 }
+const std::vector<int>& GrowingCut::candidates() const {
+  return state_->options.contact;
+}
 const VectorX& GrowingCut::external_loads() const {
   return state_->external;
 }

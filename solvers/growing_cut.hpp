@@ -81,6 +81,7 @@ class GrowingCut {
 
   /// Displacement of the candidates (3 each, m) per unit force on them, m/N; and under the loads alone.
   [[nodiscard]] const MatrixX& compliance() const;
+  [[nodiscard]] const std::vector<int>& candidates() const;
   [[nodiscard]] const VectorX& base_displacement() const;
 
   /// Nodal coefficients (3N, zero for removed nodes) under the loads and the given forces on the candidates, N.

@@ -261,7 +261,10 @@ LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& p
   lips.base_opening = openings(body, pairs, lips.modes, {tool != nullptr ? tool->base : body.solve()}).col(0);
   if (tool != nullptr) {
     lips.tool_of_lips = body.contact_displacements(tool->nodes, lips.responses);
-    lips.lips_of_tool = openings(body, pairs, lips.modes, tool->responses);
+    // A symmetric body opens its lips under a force on a node as it moves the node under that force between the lips.
+    lips.lips_of_tool = std::ssize(tool->responses) < 3 * std::ssize(tool->nodes) && body.method() == Method::galerkin
+                            ? MatrixX(lips.tool_of_lips.transpose())
+                            : openings(body, pairs, lips.modes, tool->responses);
   }
   if (!lips.compliance.allFinite())
     throw NumericalError(fmt::format("the compliance of {} lip pairs is not finite", pairs.size()));
@@ -316,6 +319,11 @@ Field deform(const Field& base, const LipPatch& lips, const LipState& state) {
     if (state.forces[k] != 0)
       field.add(state.forces[k], lips.responses[k]);
   return field;
+}
+
+Field deform(const Discretisation& body, const ContactPatch& patch, const LipPatch& lips,
+             const CutContactState& state) {
+  return deform(deform(body, patch, state.tool), lips, state.lips);
 }
 
 Field deform(const ContactPatch& patch, const LipPatch& lips, const CutContactState& state) {

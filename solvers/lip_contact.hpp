@@ -80,6 +80,7 @@ CutContactState prescribe(const ContactPatch& patch, const LipPatch& lips, const
                           double tolerance = 1e-9);
 
 /// Field of the body for the given state; without tool `patch` is null and `base` the body's own solution.
+Field deform(const Discretisation& body, const ContactPatch& patch, const LipPatch& lips, const CutContactState& state);
 Field deform(const ContactPatch& patch, const LipPatch& lips, const CutContactState& state);
 Field deform(const Field& base, const LipPatch& lips, const LipState& state);
 

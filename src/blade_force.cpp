@@ -56,7 +56,7 @@ VectorX openings(const BodyModel& body, const solvers::Field& field) {
 /// The body under its loads and its tool: lips that the blade brings together are in its own contact.
 solvers::Field without_lips(const BodyModel& body) {
   const bool tool = body.state && !body.patch.nodes.empty();
-  return tool ? solvers::deform(body.patch, body.state->tool) : body.base;
+  return tool ? solvers::deform(*body.body, body.patch, body.state->tool) : body.base;
 }
 
 } // namespace

@@ -230,14 +230,17 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
   return growth;
 }
 
-void condense(const std::vector<int>& candidates, BodyModel& model) {
+void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
   model.lips.reset();
   model.state.reset();
+  model.presses = 0;
   if (candidates.empty()) {
     model.patch = {};
     model.base = model.body->solve();
   } else {
-    model.patch = solvers::condense(*model.body, candidates);
+    model.patch = for_few_presses && model.body->method() == solvers::Method::galerkin
+                      ? solvers::condense_without_fields(*model.body, candidates)
+                      : solvers::condense(*model.body, candidates);
     model.base = model.patch.base;
   }
 }
@@ -271,7 +274,7 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
                        : solvers::press(model.patch, tool->shape, *pose, options, previous ? &previous->tool : nullptr);
     if (in_reach && grasped != nullptr)
       bond(*grasped, *pose, state.tool);
-    model.field = in_reach ? solvers::deform(model.patch, state.tool) : model.base;
+    model.field = in_reach ? solvers::deform(*model.body, model.patch, state.tool) : model.base;
     const std::vector<double> openings = normal_openings(model);
     const bool apart =
         std::all_of(openings.begin(), openings.end(), [](double opening) { return opening >= -lip_tolerance; });
@@ -290,7 +293,7 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
                 : solvers::press(model.patch, *model.lips, tool->shape, *pose, options, goes_on ? previous : nullptr);
     if (grasped != nullptr)
       bond(*grasped, *pose, state.tool);
-    model.field = solvers::deform(model.patch, *model.lips, state);
+    model.field = solvers::deform(*model.body, model.patch, *model.lips, state);
   } else {
     state.lips = solvers::close_lips(*model.lips, model.lips->base_opening, lip_tolerance,
                                      previous ? previous->lips.closed : std::vector<char>{});

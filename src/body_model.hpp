@@ -25,6 +25,7 @@ struct BodyModel {
   int added_nodes = 0;                           // by updates since then
   solvers::Field base;                           // without tool and contact
   solvers::ContactPatch patch;                   // no nodes: the tool is far
+  int presses = 0;                               // since it was condensed
   std::optional<solvers::LipPatch> lips;         // empty: no pair has had to be held yet
   std::optional<solvers::CutContactState> state; // empty: not solved yet
   solvers::Field field;                          // solution
@@ -79,8 +80,12 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
                                const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
                                BodyModel& after, bool only_update = false);
 
-/// Condenses the model onto tool candidates; none: the tool is far. Forgets the state.
-void condense(const std::vector<int>& candidates, BodyModel& model);
+/// Condenses the model onto tool candidates; none: the tool is far. Forgets the state. `for_few_presses`: without the
+/// fields of the patch where the method can do without (contact_solver.hpp).
+void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
+
+/// Presses on a patch without fields after which they are made, a few candidates a press.
+inline constexpr int few_presses = 20;
 
 /// Solves for tool and lips in contact; `tool` null: the tool is far, and candidates there are none. Starts from the
 /// model's state where it has one. With `grasped`, one displacement (m) a node of the patch, the tool does not press:

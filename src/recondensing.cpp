@@ -41,7 +41,7 @@ struct Recondensing::State {
 
   void condense(const std::vector<int>& candidates) {
     if (!candidates.empty()) {
-      made.patch = solvers::condense(*made.body, candidates);
+      made.patch = solvers::condense_without_fields(*made.body, candidates);
       return;
     }
     made.patch = {};

@@ -19,6 +19,7 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
+constexpr int candidates_a_press = 4;       // whose fields are made beside a press
 constexpr double crowded_by_sheet = 0.3;    // of the fine spacing: nearer to a sheet no node of a grasp is put
 
 Organ timed_organ(const OrganSettings& settings, double& seconds) {
@@ -294,9 +295,9 @@ void Session::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead,
                    model.body->problem().prescribed.size()));
 }
 
-void Session::condense(const std::vector<int>& candidates, BodyModel& model) {
+void Session::condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
   const StageTimer timer(profile_.condense);
-  app::condense(candidates, model);
+  app::condense(candidates, model, for_few_presses);
 }
 
 void Session::solve(const StepSample& sample, BodyModel& model) {
@@ -317,6 +318,10 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
     }
     if (model.patch.nodes.empty())
       return;
+    // A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
+    if (force_only_ && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
+        ++model.presses > few_presses)
+      solvers::extend_responses(*model.body, candidates_a_press, model.patch);
     const std::vector<int> missed = penetrated_outside_patch(*pose, model);
     if (missed.empty())
       return;

@@ -146,7 +146,7 @@ class Session {
   [[nodiscard]] bool tool_in_reach() const;
   void build(BodyModel& model);
   void assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near);
-  void condense(const std::vector<int>& candidates, BodyModel& model);
+  void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
   void solve(const StepSample& sample, BodyModel& model);
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
   bool move_blade(const StepSample& sample, CutReport& report);

@@ -118,7 +118,7 @@ void Session::build_cut(const StepSample& sample, const topology::RestMap& to_re
   report.seconds.solve = next.body->report().factor_seconds;
   report.seconds.assembly -= report.seconds.visibility + report.seconds.solve;
   const StageTimer timer(report.seconds.solve);
-  condense(near, next);
+  condense(near, next, true);
 }
 
 void Session::lift_blade() {
@@ -229,7 +229,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     drop_recondensing();
     app::assemble(scenario_, organ_.domain, model_);
   } else if (model_.body.get() != body) { // another took over before that
-    condense(std::vector<int>(model_.patch.nodes), model_);
+    condense(std::vector<int>(model_.patch.nodes), model_, true);
   }
   return false;
 }

@@ -1,4 +1,6 @@
 #include "solvers/growing_body.hpp"
+
+#include "solvers/lip_contact.hpp"
 #include "topology/blade.hpp"
 #include "topology/cut_sheets.hpp"
 #include "topology/errors.hpp"
@@ -102,7 +104,16 @@ Vector3 sum(const std::vector<Vector3>& forces) {
 
 TEST_CASE("A body that has followed its cut is in balance and equals the body built anew") {
   Scene scene;
-  GrowingBody body(scene.problem(), scene.options());
+  GrowthOptions options = scene.options();
+  std::vector<Vector3> candidates; // on the top, ahead of the cut and far from it
+  for (int i = 0; i < scene.nodes.size() && candidates.size() < 6; ++i)
+    if (scene.nodes.kinds[i] == NodeKind::surface && scene.nodes.normals[i].z() > 0.9 &&
+        scene.nodes.positions[i].x() > 0.01) {
+      options.contact.push_back(i);
+      candidates.push_back(scene.nodes.positions[i]);
+    }
+  REQUIRE(candidates.size() == 6);
+  GrowingBody body(scene.problem(), options);
   for (int increment = 0; increment < 3; ++increment) {
     const SprinkleIncrement change = scene.grow();
     const BodyGrowth growth = body.grow(change, scene.problem());
@@ -139,6 +150,34 @@ TEST_CASE("A body that has followed its cut is in balance and equals the body bu
         CHECK((sum(body.constraint_forces(responses[axis])) + Vector3::Unit(axis)).norm() < 1e-8);
       }
       CHECK((body.contact_point(node) - ordinary->contact_point(node)).norm() < 1e-15);
+    }
+
+    // The compliance of a patch, of candidates that the system knows and of others, without the fields; and of a body
+    // built at once. Lips that meet on a patch without fields.
+    std::vector<int> patch_nodes{scene.first(NodeKind::lip)};
+    for (const Vector3& x : candidates)
+      patch_nodes.push_back(static_cast<int>(std::find(scene.nodes.positions.begin(), scene.nodes.positions.end(), x) -
+                                             scene.nodes.positions.begin()));
+    REQUIRE(*std::max_element(patch_nodes.begin(), patch_nodes.end()) < scene.nodes.size());
+    const std::vector<LipPair> pairs = lip_pairs(body.problem().nodes);
+    for (const Discretisation* each : std::vector<const Discretisation*>{&body, ordinary.get()}) {
+      const ContactPatch full = condense(*each, patch_nodes);
+      ContactPatch bare = condense_without_fields(*each, patch_nodes);
+      CHECK((bare.compliance - full.compliance).norm() < 1e-9 * full.compliance.norm());
+      ContactState pulled;
+      for (std::size_t c = 0; c < patch_nodes.size(); ++c)
+        pulled.nodal_forces.emplace_back(0.01 * static_cast<double>(c % 3), -0.02, 0.03);
+      const Field with = deform(full, pulled);
+      CHECK((deform(*each, bare, pulled).coefficients - with.coefficients).norm() < 1e-9 * with.coefficients.norm());
+      CHECK_THROWS_AS(deform(bare, pulled), InputError);
+      const MatrixX opened = condense_lips(*each, pairs, LipCondition::sticking, &full).lips_of_tool;
+      CHECK((condense_lips(*each, pairs, LipCondition::sticking, &bare).lips_of_tool - opened).norm() <
+            1e-9 * opened.norm());
+      extend_responses(*each, 2, bare);
+      CHECK(bare.responses.size() == std::min<std::size_t>(6, full.responses.size()));
+      extend_responses(*each, 1000, bare);
+      REQUIRE(bare.responses.size() == full.responses.size());
+      CHECK((deform(bare, pulled).coefficients - with.coefficients).norm() < 1e-9 * with.coefficients.norm());
     }
     std::vector<Vector3> moved(scene.problem().prescribed.size(), Vector3(1, 2, 3));
     const Field rigid = body.prescribed_response(moved);
