@@ -125,6 +125,7 @@ ModelForce TangentModel::at(const topology::ToolPose& pose, double time) noexcep
 // block is not positive definite, and the candidate that made it so has been let go.
 bool TangentModel::solve_active() noexcept {
   const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
+  const bool frictional = snapshot_->condition == solvers::ContactCondition::frictional;
   chosen_count_ = 0;
   for (int k = 0; k < near_count_; ++k) {
     const int c = near_[k];
@@ -143,7 +144,9 @@ bool TangentModel::solve_active() noexcept {
     double* column = &factor_[a * most_candidates];
     for (std::size_t b = a; b < size; ++b)
       column[b] = normal_[chosen_[b]].dot(Eigen::Map<const Vector3>(response + 3 * chosen_[b]));
-    right_[a] = -gap_[c] - normal_[c].dot(bare_[c] - snapshot_->base[c]);
+    right_[a] = -gap_[c];
+    if (frictional)
+      right_[a] -= normal_[c].dot(bare_[c] - snapshot_->base[c]);
   }
   for (std::size_t a = 0; a < size; ++a) {
     double* column = &factor_[a * most_candidates];
@@ -203,10 +206,10 @@ void TangentModel::displace() noexcept {
   const bool bonded = snapshot_->condition == solvers::ContactCondition::bonded;
   double* u = moved_[0].data(); // Vector3 is three doubles without padding
   static_assert(sizeof(Vector3) == 3 * sizeof(double));
-  if (bonded)
-    std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, moved_.begin());
-  else
+  if (snapshot_->condition == solvers::ContactCondition::frictional)
     std::copy(bare_.begin(), bare_.begin() + snapshot_->count, moved_.begin());
+  else
+    std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, moved_.begin());
   for (int a = 0; a < chosen_count_; ++a) {
     const auto c = static_cast<std::size_t>(chosen_[a]);
     double* response = &response_[c * ld];
@@ -220,8 +223,6 @@ void TangentModel::displace() noexcept {
 void TangentModel::drag_along() noexcept {
   const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
   std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, bare_.begin());
-  if (snapshot_->condition != solvers::ContactCondition::frictional)
-    return;
   for (int k = 0; k < near_count_; ++k) {
     const auto c = static_cast<std::size_t>(near_[k]);
     if (along_[c].isZero(0))
@@ -291,7 +292,8 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       if (active_[c] != 0)
         bond_[c] += solvers::tool_motion(pose_, pose, snapshot_->rest[c] + bond_[c]);
   look_around(tool);
-  drag_along();
+  if (frictional)
+    drag_along();
   ModelForce result;
   result.converged = false;
   int pivots = 0;

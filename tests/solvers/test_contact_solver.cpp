@@ -2,7 +2,7 @@
 
 #include "experiments/analytic/half_space.hpp"
 #include "solvers/half_space.hpp"
-#include "tests/support/bodies.hpp"
+#include "tests/support/pressed_block.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Dense>
@@ -17,6 +17,8 @@ using solvers::Method;
 using solvers::press;
 using tests::held_box;
 using tests::options_for;
+using tests::pressed_block;
+using tests::PressedBlock;
 using tests::top_nodes;
 using topology::FlatPunch;
 using topology::SphereTip;
@@ -27,26 +29,7 @@ namespace {
 
 const std::array<Method, 2> both{Method::collocation, Method::galerkin};
 
-/// A block of soft tissue, 6 x 6 x 3 cm, and its condensed top.
-struct Block {
-  std::unique_ptr<solvers::Discretisation> body;
-  ContactPatch patch;
-};
-
-const Block& block(Method method) {
-  static const auto make = [](Method which) {
-    Block result;
-    const solvers::Problem problem =
-        held_box({-0.03, -0.03, -0.03}, {0.03, 0.03, 0}, 0.0075, 0.2, {5e3, 0.45, 1000}, 3);
-    result.body = solvers::discretise(problem, options_for(which));
-    result.patch = solvers::condense(*result.body, top_nodes(problem));
-    return result;
-  };
-  static const Block collocation = make(Method::collocation), galerkin = make(Method::galerkin);
-  return method == Method::collocation ? collocation : galerkin;
-}
-
-Vector3 reaction(const Block& on, const ContactState& state) {
+Vector3 reaction(const PressedBlock& on, const ContactState& state) {
   Vector3 total = Vector3::Zero();
   for (const Vector3& force : on.body->constraint_forces(solvers::deform(on.patch, state)))
     total += force;
@@ -63,7 +46,7 @@ TEST_CASE("A pressed tool leaves no penetration and no tension, and its force is
   for (Method method : both)
     for (const ToolShape& tool : {ToolShape(SphereTip{0.01}), ToolShape(FlatPunch{0.012, 0.05})})
       for (const Vector3& axis : {Vector3(0, 0, 1), Vector3(0.2, -0.1, 1)}) {
-        const Block& on = block(method);
+        const PressedBlock& on = pressed_block(method);
         const ToolPose pose = topology::pose_at(tool, Vector3(0.002, -0.001, -0.003), axis);
         const ContactState state = press(on.patch, tool, pose);
         INFO(solvers::to_string(method) << ", tool " << tool.index() << ", axis " << axis.transpose());
@@ -102,10 +85,11 @@ TEST_CASE("A pressed tool leaves no penetration and no tension, and its force is
 TEST_CASE("A shallow sphere on a thick block presses about as Hertz says") {
   // Radius and depth such that the contact spans a few spacings and the block is seven contact radii wide.
   const double radius = 0.06, depth = 0.0012;
-  const solvers::Material& material = block(Method::galerkin).body->problem().material;
+  const solvers::Material& material = pressed_block(Method::galerkin).body->problem().material;
   const double exact = experiments::hertz_contact(material, radius, depth).force;
   for (Method method : both) {
-    const ContactState state = press(block(method).patch, SphereTip{radius}, {{0, 0, -depth}, Vector3::UnitZ()});
+    const ContactState state =
+        press(pressed_block(method).patch, SphereTip{radius}, {{0, 0, -depth}, Vector3::UnitZ()});
     const double ratio = state.tool_force.z() / exact;
     INFO(solvers::to_string(method) << " " << ratio);
     // The held base at 3.5 contact radii stiffens it: about 1 + 1.1 a / thickness = 1.3 by itself.
@@ -119,7 +103,8 @@ TEST_CASE("A tool that does not touch feels nothing") {
     for (ContactCondition condition : {ContactCondition::frictionless, ContactCondition::bonded}) {
       ContactOptions options;
       options.condition = condition;
-      const ContactState state = press(block(method).patch, SphereTip{0.01}, {{0, 0, 1e-4}, Vector3::UnitZ()}, options);
+      const ContactState state =
+          press(pressed_block(method).patch, SphereTip{0.01}, {{0, 0, 1e-4}, Vector3::UnitZ()}, options);
       CHECK(state.tool_force.isZero(0));
       CHECK(state.active_nodes == 0);
       CHECK(state.contact_radius == 0);
@@ -130,7 +115,7 @@ TEST_CASE("A tool that does not touch feels nothing") {
 
 TEST_CASE("Pressing on and drawing back traces one force curve, back to nothing") {
   for (Method method : both) {
-    const ContactPatch& patch = block(method).patch;
+    const ContactPatch& patch = pressed_block(method).patch;
     const SphereTip tool{0.012};
     std::vector<double> depths, forces;
     ContactState state;
@@ -157,7 +142,7 @@ TEST_CASE("Pressing on and drawing back traces one force curve, back to nothing"
 
 TEST_CASE("A bonded punch is stiffer than a frictionless one and carries its nodes along") {
   for (Method method : both) {
-    const ContactPatch& patch = block(method).patch;
+    const ContactPatch& patch = pressed_block(method).patch;
     const FlatPunch tool{0.012, 0.05};
     ContactOptions bonded;
     bonded.condition = ContactCondition::bonded;
@@ -187,7 +172,8 @@ TEST_CASE("A bonded punch is stiffer than a frictionless one and carries its nod
 TEST_CASE("A press as deep as the tip's radius converges") {
   for (Method method : both)
     for (double radius : {0.012, 0.015, 0.018}) { // a node slips off a ball of about its own spacing
-      const ContactState state = press(block(method).patch, SphereTip{radius}, {{0, 0, -radius}, Vector3::UnitZ()});
+      const ContactState state =
+          press(pressed_block(method).patch, SphereTip{radius}, {{0, 0, -radius}, Vector3::UnitZ()});
       INFO(solvers::to_string(method) << " radius " << radius);
       CHECK(state.converged);
       CHECK(state.iterations < 80); // of two sub-steps
@@ -200,7 +186,7 @@ TEST_CASE("A ball presses the same whichever way its shaft leans") {
   // Deep enough that its tangent cone matters; the shaft itself stays clear of the block.
   const Vector3 centre(0.001, 0.002, 0.0035);
   for (Method method : both) {
-    const Block& on = block(method);
+    const PressedBlock& on = pressed_block(method);
     const auto force = [&](const ToolShape& tool, const Vector3& axis) {
       const ContactState state = press(on.patch, tool, {centre - topology::tip_radius(tool) * axis, axis});
       REQUIRE(state.converged);
@@ -217,7 +203,7 @@ TEST_CASE("A ball presses the same whichever way its shaft leans") {
 
 TEST_CASE("Prescribed displacements of the patch are met and give the condensed stiffness") {
   for (Method method : both) {
-    const ContactPatch& patch = block(method).patch;
+    const ContactPatch& patch = pressed_block(method).patch;
     std::vector<Vector3> values;
     for (std::size_t c = 0; c < patch.nodes.size(); ++c)
       values.emplace_back(1e-4 * std::sin(0.1 * static_cast<double>(c)), 0, -1e-3);
@@ -305,7 +291,7 @@ TEST_CASE("A coupled far boundary follows the half-space under the tool's force"
 
 TEST_CASE("Candidates that cannot be pressed on are refused") {
   for (Method method : both) {
-    const solvers::Discretisation& body = *block(method).body;
+    const solvers::Discretisation& body = *pressed_block(method).body;
     CHECK_THROWS_AS(solvers::condense(body, {}), InputError);
     CHECK_THROWS_WITH(solvers::condense(body, {-1}), Catch::Contains("does not exist"));
     CHECK_THROWS_WITH(solvers::condense(body, {body.problem().nodes.size()}), Catch::Contains("does not exist"));

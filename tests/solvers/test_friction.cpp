@@ -2,7 +2,7 @@
 // block.
 #include "solvers/contact_solver.hpp"
 #include "solvers/friction.hpp"
-#include "tests/support/bodies.hpp"
+#include "tests/support/pressed_block.hpp"
 #include "topology/errors.hpp"
 
 #include <catch2/catch.hpp>
@@ -15,9 +15,7 @@ using solvers::ContactPatch;
 using solvers::ContactState;
 using solvers::Method;
 using solvers::press;
-using tests::held_box;
-using tests::options_for;
-using tests::top_nodes;
+using tests::pressed_block;
 using topology::SphereTip;
 using topology::ToolPose;
 
@@ -67,25 +65,6 @@ ContactPatch half_space(int n, double h, double shear_modulus, double nu) {
       patch.compliance.block<3, 3>(3 * c, 3 * d) = scale * green;
     }
   return patch;
-}
-
-struct Block {
-  std::unique_ptr<solvers::Discretisation> body;
-  ContactPatch patch;
-};
-
-const Block& block(Method method) {
-  static const auto make = [](Method which) {
-    Block result;
-    const solvers::Problem problem =
-        held_box({-0.03, -0.03, -0.03}, {0.03, 0.03, 0}, 0.0075, 0.2, {5e3, 0.45, 1000}, 3);
-    result.body = solvers::discretise(problem, options_for(which));
-    result.patch = solvers::condense(*result.body, top_nodes(problem));
-    return result;
-  };
-  static const Block collocation = make(Method::collocation);
-  static const Block galerkin = make(Method::galerkin);
-  return method == Method::collocation ? collocation : galerkin;
 }
 
 double elastic_energy(const ContactPatch& patch, const ContactState& state) {
@@ -146,7 +125,7 @@ TEST_CASE("A pressed sphere that is pushed sideways follows Cattaneo and Mindlin
 
 TEST_CASE("Without a coefficient friction changes nothing") {
   for (Method method : {Method::collocation, Method::galerkin}) {
-    const ContactPatch& patch = block(method).patch;
+    const ContactPatch& patch = pressed_block(method).patch;
     const ToolPose pose{{0.001, 0, -0.003}, Vector3::UnitZ()};
     const ContactState plain = press(patch, SphereTip{0.01}, pose);
     const ContactState none = press(patch, SphereTip{0.01}, pose, with_friction(0));
@@ -158,7 +137,7 @@ TEST_CASE("Without a coefficient friction changes nothing") {
 TEST_CASE("A tool dragged far meets friction times pressure against its way, and the same on the way back") {
   const double coefficient = 0.3;
   for (Method method : {Method::collocation, Method::galerkin}) {
-    const ContactPatch& patch = block(method).patch;
+    const ContactPatch& patch = pressed_block(method).patch;
     const SphereTip tool{0.04};
     const double depth = 0.002;
     ContactState state = press(patch, tool, {{-0.002, 0, -depth}, Vector3::UnitZ()}, with_friction(coefficient));
@@ -204,7 +183,7 @@ TEST_CASE("A tool dragged far meets friction times pressure against its way, and
 
 TEST_CASE("What sticks goes on with the tool, and a contact on other nodes goes on from its memory") {
   const double coefficient = 0.5;
-  const ContactPatch& patch = block(Method::galerkin).patch;
+  const ContactPatch& patch = pressed_block(Method::galerkin).patch;
   const SphereTip tool{0.02};
   const ContactOptions options = with_friction(coefficient);
   ContactState state = press(patch, tool, {{0, 0, -0.002}, Vector3::UnitZ()}, options);
@@ -231,5 +210,5 @@ TEST_CASE("A turned tool carries along what sticks to it; friction below 0 is re
   // A quarter turn's half about y: from (0, 0, 0.02), 1 cm up the axis, to 1 cm along the new one.
   const Vector3 way = solvers::tool_motion(from, to, Vector3(0, 0, 0.02));
   CHECK((Vector3(0, 0, 0.02) + way - (to.point + 0.01 * to.axis)).norm() < 1e-15);
-  CHECK_THROWS_AS(press(block(Method::galerkin).patch, SphereTip{0.01}, from, with_friction(-0.1)), InputError);
+  CHECK_THROWS_AS(press(pressed_block(Method::galerkin).patch, SphereTip{0.01}, from, with_friction(-0.1)), InputError);
 }
