@@ -6,25 +6,18 @@
 
 namespace spherecut::tests {
 
-/// A ball pressed 2 mm into a block of about 200 nodes. Line numbers matter to the tests.
-inline const std::string small_scenario = R"(title = "small"
-[organ]
+/// A block of 60 x 60 x 30 mm, to be held and filled with nodes.
+inline const std::string block_organ = R"([organ]
 shape = "block"
 size = [0.06, 0.06, 0.03]
 edge = 0.006
 [material]
 young_modulus = 1e4
 poisson_ratio = 0.3
-[[fixed]]
-name = "base"
-region = "box"
-lower = [-1, -1, -0.001]
-upper = [1, 1, 0.001]
-[nodes]
-fine_spacing = 0.004
-coarse_spacing = 0.012
-fine_radius = 0.006
-[tool]
+)";
+
+/// A ball that presses its top in by 2 mm.
+inline const std::string ball_tool = R"([tool]
 shape = "sphere_tip"
 radius = 0.01
 step = 0.25
@@ -33,19 +26,24 @@ target = [0, 0, 0.03]
 direction = [0, 0, -1]
 depth = 0.002
 clearance = 0.001
-[output]
+)";
+
+/// A ball pressed 2 mm into a block of about 200 nodes. Line numbers matter to the tests.
+inline const std::string small_scenario = "title = \"small\"\n" + block_organ + R"([[fixed]]
+name = "base"
+region = "box"
+lower = [-1, -1, -0.001]
+upper = [1, 1, 0.001]
+[nodes]
+fine_spacing = 0.004
+coarse_spacing = 0.012
+fine_radius = 0.006
+)" + ball_tool + R"([output]
 figures = false
 )";
 
 /// A block of 60 x 60 x 30 mm on its base with coarse nodes, without tool or cut. Line numbers matter to the tests.
-inline const std::string cut_block = R"([organ]
-shape = "block"
-size = [0.06, 0.06, 0.03]
-edge = 0.006
-[material]
-young_modulus = 1e4
-poisson_ratio = 0.3
-[[fixed]]
+inline const std::string cut_block = block_organ + R"([[fixed]]
 region = "box"
 lower = [-1, -1, -0.001]
 upper = [1, 1, 0.001]
@@ -61,6 +59,22 @@ centre = [0, 0, 0.016]
 normal = [0, 0, 1]
 radius = 0.01
 )";
+
+/// A rectangle as a precut; values as they stand in the file.
+inline std::string rectangle_precut(const std::string& centre, const std::string& normal, const std::string& up,
+                                    const std::string& width, const std::string& height) {
+  return "[[precut]]\nshape = \"rectangle\"\ncentre = " + centre + "\nnormal = " + normal + "\nup = " + up +
+         "\nwidth = " + width + "\nheight = " + height + "\n";
+}
+
+/// Everything below the level z is held.
+inline std::string held_below(const std::string& z) {
+  return "[[fixed]]\nregion = \"half_space\"\npoint = [0, 0, " + z + "]\nnormal = [0, 0, 1]\n";
+}
+
+inline std::string node_spacings(const std::string& fine, const std::string& coarse) {
+  return "[nodes]\nfine_spacing = " + fine + "\ncoarse_spacing = " + coarse + "\n";
+}
 
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const auto at = text.find(from);

@@ -46,14 +46,8 @@ centre = [0, 0, 0.015]
 normal = [0, 0, 2]
 radius = 0.01
 pressure = 100
-[[precut]]
-shape = "rectangle"
-centre = [0.01, 0, 0.02]
-normal = [1, 0, 0]
-up = [1, 0, 1]
-width = 0.02
-height = 0.01
-[[precut]]
+)" + rectangle_precut("[0.01, 0, 0.02]", "[1, 0, 0]", "[1, 0, 1]", "0.02", "0.01") +
+                                 R"([[precut]]
 shape = "polygon"
 points = [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]]
 [blade]

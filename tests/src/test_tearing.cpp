@@ -47,21 +47,9 @@ point = [0, 0, 0.0181]
 normal = [0, 0, 1]
 thickness = 0.001
 toughness = 0.4
-[[fixed]]
-region = "half_space"
-point = [0, 0, 0.001]
-normal = [0, 0, 1]
-[nodes]
-fine_spacing = 0.0032
-coarse_spacing = 0.008
-[[precut]]
-shape = "rectangle"
-centre = [-0.03, 0, 0.0181]
-normal = [0, 0, 1]
-up = [1, 0, 0]
-width = 0.03
-height = 0.04
-[tool]
+)" + held_below("0.001") +
+                         node_spacings("0.0032", "0.008") +
+                         rectangle_precut("[-0.03, 0, 0.0181]", "[0, 0, 1]", "[1, 0, 0]", "0.03", "0.04") + R"([tool]
 shape = "grasper"
 radius = 0.005
 step = 0.5
@@ -261,21 +249,8 @@ edge = 0.005
 [material]
 young_modulus = 6000.0
 poisson_ratio = 0.45
-[[fixed]]
-region = "half_space"
-point = [0, 0, 0.005]
-normal = [0, 0, 1]
-[nodes]
-fine_spacing = 0.006
-coarse_spacing = 0.02
-[[precut]]
-shape = "rectangle"
-centre = [-0.02, 0, 0.047]
-normal = [0, 0, 1]
-up = [1, 0, 0]
-width = 0.12
-height = 0.04
-)"));
+)" + held_below("0.005") + node_spacings("0.006", "0.02") +
+                              rectangle_precut("[-0.02, 0, 0.047]", "[0, 0, 1]", "[1, 0, 0]", "0.12", "0.04")));
   session.step(session.steps().front());
   const solvers::NodeCloud& nodes = session.sprinkling().nodes;
   solvers::ShapeFunctions shape;

@@ -23,15 +23,7 @@ using Json = nlohmann::json;
 namespace {
 
 /// A stretched block with a ball and a blade to hold, about 150 nodes.
-const std::string live_block = R"(title = "live"
-[organ]
-shape = "block"
-size = [0.06, 0.06, 0.03]
-edge = 0.006
-[material]
-young_modulus = 1e4
-poisson_ratio = 0.3
-pretension = [0.05, 0.0, 0.0]
+const std::string live_block = "title = \"live\"\n" + block_organ + R"(pretension = [0.05, 0.0, 0.0]
 [[fixed]]
 name = "sides"
 region = "half_space"
@@ -46,16 +38,8 @@ normal = [-1, 0, 0]
 fine_spacing = 0.007
 coarse_spacing = 0.014
 fine_radius = 0.008
-[tool]
-shape = "sphere_tip"
-radius = 0.01
-step = 0.25
-[tool.approach]
-target = [0, 0, 0.03]
-direction = [0, 0, -1]
-depth = 0.002
-clearance = 0.005
-[blade]
+)" + replaced(ball_tool, "0.001", "0.005") +
+                               R"([blade]
 edge = [[0, 0, 0], [0, 0, 0.03]]
 edge_radius = 1e-4
 [[blade.path]]
