@@ -211,12 +211,12 @@ std::vector<FrontState> directed(std::vector<FrontState> states, TearDirection r
   return states;
 }
 
-std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest,
-                                                      double smoothing) {
-  if (states.empty() || !(longest > 0) || !(smoothing > 0))
-    throw InputError(fmt::format("tearing: {} places of the front, steps of {} m, smoothing over {} m; all must be "
-                                 "positive",
-                                 states.size(), longest, smoothing));
+std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest, double smoothing,
+                                                      double slope) {
+  if (states.empty() || !(longest > 0) || !(smoothing > 0) || !(slope > 0))
+    throw InputError(fmt::format("tearing: {} places of the front, steps of {} m, smoothing over {} m, a slope of {} "
+                                 "m; all must be positive",
+                                 states.size(), longest, smoothing, slope));
   double most = 0; // G / G_c - 1
   for (const FrontState& state : states)
     most = std::max(most, state.release / state.toughness - 1);
@@ -224,7 +224,8 @@ std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> st
   lengths.reserve(states.size());
   for (const FrontState& state : states) {
     const double excess = state.release / state.toughness - 1;
-    lengths.push_back(excess < 0 ? 0 : longest * (most > 0 ? std::max(0.1, excess / most) : 1));
+    const double behind = most > 0 ? std::min(longest * (1 - excess / most), slope * (most - excess)) : 0;
+    lengths.push_back(excess < 0 ? 0 : std::max(0.1 * longest, longest - behind));
   }
   return [states = std::move(states), lengths = std::move(lengths), smoothing](const FrontFrame& frame) -> Vector3 {
     double weights = 0, length = 0, angle = 0, nearest = std::numeric_limits<double>::infinity();

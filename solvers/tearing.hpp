@@ -3,6 +3,8 @@
 
 #include "solvers/stress_intensity.hpp"
 
+#include <limits>
+
 namespace spherecut::solvers {
 
 /// Direction in which a front runs on, rad, in the plane across it: 0 ahead, positive to the + side of the sheet. The
@@ -65,7 +67,13 @@ std::vector<FrontState> directed(std::vector<FrontState> states, TearDirection r
 /// How the front moves in one step of quasi-static growth: where G >= G_c by up to `longest` m, in proportion to
 /// (G / G_c - 1) over its largest, never less than a tenth of it where G >= G_c; elsewhere not. Directions and lengths
 /// between the places are averages over about `smoothing` m. The states must not be empty.
+///
+/// The motions of places that move differ by at most `slope` m for each unit of G / G_c. A wave of length 2 pi / k and
+/// height A on a straight front changes G by k A of itself [Rice 1985], so a slope of 1 / k flattens it in one step and
+/// one beyond 2 / k makes it grow: a front that is averaged and smoothed over a spacing or so asks for slopes below
+/// some five spacings.
 std::function<Vector3(const topology::FrontFrame&)> tear_motion(std::vector<FrontState> states, double longest,
-                                                                double smoothing);
+                                                                double smoothing,
+                                                                double slope = std::numeric_limits<double>::infinity());
 
 } // namespace spherecut::solvers

@@ -14,6 +14,7 @@ namespace {
 // In units of the fine spacing:
 constexpr double averaged_over = 1.5; // length along the front over which intensities are averaged
 constexpr double smoothing = 1;       // and motions
+constexpr double slope = 2;           // by which motions differ for each unit of G / G_c, at most
 constexpr double probe = 0.5;         // so far ahead the toughness is looked at
 constexpr double met_reach = 0.3;     // nearer to another sheet a front has met it
 constexpr double overlap = 0.05;      // by which a front runs into the sheet that it meets
@@ -74,7 +75,7 @@ topology::FrontGrowth Session::grow_tear(const std::vector<solvers::FrontState>&
   const auto motion = states.empty()
                           ? std::function<Vector3(const topology::FrontFrame&)>(
                                 [&](const topology::FrontFrame& frame) -> Vector3 { return longest * frame.ahead; })
-                          : solvers::tear_motion(states, longest, smoothing * fine);
+                          : solvers::tear_motion(states, longest, smoothing * fine, slope * fine);
   const auto facing = topology::facing_fronts(incision, longest / approach);
   return topology::grow_front(
       incision,

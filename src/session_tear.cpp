@@ -13,6 +13,7 @@ namespace {
 
 // In units of the fine spacing:
 constexpr double smoothing = 1;   // length along the front over which motions are averaged
+constexpr double slope = 2;       // by which they differ for each unit of G / G_c, at most
 constexpr double bridge = 4;      // a front shorter than this, too near to the surface for intensities, gives way
 constexpr double bridge_step = 3; // by this in one increment
 // Of the longest step:
@@ -21,12 +22,26 @@ constexpr double told = 0.5;        // increments at least so long tell the deca
 constexpr double kept_drive = 0.95; // share of the G / G_c of its start that a growth keeps
 constexpr int kept_to_tell = 2;     // after so many of them: it is
 constexpr double in_balance = 1.01; // G / G_c up to which nothing moves: intensities scatter by as much
+constexpr double along = 1.1;       // while the load is followed, places so far below the largest G / G_c move with it
 
 double drive_of(const std::vector<solvers::FrontState>& states) {
   double most = 0;
   for (const solvers::FrontState& state : states)
     most = std::max(most, state.release / state.toughness);
   return most;
+}
+
+/// Mean G / G_c of the places that move while the load is followed: it is they that have to pay for the new surface.
+double drive_of_moving(const std::vector<solvers::FrontState>& states) {
+  const double most = drive_of(states);
+  double sum = 0;
+  int count = 0;
+  for (const solvers::FrontState& state : states)
+    if (const double drive = state.release / state.toughness; along * drive >= most) {
+      sum += drive;
+      ++count;
+    }
+  return count > 0 ? sum / count : 0;
 }
 
 double mean_toughness(const topology::FrontGrowth& growth, const topology::Incision& before,
@@ -198,7 +213,6 @@ StepSample loaded(const topology::ToolPose& pose, double time, const StepSample&
 /// Intensities that scatter from place to place would let one place move at a time when the load stops at the first:
 /// those within a tenth of it move along.
 std::vector<solvers::FrontState> acting(std::vector<solvers::FrontState> states, double drive) {
-  constexpr double along = 1.1;
   for (solvers::FrontState& state : states)
     state.release *= std::max(1.0, along / drive);
   return states;
@@ -260,17 +274,19 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
   int kept = 0;
   for (int number = 1;; ++number) {
     double drive = states ? drive_of(*states) : 0, ahead = drive; // now, and at the end of the step
-    if (share < 1 && (!states || drive < in_balance)) {
+    const double moving_drive = states ? drive_of_moving(*states) : 0;
+    if (share < 1 && moving_drive < in_balance) {
       const States now = states;
       solve(sample, model_);
       const States full = known_states();
       ahead = full ? drive_of(*full) : 0;
       states = now;
-      // G falls by exp(-decay way) in the increment: half of that before, half after it is in balance.
+      // G falls by exp(-decay way) in the increment: half of that before, half after those that move are in balance.
+      const double above = moving_drive > 0 ? drive / moving_drive : 1;
       if (ahead < in_balance)
         load_to(1);
       else
-        load_until(std::max(drive, std::exp(0.5 * tears_->decay * way_of(ahead))), full);
+        load_until(std::max(drive, above * std::exp(0.5 * tears_->decay * way_of(ahead))), full);
       drive = states ? drive_of(*states) : 0;
       ahead = std::max(ahead, drive);
       start = drive;
@@ -333,7 +349,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     double surplus = free - surface; // of a front that is gone, or comes about, by the energies alone
     if (!seed && !gives_way && !joins && next && !next->empty()) {
       std::vector<double> advance;
-      const auto motion = solvers::tear_motion(moving, longest, smoothing * fine);
+      const auto motion = solvers::tear_motion(moving, longest, smoothing * fine, slope * fine);
       for (const solvers::FrontState& state : *states)
         advance.push_back(motion(state.frame).norm());
       surplus = 0.5 * (mean_surplus(*states, *states, advance) + mean_surplus(*next, *states, advance)) * torn;

@@ -14,7 +14,11 @@ namespace spherecut::topology {
 
 namespace {
 
-constexpr double still = 0.02, merged = 0.35, stretched = 1.5; // in units of the edge
+// In units of the edge:
+constexpr double still = 0.02, merged = 0.35, stretched = 1.5;
+constexpr double reach_out = 0.3;    // of the ends of a front beyond the surface of the body
+constexpr double most_sideways = 2;  // in units of its own motion: farther an end is not led outwards in one row
+constexpr double least_slope = 0.15; // of the distance to the surface on the way out: less leads nowhere
 
 } // namespace
 
@@ -46,13 +50,17 @@ namespace {
 /// Grows one sheet; its border edges and the motions of their ends change row by row.
 class SheetGrowth {
  public:
-  SheetGrowth(SurfaceMesh& mesh, double edge) : mesh_(mesh), edge_(edge) {}
+  SheetGrowth(SurfaceMesh& mesh, double edge, const Domain& domain) : mesh_(mesh), edge_(edge), domain_(domain) {}
 
   /// One row: the ends of `edges` move by `motions`. The moved edges, with their motions, take their place.
   void row(std::vector<BorderEdge>& edges, std::map<int, Vector3>& motions, double share) {
     std::map<int, int> moved; // vertex to its new place; itself where it stays
     for (const auto& [vertex, motion] : motions)
       moved[vertex] = (share * motion).norm() < still * edge_ ? vertex : add(mesh_.vertices[vertex] + share * motion);
+    const std::map<int, int> ends = ends_outside(edges);
+    for (const auto& [vertex, other] : ends)
+      if (const int at = moved.at(vertex); at != vertex)
+        mesh_.vertices[at] += way_out(vertex, other, mesh_.vertices[at], share * motions.at(vertex));
     // Neighbours that have come together become one; each vertex in one such pair at most.
     std::map<int, bool> paired;
     for (const BorderEdge& edge : edges) {
@@ -60,7 +68,11 @@ class SheetGrowth {
       if (a == edge.from || b == edge.to || a == b || paired[a] || paired[b] ||
           (mesh_.vertices[a] - mesh_.vertices[b]).norm() >= merged * edge_)
         continue;
-      mesh_.vertices[a] = 0.5 * (mesh_.vertices[a] + mesh_.vertices[b]);
+      const bool keep_a = ends.contains(edge.from), keep_b = ends.contains(edge.to);
+      if (keep_a == keep_b)
+        mesh_.vertices[a] = 0.5 * (mesh_.vertices[a] + mesh_.vertices[b]);
+      else if (keep_b)
+        mesh_.vertices[a] = mesh_.vertices[b];
       b = a;
       paired[a] = true;
     }
@@ -81,6 +93,47 @@ class SheetGrowth {
   }
 
  private:
+  /// Ends of the front that lie outside the body, with the other end of their edges.
+  [[nodiscard]] std::map<int, int> ends_outside(const std::vector<BorderEdge>& edges) const {
+    std::map<int, int> uses, ends;
+    for (const BorderEdge& edge : edges) {
+      ++uses[edge.from];
+      ++uses[edge.to];
+    }
+    const auto add_end = [&](int vertex, int other) {
+      if (uses.at(vertex) == 1 && domain_.signed_distance(mesh_.vertices[vertex]) >= 0)
+        ends.emplace(vertex, other);
+    };
+    for (const BorderEdge& edge : edges) {
+      add_end(edge.from, edge.to);
+      add_end(edge.to, edge.from);
+    }
+    return ends;
+  }
+
+  /// A front that turns inwards, or a surface that opens ahead, would let an end sink into the body, and a ligament
+  /// stay along the surface: so far the end, moved to x, has to go on along the front, or else straight out, in the
+  /// plane of the growth.
+  [[nodiscard]] Vector3 way_out(int vertex, int other, const Vector3& x, const Vector3& motion) const {
+    const Vector3 along = (mesh_.vertices[vertex] - mesh_.vertices[other]).normalized(), across = along.cross(motion);
+    if (!(across.norm() > 0))
+      return Vector3::Zero();
+    const Vector3 normal = across.normalized();
+    const double most = most_sideways * motion.norm();
+    Vector3 way = Vector3::Zero();
+    for (int correction = 0; correction < 3; ++correction) {
+      const double missing = reach_out * edge_ - domain_.signed_distance(x + way);
+      if (missing <= 0)
+        break;
+      const Vector3 outward = domain_.normal(x + way), in_plane = outward - outward.dot(normal) * normal;
+      const Vector3 direction = along.dot(outward) > least_slope ? along : in_plane.normalized();
+      if (!(direction.dot(outward) > least_slope))
+        break;
+      way += std::min(missing / direction.dot(outward), most - way.norm()) * direction;
+    }
+    return way;
+  }
+
   int add(const Vector3& x) {
     mesh_.vertices.push_back(x);
     return static_cast<int>(mesh_.vertices.size()) - 1;
@@ -127,6 +180,7 @@ class SheetGrowth {
 
   SurfaceMesh& mesh_;
   double edge_;
+  const Domain& domain_;
 };
 
 } // namespace
@@ -159,7 +213,7 @@ FrontGrowth grow_front(const Incision& incision, const std::function<Vector3(con
       continue;
     const std::size_t before = mesh.triangles.size();
     const int rows = std::max(1, static_cast<int>(std::ceil(longest / edge - 1e-9)));
-    SheetGrowth sheet(mesh, edge);
+    SheetGrowth sheet(mesh, edge, *incision.domain());
     for (int row = 0; row < rows; ++row)
       sheet.row(edges, motions, 1.0 / rows);
     growth.triangles += static_cast<int>(mesh.triangles.size() - before);

@@ -23,7 +23,8 @@ struct BorderEdge {
 std::vector<BorderEdge> front_edges(const Incision& incision, int sheet);
 
 /// Moves every vertex of the front by motion(frame of the front there), m, in the rest frame. Border vertices just
-/// outside the body move with the nearest point of the front, so that the sheet goes on reaching through the surface.
+/// outside the body move with the nearest point of the front, and sideways where that would take them into the body, so
+/// that the sheet goes on reaching through the surface.
 /// New triangles have edges of about `edge` m: longer motions make several rows, vertices that come closer to one
 /// another than 0.35 edges become one, edges that stretch beyond 1.5 edges are halved. Motions under 0.02 edges count
 /// as none. Throws InputError when `edge` is not positive or a motion is not finite.

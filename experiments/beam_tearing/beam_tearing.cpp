@@ -24,7 +24,7 @@ namespace {
 
 constexpr double arm = 1, length = 10.5, thickness = 0.6, first_depth = 4; // m
 constexpr double toughness = 1, elsewhere = 4, weak_half = 0.004;          // J/m2; m
-constexpr double stride = 1.5;                                             // spacings
+constexpr double stride = 1.5, slope = 2;                                  // spacings
 const solvers::Material material{1, 0.3, 0};
 const double modulus = material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
 
@@ -93,8 +93,8 @@ Length solve_length(const TiltedStrip& strip, const std::vector<topology::Surfac
   std::vector<solvers::FrontState> acting = states;
   for (solvers::FrontState& state : acting)
     state.release *= std::pow(1 + stride * body.fine / (result.depth + 0.64 * arm), 4) * toughness / result.release;
-  result.grown =
-      topology::grow_front(incision, solvers::tear_motion(acting, stride * body.fine, body.fine), 0.5 * body.fine);
+  result.grown = topology::grow_front(
+      incision, solvers::tear_motion(acting, stride * body.fine, body.fine, slope * body.fine), 0.5 * body.fine);
   return result;
 }
 

@@ -6,8 +6,10 @@
 #include "tests/support/cut_block.hpp"
 #include "topology/errors.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 using namespace spherecut;
@@ -77,6 +79,42 @@ TEST_CASE("A front moves where the release reaches the toughness, most where it 
   CHECK(exact(states[0].frame).norm() == Approx(0.1));
   CHECK_THROWS_AS(tear_motion({}, 0.1, 1), InputError);
   CHECK_THROWS_AS(tear_motion(states, 0, 1), InputError);
+}
+
+TEST_CASE("A wavy front straightens where motions are even enough, and grows ragged where they are not", "[tearing]") {
+  // A front at x = A cos(k y) in a field without other lengths has G = G_c drive (1 - k A cos(k y)) [Rice 1985].
+  constexpr int places = 96;
+  constexpr double spacing = 1, wave = 12 * spacing, drive = 1.1, stride = 1.5 * spacing;
+  constexpr double k = 2 * std::numbers::pi / wave;
+  const auto height_after = [&](double slope, int steps) {
+    std::vector<double> x;
+    for (int i = 0; i < places; ++i)
+      x.push_back(0.02 * std::cos(k * 0.5 * spacing * i));
+    double height = 0;
+    for (int step = 0; step < steps; ++step) {
+      double cosine = 0; // Fourier component of the wave: smoothing and motion add no other of any size
+      for (int i = 0; i < places; ++i)
+        cosine += 2 * x[static_cast<std::size_t>(i)] * std::cos(k * 0.5 * spacing * i) / places;
+      std::vector<FrontState> states;
+      for (int i = 0; i < places; ++i)
+        states.push_back(state_at(0.5 * spacing * i, 2 * drive * (1 - k * cosine * std::cos(k * 0.5 * spacing * i))));
+      const auto motion = tear_motion(states, stride, spacing, slope);
+      double lowest = 1e300, highest = -1e300;
+      for (int i = 0; i < places; ++i) {
+        double& at = x[static_cast<std::size_t>(i)];
+        at += motion(states[static_cast<std::size_t>(i)].frame).x();
+        if (i < places / 4 || i >= 3 * places / 4)
+          continue; // the ends have neighbours on one side alone
+        lowest = std::min(lowest, at);
+        highest = std::max(highest, at);
+      }
+      height = 0.5 * (highest - lowest);
+    }
+    return height;
+  };
+  CHECK(height_after(2 * spacing, 6) < 0.002);
+  CHECK(height_after(std::numeric_limits<double>::infinity(), 6) > 0.1);
+  CHECK_THROWS_AS(tear_motion({state_at(0, 2)}, 0.1, 1, 0), InputError);
 }
 
 TEST_CASE("A cut that is pressed together and sticks is not driven on", "[tearing]") {

@@ -61,6 +61,39 @@ TEST_CASE("A straight front through a block moves as told and stays a sheet", "[
   }
 }
 
+TEST_CASE("A front that turns inwards goes on reaching through the surface", "[front_growth]") {
+  // Its ends would sink into the body after two steps, and a ligament along the sides would stay.
+  const auto domain = block();
+  const Vector3 up = (normal - normal.x() * Vector3::UnitX()).normalized(), sideways = up.cross(Vector3::UnitX());
+  std::vector<SurfaceMesh> sheets{
+      make_rectangle_sheet(Vector3(-0.04, 0.001, 0.002), up, Vector3::UnitX(), 0.084, 0.08, 0.004)};
+  constexpr double step = 0.004;
+  constexpr int steps = 8;
+  for (int k = 0; k < steps; ++k) {
+    const Incision incision(sheets, domain);
+    sheets = grow_front(
+                 incision,
+                 [&](const FrontFrame& f) -> Vector3 {
+                   const double inwards = f.point.dot(sideways) > 0 ? -0.4 : 0.4;
+                   return step * (Vector3::UnitX() + inwards * sideways);
+                 },
+                 0.004)
+                 .sheets;
+    CHECK_NOTHROW(check_sheet(sheets[0], "grown"));
+  }
+  const Incision grown(sheets, domain);
+  double left = 0, right = 0;
+  for (const FrontSegment& segment : grown.front())
+    for (const Vector3& x : {segment.from, segment.to}) {
+      left = std::min(left, x.y());
+      right = std::max(right, x.y());
+      CHECK(x.x() == Approx(steps * step).epsilon(0.01)); // no part of it has stayed behind
+    }
+  CHECK(left == Approx(lower.y()).epsilon(1e-3));
+  CHECK(right == Approx(upper.y()).epsilon(1e-3));
+  CHECK_FALSE(manifold_defect(cut_surface(domain->surface(), sheets).surface));
+}
+
 TEST_CASE("A buried disc grows to a larger disc", "[front_growth]") {
   const auto domain = block();
   const double radius = 0.01, step = 0.006;
