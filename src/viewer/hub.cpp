@@ -139,6 +139,7 @@ void Hub::act(int client, Client& from, const Request& request) {
     break;
   case RequestType::credit:
     from.credit = std::min(most_credit, from.credit + request.number);
+    send_frames(session_->tick()); // what waits for it need not wait for the next tick of the server
     break;
   case RequestType::take:
     take(client);

@@ -4,3 +4,8 @@ export function element<T extends HTMLElement>(id: string, kind: new () => T): T
   if (!(found instanceof kind)) throw new Error(`the document has no ${kind.name} '${id}'`);
   return found;
 }
+
+/** Says `text` there, unless it does already: words that are set anew are laid out and drawn anew. */
+export function write(target: HTMLElement, text: string): void {
+  if (target.textContent !== text) target.textContent = text;
+}

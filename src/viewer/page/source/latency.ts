@@ -1,4 +1,7 @@
-// How long it takes from a pose of the hand to the picture of the body that answers it.
+// How long it takes from a pose of the hand to the picture that answers it: to the first that knows this pose or a later
+// one. Every pose counts, also one that a later one overtook.
+
+const remembered = 600;
 
 export class Latency {
   private readonly sent = new Map<number, number>(); // pose number: ms
@@ -9,16 +12,16 @@ export class Latency {
     this.sent.set(n, now);
   }
 
-  /** A picture whose solve knew pose `n` has been drawn. */
+  /** A picture that knows pose `n` has been drawn. */
   drawn(n: number, now: number): void {
     if (n <= this.answered) return;
     this.answered = n;
-    const start = this.sent.get(n);
-    if (start !== undefined) {
+    for (const [pose, start] of this.sent) {
+      if (pose > n) continue;
       this.seconds.push((now - start) / 1000);
-      if (this.seconds.length > 200) this.seconds.shift();
+      this.sent.delete(pose);
     }
-    for (const older of this.sent.keys()) if (older <= n) this.sent.delete(older);
+    if (this.seconds.length > remembered) this.seconds.splice(0, this.seconds.length - remembered);
   }
 
   clear(): void {
@@ -27,7 +30,7 @@ export class Latency {
     this.answered = 0;
   }
 
-  /** Quantile in s over the last 200 answers; null: too few. */
+  /** Quantile in s over the last answers; null: too few. */
   quantile(q: number): number | null {
     if (this.seconds.length < 5) return null;
     const sorted = [...this.seconds].sort((a, b) => a - b);

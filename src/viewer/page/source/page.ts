@@ -1,7 +1,7 @@
 import { drawBar, diverging, sequential, withUnit } from './colours';
 import { ForceChart } from './chart';
 import { Connection, type LinkState } from './connection';
-import { element } from './element';
+import { element, write } from './element';
 import { attachPointer } from './input';
 import { bindings } from './bindings';
 import { Keyboard } from './keys';
@@ -21,7 +21,8 @@ const byId = (id: string): HTMLElement => element(id, HTMLElement);
 /** What the page knows, and how its parts hang together. */
 export class Page {
   readonly view = new View(element('scene', HTMLCanvasElement));
-  readonly latency = new Latency();
+  readonly latency = new Latency(); // to the picture of the body that was solved for the pose
+  readonly toolLatency = new Latency(); // to the picture of the tool and its force that follow the pose
   session: SessionStart | null = null;
   frame: Frame | null = null;
   holder: number | null = null;
@@ -33,6 +34,8 @@ export class Page {
   private readonly keyboard: Keyboard;
   private readonly connection: Connection;
   private pending: Frame[] = [];
+  private taken = 0; // frames that the last picture shows
+  private completed = true; // that picture is done
   private pointer = { x: -1, y: -1 }; // px, of the stylus
   private frozen: Snapshot | null = null;
   private scalars: Scalars | null = null;
@@ -41,7 +44,8 @@ export class Page {
   private slice: Slice | null = null;
   private stages: Float32Array | null = null;
   private drawn: number[] = []; // times of the last pictures, ms
-  private ratesShown = 0;
+  private ratesShown = 0; // ms
+  private chartShown = 0;
   private lastStep = performance.now();
   private wantsTool = true; // takes it when it is free
 
@@ -56,7 +60,7 @@ export class Page {
     this.stylus = new Stylus(
       { cast: (ray) => this.cast(ray), freeze: () => (this.frozen = this.view.body.snapshot()), thaw: () => (this.frozen = null) },
       (message) => this.connection.send(message),
-      (n) => this.latency.posed(n, performance.now()),
+      (n) => [this.latency, this.toolLatency].forEach((latency) => latency.posed(n, performance.now())),
       (pressing) => this.showPress(pressing),
     );
     this.keyboard = new Keyboard(bindings(this, this.stylus, this.view.orbit, this.panels));
@@ -143,6 +147,7 @@ export class Page {
     const same = this.session?.scenario === session.scenario;
     this.session = session;
     this.latency.clear();
+    this.toolLatency.clear();
     this.chart.clear();
     this.scalars = this.nodes = this.support = this.slice = this.stages = null;
     byId('link').textContent = 'live';
@@ -192,22 +197,36 @@ export class Page {
 
   private paint(): void {
     requestAnimationFrame(() => this.paint());
+    if (!this.complete()) return;
     const frames = this.pending;
     this.pending = [];
     // Of several only the newest vertices are seen.
     const seen = frames.map((frame) => frame.vertices !== null).lastIndexOf(true);
     frames.forEach((frame, i) => this.take(frame, i === seen));
+    this.taken = frames.length;
+    this.completed = !this.view.draw() && frames.length === 0;
+    if (frames.length > 0) this.showNumbers(performance.now());
+    this.watch();
+  }
+
+  private watch(): void {
+    if (!this.complete()) setTimeout(() => this.watch(), 2);
+  }
+
+  /** Whether the last picture is done: it counts then, not when it is ordered, and gives back the credit of what it shows. */
+  private complete(): boolean {
+    if (this.completed) return true;
+    if (this.view.busy()) return false;
+    this.completed = true;
     const now = performance.now();
-    if (this.view.draw()) {
-      this.drawn.push(now);
-      while ((this.drawn[0] ?? now) < now - 1000) this.drawn.shift();
-      // The picture counts when it is done, not when it is ordered.
-      if (this.frame) this.latency.drawn(this.frame.poseInSolve, performance.now());
+    this.drawn.push(now);
+    while ((this.drawn[0] ?? now) < now - 1000) this.drawn.shift();
+    if (this.frame) {
+      this.latency.drawn(this.frame.poseInSolve, now);
+      this.toolLatency.drawn(this.frame.poseInTick, now);
     }
-    if (frames.length > 0) {
-      this.connection.shown(frames.length, this.view.pictureSeconds);
-      this.showNumbers(now);
-    }
+    if (this.taken > 0) this.connection.shown(this.taken, this.view.pictureSeconds);
+    return true;
   }
 
   private take(frame: Frame, moves: boolean): void {
@@ -232,11 +251,15 @@ export class Page {
   private showNumbers(now: number): void {
     const frame = this.frame;
     if (!frame) return;
-    element('force', HTMLOutputElement).textContent = Math.hypot(...frame.force).toFixed(3);
-    element('depth', HTMLOutputElement).textContent = (1000 * Math.max(frame.depth, 0)).toFixed(1);
+    write(byId('force'), Math.hypot(...frame.force).toFixed(3));
+    write(byId('depth'), (1000 * Math.max(frame.depth, 0)).toFixed(1));
     const lag = Math.hypot(...frame.hand.map((x, d) => x - (frame.tip[d] ?? x)));
-    element('lag', HTMLOutputElement).textContent = (1000 * lag).toFixed(1);
-    this.chart.draw(frame.tickTime);
+    write(byId('lag'), (1000 * lag).toFixed(1));
+    // What the processor draws beside the picture it does not draw for the picture.
+    if (now - this.chartShown > (this.view.software ? 125 : 0)) {
+      this.chartShown = now;
+      this.chart.draw(frame.tickTime);
+    }
     if (now - this.ratesShown < 250) return;
     this.ratesShown = now;
     this.panels.showRates(frame, this.drawn.length, this.latency, this.stages);

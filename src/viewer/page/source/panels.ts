@@ -1,6 +1,6 @@
 // The panels beside the picture: what they show, and what they ask for.
 import { withUnit } from './colours';
-import { element } from './element';
+import { element, write } from './element';
 import type { Latency } from './latency';
 import {
   type Colour,
@@ -44,6 +44,7 @@ export class Panels {
   private readonly list: Recording[] = [];
   private picked: number | Vec3 | null = null;
   private session: SessionStart | null = null;
+  private volumes: string[] = []; // cm3, as shown
 
   constructor(private readonly host: PanelHost) {
     const ask = (): void => this.askOverlays();
@@ -153,15 +154,17 @@ export class Panels {
       element('support-state', HTMLElement).textContent =
         `Node ${node}, support ${withUnit(radius, 'm')}: sees ${seen.length} nodes, ${hidden.length} hidden by the cut.`;
     }
-    if (frame.volumes) {
-      element('pieces', HTMLTableSectionElement).replaceChildren(
-        ...[...frame.volumes].map((volume, i) => line(String(i + 1), (volume * 1e6).toPrecision(4))),
-      );
+    const volumes = frame.volumes ? [...frame.volumes].map((volume) => (volume * 1e6).toPrecision(4)) : this.volumes;
+    if (volumes.join() !== this.volumes.join()) {
+      this.volumes = volumes;
+      element('pieces', HTMLTableSectionElement).replaceChildren(...volumes.map((volume, i) => line(String(i + 1), volume)));
     }
-    element('cut-state', HTMLElement).textContent =
+    write(
+      element('cut-state', HTMLElement),
       frame.cutArea > 0
         ? `Cut ${(frame.cutArea * 1e4).toPrecision(3)} cm², front ${withUnit(frame.frontLength, 'm')}, opens by ${withUnit(frame.opening, 'm')}.`
-        : 'No cut yet.';
+        : 'No cut yet.',
+    );
   }
 
   showRates(frame: Frame, display: number, latency: Latency, stages: Float32Array | null): void {

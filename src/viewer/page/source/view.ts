@@ -21,6 +21,7 @@ export class View {
   private stale = true;
   private sharpness = 1; // drawn pixels per pixel of the page, where the processor draws
   private drawSeconds = 0; // of a picture, smoothed
+  private ordered: { done: WebGLSync; since: number } | null = null; // the picture that the processor is at
 
   /** Throws Error in words when the browser has no WebGL 2. */
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -68,19 +69,30 @@ export class View {
     this.stale = true;
   }
 
-  /** Draws if anything has changed; true when it has drawn. */
+  /** Orders a picture if anything has changed and the last one is done; true when it has. */
   draw(): boolean {
-    if (!this.stale) return false;
-    const start = performance.now();
+    if (!this.stale || this.busy()) return false;
+    const since = performance.now();
     this.drawNow();
-    if (this.software) {
-      const gl = this.renderer.getContext();
-      const pixel = new Uint8Array(4); // reading one waits for all
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-      this.drawSeconds += 0.2 * ((performance.now() - start) / 1000 - this.drawSeconds);
-      if (this.sharpness <= 1) this.adapt();
-    }
+    if (!this.software) return true;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    if (done) this.ordered = { done, since };
     return true;
+  }
+
+  /** Whether the processor is still at the last picture. The hand and the messages go on meanwhile. */
+  busy(): boolean {
+    if (!this.ordered) return false;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    const { done, since } = this.ordered;
+    if (gl.clientWaitSync(done, 0, 0) === gl.TIMEOUT_EXPIRED) return true;
+    gl.deleteSync(done);
+    this.ordered = null;
+    this.drawSeconds += 0.2 * ((performance.now() - since) / 1000 - this.drawSeconds);
+    if (this.sharpness <= 1) this.adapt();
+    return false;
   }
 
   /** Wall clock of a picture, s; 0 where graphics hardware draws and does not tell. */
