@@ -9,9 +9,11 @@
 namespace spherecut::app {
 namespace {
 
-constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
-constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
-constexpr double largest_share = 0.8;  // of the nodes in a window that is worth its while
+constexpr int most_iterations = 300;     // of the contact: deep presses converge slowly
+constexpr double lip_tolerance = 1e-9;   // m, lips this far through one another are in contact
+constexpr double largest_share = 0.8;    // of the nodes in a window that is worth its while
+constexpr double crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a fixed region is kept
+constexpr double crowded_by_seed = 0.7;  // likewise, to a node that must be where it is
 constexpr double rim = 1e-2; // of its spacing: a lip node so near to the surface stands on the rim of its wound
 
 bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& nodes, int node) {
@@ -132,6 +134,52 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
                                    box.upper.z()));
     }
   return prescribed;
+}
+
+std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domain& domain,
+                                 const solvers::NodeCloud& nodes, const topology::SurfaceContact& centre,
+                                 double reach) {
+  std::vector<char> held(nodes.positions.size(), 0);
+  for (const solvers::Prescribed& entry : fixed_nodes(scenario, domain, nodes))
+    held[entry.node] = 1;
+  std::vector<int> near;
+  for (int i = 0; i < nodes.size(); ++i)
+    if (on_surface(nodes.kinds[i]) && held[i] == 0 && (nodes.positions[i] - centre.point).norm() <= reach &&
+        nodes.normals[i].dot(centre.normal) > 0)
+      near.push_back(i);
+  if (near.empty())
+    throw InputError(fmt::format("no free surface node within {:g} m of the contact at [{:.4g}, {:.4g}, {:.4g}] m: the "
+                                 "tool presses on a fixed region, or contact.candidate_radius is too small",
+                                 reach, centre.point.x(), centre.point.y(), centre.point.z()));
+  return near;
+}
+
+solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Domain& domain,
+                                    const solvers::SprinkleOptions& options, const solvers::NodeCloud& previous) {
+  solvers::Sprinkling made = solvers::resprinkle(domain, options, previous);
+  solvers::SprinkleOptions held = options;
+  for (const FixedRegion& region : scenario.fixed) {
+    const auto holds = [&](const solvers::NodeCloud& nodes, int i) {
+      return region.holds(nodes.positions[i]) && carries_surface(domain, nodes, i);
+    };
+    const auto any = [&](const solvers::NodeCloud& nodes) {
+      for (int i = 0; i < nodes.size(); ++i)
+        if (holds(nodes, i))
+          return true;
+      return false;
+    };
+    if (any(made.nodes))
+      continue;
+    for (int i = 0; i < previous.size(); ++i)
+      if (holds(previous, i) && on_surface(previous.kinds[i]) &&
+          (options.incision == nullptr ||
+           !options.incision->closest(previous.positions[i], crowded_by_sheet * options.spacing.fine)) &&
+          std::none_of(held.seeds.begin(), held.seeds.end(), [&](const solvers::SeedNode& seed) {
+            return (seed.position - previous.positions[i]).norm() < crowded_by_seed * options.spacing.fine;
+          }))
+        held.seeds.push_back({previous.positions[i], previous.kinds[i]});
+  }
+  return held.seeds.size() == options.seeds.size() ? made : solvers::resprinkle(domain, held, previous);
 }
 
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,

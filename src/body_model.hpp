@@ -7,6 +7,8 @@
 #include "src/recondensing.hpp"
 #include "src/scenario.hpp"
 
+#include "topology/contact.hpp"
+
 namespace spherecut::app {
 
 /// Wall clock of the stages of a rebuild, s.
@@ -47,6 +49,16 @@ inline bool on_surface(solvers::NodeKind kind) {
 /// Nodes of the fixed regions with the components that are held. Throws InputError naming the region that holds none.
 std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const topology::Domain& domain,
                                              const solvers::NodeCloud& nodes);
+
+/// Surface nodes that a tool at `centre` may touch: within `reach` m on its side of the organ, without those that are
+/// held. Throws InputError when there are none.
+std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domain& domain,
+                                 const solvers::NodeCloud& nodes, const topology::SurfaceContact& centre, double reach);
+
+/// Nodes for `options` in place of `previous`, as solvers::resprinkle. A fixed region that would be left without a
+/// surface node keeps those that it had. Throws as that does.
+solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Domain& domain,
+                                    const solvers::SprinkleOptions& options, const solvers::NodeCloud& previous);
 
 /// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead (method
 /// galerkin) the body is one that can follow it. Throws as solvers::discretise does.

@@ -125,6 +125,8 @@ StepResult Session::step(const StepSample& sample) {
     model_.field = std::move(*without_blade_);
     without_blade_.reset();
   }
+  if (sample.blade)
+    drop_following();
   const bool released = handle_grasper(sample);
   const std::optional<topology::BladePose> last_blade = last_blade_;
   const bool solved = incisions_ != nullptr && blade_force_ == nullptr && move_blade(sample, *result.cut);
@@ -142,7 +144,9 @@ StepResult Session::step(const StepSample& sample) {
       solve(sample, model_);
     if (touch_) {
       const topology::SurfaceContact centre = centre_of(result.contact, result.pose);
-      if (must_follow(centre))
+      if (must_follow(centre) && following_aside_ && recondensing_ == nullptr)
+        follow_aside(sample, centre);
+      else if (must_follow(centre))
         follow(sample, centre, result);
     }
     Loading loading{.releases = released};
@@ -154,6 +158,7 @@ StepResult Session::step(const StepSample& sample) {
       watch_window(sample, last_blade, result);
     evaluate(result);
   }
+  result.resprinkled = result.resprinkled || std::exchange(followed_aside_, false);
   if (result.cut)
     report_cut(*result.cut);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -241,30 +246,14 @@ void Session::sprinkle(const solvers::NodeCloud* previous, BodyModel& model) {
   const StageTimer timer(profile_.sprinkle);
   const solvers::SprinkleOptions options = sprinkle_options(model);
   model.sprinkling = previous == nullptr ? solvers::sprinkle(*organ_.domain, options)
-                                         : solvers::resprinkle(*organ_.domain, options, *previous);
+                                         : resprinkle_held(scenario_, *organ_.domain, options, *previous);
   model.coarseness = coarseness_;
 }
 
-// Surface nodes near the contact on its side of the organ, without those that are held.
 std::vector<int> Session::candidates(const BodyModel& model) const {
   if (scenario_.tool->grasp)
     return grasped_nodes(model);
-  const solvers::NodeCloud& nodes = model.sprinkling.nodes;
-  std::vector<char> held(nodes.positions.size(), 0);
-  for (const solvers::Prescribed& entry : fixed_nodes(scenario_, *organ_.domain, nodes))
-    held[entry.node] = 1;
-  std::vector<int> near;
-  for (int i = 0; i < nodes.size(); ++i)
-    if (on_surface(nodes.kinds[i]) && held[i] == 0 &&
-        (nodes.positions[i] - zone_contact_->point).norm() <= zone_.candidate_radius &&
-        nodes.normals[i].dot(zone_contact_->normal) > 0)
-      near.push_back(i);
-  if (near.empty())
-    throw InputError(fmt::format("no free surface node within {:g} m of the contact at [{:.4g}, {:.4g}, {:.4g}] m: the "
-                                 "tool presses on a fixed region, or contact.candidate_radius is too small",
-                                 zone_.candidate_radius, zone_contact_->point.x(), zone_contact_->point.y(),
-                                 zone_contact_->point.z()));
-  return near;
+  return touchable_nodes(scenario_, *organ_.domain, model.sprinkling.nodes, *zone_contact_, zone_.candidate_radius);
 }
 
 // Whether the tool can be on the surface, as far as that has moved by now.
@@ -288,6 +277,7 @@ void Session::build(BodyModel& model) {
 void Session::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near) {
   const StageTimer timer(profile_.discretise);
   drop_recondensing();
+  drop_following();
   app::assemble(scenario_, organ_.domain, model, way_ahead, near);
   const solvers::SprinkleReport& report = model.sprinkling.report;
   say_(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",

@@ -14,6 +14,7 @@
 #include "topology/front_growth.hpp"
 
 #include <functional>
+#include <future>
 
 namespace spherecut::app {
 
@@ -102,11 +103,17 @@ class Session {
   /// update needs it, which waits for it, or at swap_body(). Cuts then give their residual. When it begins, and what
   /// it becomes, depends on the steps alone.
   void set_recondensing(bool on);
+
+  /// On: nodes that follow a tool are sprinkled, and their body assembled and condensed, on a thread of their own. It
+  /// takes over at swap_body(), or, after waiting for it, once the contact has left the fine zone that it would
+  /// replace. When it begins, and what it becomes, depends on the steps alone.
+  void set_following_aside(bool on);
+
   /// Whether such a body is under way; and whether it is there and has followed all that was cut meanwhile.
-  [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr; }
-  [[nodiscard]] bool recondensed() const { return recondensing_ != nullptr && recondensing_->ready(); }
+  [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr || following_; }
+  [[nodiscard]] bool recondensed() const;
   /// Takes it over, after waiting for it where need be; the next step solves with it. False: there is none, or it could
-  /// not follow.
+  /// not follow. Throws what making nodes and body anew throws.
   bool swap_body();
 
   /// Spacings `factor` times the scenario's from the next sprinkling on. Throws InputError unless it is positive.
@@ -162,6 +169,10 @@ class Session {
   bool take_recondensed(BodyModel& into, solvers::ContactPatch& patch);
   void lead_recondensing(const StepSample& sample, const topology::RestMap& to_rest);
   void drop_recondensing();
+  void follow_aside(const StepSample& sample, const topology::SurfaceContact& centre);
+  void begin_following(const topology::SurfaceContact& centre);
+  void take_following();
+  void drop_following();
   [[nodiscard]] Vector3 rest_position(const Vector3& x) const { return rest_position(x, model_); }
   [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
   void make_blade_force();
@@ -197,6 +208,11 @@ class Session {
   void evaluate_nodes(StepResult& result);
   void warn(const std::string& key, const std::string& text);
 
+  /// A body on nodes that follow the tool, made on a thread of its own.
+  struct Following {
+    topology::SurfaceContact centre; // of its fine zone
+    std::future<BodyModel> made;
+  };
   /// Tissue in a grasper's jaws.
   struct Grasp {
     Vector3 place = Vector3::Zero(), normal = Vector3::UnitZ(); // m, on the surface at rest; outward there
@@ -213,6 +229,10 @@ class Session {
     double time = 0;                        // s
     double area = 0;                        // m2 torn
     double decay = 0;                       // 1/m, of the release rate with the way of the front, as last seen
+    bool grows = false;                     // it has in the last step
+    double start = 0;                       // G / G_c when the growth at this load began
+    int kept = 0;                           // increments since then that have left most of it
+    bool told = false;                      // that it is unstable
   };
 
   Scenario scenario_;
@@ -253,8 +273,12 @@ class Session {
   std::unique_ptr<Recondensing> recondensing_, given_up_; // null: none
   topology::SurfaceMesh recondensing_way_;                // for which it is condensed
   std::optional<solvers::SprinkleIncrement> followed_;    // by the body of the last cut
+  bool following_aside_ = false;
+  bool followed_aside_ = false; // its body has taken over since the last step
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;
+  std::future<BodyModel> unwanted_;    // one that nobody will take
+  std::optional<Following> following_; // empty: none; its thread uses the above
 };
 
 } // namespace spherecut::app

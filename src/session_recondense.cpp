@@ -130,7 +130,16 @@ bool Session::take_recondensed(BodyModel& into, solvers::ContactPatch& patch) {
   return true;
 }
 
+bool Session::recondensed() const {
+  return following_ ? following_->made.wait_for(std::chrono::seconds(0)) == std::future_status::ready
+                    : recondensing_ != nullptr && recondensing_->ready();
+}
+
 bool Session::swap_body() {
+  if (following_) {
+    take_following();
+    return true;
+  }
   if (recondensing_ == nullptr)
     return false;
   solvers::ContactPatch patch;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
@@ -234,6 +235,11 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
       return stride * std::clamp(std::log(std::max(drive, 1.0)) / (tears_->decay * stride), least_step, 1.0);
     return drive < 1.1 ? first_step * stride : stride;
   };
+  // A tear that makes one increment a step goes on in the next where nothing has changed but the tear.
+  const bool goes_on =
+      tear_gradually_ && tears_ && tears_->grows && !loading.releases && loading.cut_surface == 0 &&
+      sample.tool.has_value() == tears_->pose.has_value() &&
+      (!sample.tool || (sample.tool->point == tears_->pose->point && sample.tool->axis == tears_->pose->axis));
   // The tool's way in this step, and how much of it the body has been loaded by.
   const bool follows = states && !states->empty() && drive_of(*states) >= in_balance && follows_load(sample, loading);
   const topology::ToolPose from = follows ? *tears_->pose : topology::ToolPose{};
@@ -272,6 +278,12 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
   add_row();
   double start = states ? drive_of(*states) : 0;
   int kept = 0;
+  if (goes_on) {
+    start = tears_->start;
+    kept = tears_->kept;
+  } else {
+    tears_->told = false;
+  }
   for (int number = 1;; ++number) {
     double drive = states ? drive_of(*states) : 0, ahead = drive; // now, and at the end of the step
     const double moving_drive = states ? drive_of_moving(*states) : 0;
@@ -375,13 +387,17 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     row.advance = seed || joins ? 0 : longest;
     if (kept >= kept_to_tell && !report.unstable) {
       report.unstable = true;
-      say_(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample.time));
+      if (!std::exchange(tears_->told, true))
+        say_(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample.time));
     }
     if (incisions_->wound().pieces.size() > pieces)
       report.severed = true;
   }
   if (share < 1)
     load_to(1);
+  tears_->grows = report.increments.size() > 1;
+  tears_->start = start;
+  tears_->kept = kept;
   if (blade_force_ != nullptr && (report.increments.size() > 1 || (proposed && !mark_)))
     blade_force_->meet_again(model_);
   report.area = tears_->area;

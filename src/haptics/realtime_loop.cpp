@@ -105,28 +105,37 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
   std::uint64_t sequence = 0;
   std::optional<DeviceState> solved; // the last that was
   bool tearing = false;              // in that
+  const auto interval = options.most_solves > 0 ? static_cast<long long>(second / options.most_solves) : 0; // ns
+  long long next = 0;                                                                                       // solve
   while (!shared.done.load(std::memory_order_acquire)) {
     if (!shared.poses.fetch()) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
       continue;
     }
     const DeviceState state = shared.poses.front();
-    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved)) {
+    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved) && !simulation.recondensed()) {
       feed.offer_again(simulation);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       continue;
     }
-    solved = state;
-    const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level(), simulation.recondensed()};
-    ContactSnapshot& snapshot = shared.snapshots.back();
     const long long began = clock_now(CLOCK_MONOTONIC);
+    if (solved && began < next) {
+      feed.offer_again(simulation);
+      std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(next - began, second / 1000)));
+      continue;
+    }
+    next = began + interval;
+    solved = state;
+    const SolveEvent event{++sequence,          state.tick, SolveEvent::never, rule.level(), simulation.recondensed(),
+                           options.follow_aside};
+    ContactSnapshot& snapshot = shared.snapshots.back();
     const SolveRecord record = solve_recording(simulation, state, event, snapshot);
     lost += shared.solves.push(record) ? 0 : 1;
     tearing = !record.failed && simulation.tearing();
     if (record.failed)
       continue;
     shared.snapshots.publish();
-    if (record.resprinkled || record.cut_triangles > 0)
+    if ((record.resprinkled && !options.follow_aside) || record.cut_triangles > 0)
       rule.rebuilt(record.seconds);
     feed.offer(simulation, record);
     report.solve_seconds += 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - began);

@@ -24,7 +24,7 @@ constexpr std::size_t tick_size = 112, solve_size = 64;
 constexpr std::size_t lot_of_ticks = 256;
 constexpr std::uint32_t longest_lot = 64U << 20U;
 constexpr std::uint32_t connected = 1;
-constexpr std::uint32_t failed = 1, resprinkled = 2, swapped = 4;
+constexpr std::uint32_t failed = 1, resprinkled = 2, swapped = 4, aside = 8;
 
 std::uint64_t checksum(std::string_view bytes) { // FNV-1a
   std::uint64_t value = 0xcbf29ce484222325U;
@@ -139,6 +139,7 @@ SolveRecord solve_of(Reader& in, const std::vector<SolveRecord>& before) {
   solve.failed = (flags & failed) != 0;
   solve.resprinkled = (flags & resprinkled) != 0;
   solve.event.swaps = (flags & swapped) != 0;
+  solve.event.aside = (flags & aside) != 0;
   solve.cut_triangles = in.get<std::int32_t>();
   solve.nodes = in.get<std::int32_t>();
   solve.topology = in.get<std::uint64_t>();
@@ -232,8 +233,8 @@ void RecordingWriter::add(const SolveRecord& solve) {
   put(solves_, solve.event.sequence);
   put(solves_, solve.event.pose_tick);
   put(solves_, static_cast<std::int32_t>(solve.event.degradation));
-  put(solves_,
-      (solve.failed ? failed : 0U) | (solve.resprinkled ? resprinkled : 0U) | (solve.event.swaps ? swapped : 0U));
+  put(solves_, (solve.failed ? failed : 0U) | (solve.resprinkled ? resprinkled : 0U) |
+                   (solve.event.swaps ? swapped : 0U) | (solve.event.aside ? aside : 0U));
   put(solves_, static_cast<std::int32_t>(solve.cut_triangles));
   put(solves_, static_cast<std::int32_t>(solve.nodes));
   put(solves_, solve.topology);

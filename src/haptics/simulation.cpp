@@ -166,6 +166,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     return record;
   };
   try {
+    simulation.set_following_aside(event.aside);
     if (event.swaps)
       simulation.swap_body();
     simulation.solve(device, event.degradation, snapshot);

@@ -45,6 +45,8 @@ class HapticSimulation {
   /// waiting for it where need be (Session::set_recondensing).
   [[nodiscard]] bool recondensed() const { return session_.recondensed(); }
   void swap_body() { session_.swap_body(); }
+  /// As Session::set_following_aside.
+  void set_following_aside(bool on) { session_.set_following_aside(on); }
 
   /// Result of the last solve.
   [[nodiscard]] const StepResult& result() const { return result_; }

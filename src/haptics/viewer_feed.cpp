@@ -103,6 +103,7 @@ void ViewerFeed::offer(const HapticSimulation& simulation, const SolveRecord& so
     last_.opening = result.cut->opening;
     last_.opening_volume = result.cut->opening_volume;
   }
+  last_.tear = tear_status(result, last_.tear);
   last_.solve_seconds = solve.seconds;
   pending_ = true;
   offer_again(simulation);

@@ -4,6 +4,7 @@
 #include "src/haptics/loop_records.hpp"
 #include "src/haptics/simulation.hpp"
 #include "src/haptics/surface_follower.hpp"
+#include "src/haptics/tear_status.hpp"
 #include "src/haptics/triple_buffer.hpp"
 
 #include <chrono>
@@ -54,8 +55,9 @@ struct ViewerFrame {
   Vector3 force = Vector3::Zero();       // N, on what the hand holds
   double contact_radius = 0;             // m
   int nodes = 0, active = 0, degradation = 0;
-  double cut_area = 0, front_length = 0;      // m2, m
-  double opening = 0, opening_volume = 0;     // m, m3
+  double cut_area = 0, front_length = 0;  // m2, m
+  double opening = 0, opening_volume = 0; // m, m3
+  TearStatus tear;
   double solve_seconds = 0;                   // wall clock of the solve
   SessionProfile profile;                     // of the whole session
   double picture_seconds = 0;                 // wall clock in pictures so far

@@ -129,6 +129,8 @@ void Hub::greet(int client, Client& from) {
   send(client, welcome_text(client, scenarios(), recordings(), options_.viewers, options_.speed));
   send(client, session_text(*session_, epoch_, target_.mode));
   send(client, holder_text(holder_));
+  if (tear_.state != TearState::none)
+    send(client, tear_text(tear_));
   if (building_ != nullptr)
     send(client, building_text(building_->what));
 }
@@ -329,6 +331,14 @@ void Hub::tell_failures() {
   }
 }
 
+void Hub::tell_tear() {
+  const TearStatus& now = session_->frame().tear;
+  if (now.state == tear_.state && now.reason == tear_.reason && now.area == tear_.area)
+    return;
+  tear_ = now;
+  send_all(tear_text(tear_));
+}
+
 void Hub::measure(const LiveTick& tick) {
   if (const std::uint64_t cuts = session_->cuts(); cuts != cuts_seen_) {
     cuts_seen_ = cuts;
@@ -368,7 +378,8 @@ std::uint32_t Hub::state_bits(const LiveTick& tick) const {
 }
 
 void Hub::send_frames(const LiveTick& tick) {
-  session_->fetch_frame();
+  if (session_->fetch_frame())
+    tell_tear();
   const ViewerFrame& frame = session_->frame();
   if (frame.number == 0)
     return;

@@ -96,6 +96,7 @@ class Hub {
   void say_here(const std::string& line);
   void tell_log();
   void tell_failures();
+  void tell_tear();
   void measure(const LiveTick& tick);
   void send_frames(const LiveTick& tick);
   void send_frame(int id, Client& client, const LiveTick& tick, bool picture);
@@ -126,6 +127,7 @@ class Hub {
   std::uint64_t ticks_before_ = 0, solves_before_ = 0, pictures_before_ = 0;
   double compute_before_ = 0; // s
   std::uint64_t cuts_seen_ = 0;
+  TearStatus tear_; // as told
   Clock::time_point cut_at_;
   LiveRates rates_;
 };

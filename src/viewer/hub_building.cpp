@@ -139,6 +139,7 @@ void Hub::finish_building() {
     measured_ = Clock::now();
     ticks_before_ = solves_before_ = pictures_before_ = cuts_seen_ = 0;
     compute_before_ = 0;
+    tear_ = {};
     session_->start();
     send_all(session_text(*session_, epoch_, target_.mode));
   } else {

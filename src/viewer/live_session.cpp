@@ -71,6 +71,11 @@ void LiveSession::run() {
   RealtimeOptions options;
   options.keep = false;
   options.solve_at_rest = false;
+  options.follow_aside = true;
+  // Between solves the tangent force is that of the body all the same; more of them than pictures are of no use, and
+  // the viewer may need the processor.
+  if (scenario_.haptics.model == ForceModelKind::tangent)
+    options.most_solves = scenario_.haptics.viewer_rate;
   options.feed = feed_.get();
   options.stop = [this] { return stop_.load(); };
   options.on_tick = [this](const TickRecord& record) { note(record); };

@@ -144,6 +144,10 @@ std::string recording_text(bool on, const RecordingEntry& entry, double seconds)
                  {"url", "/recordings/" + entry.name}});
 }
 
+std::string tear_text(const TearStatus& tear) {
+  return dumped({{"type", "tear"}, {"state", to_string(tear.state)}, {"text", tear.reason}, {"area", tear.area}});
+}
+
 std::string replay_text(bool on, const std::string& name) {
   return dumped({{"type", "replay"}, {"name", name}, {"on", on}});
 }

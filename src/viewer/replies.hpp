@@ -24,6 +24,7 @@ std::string building_text(const std::string& what);
 std::string error_text(std::string_view code, const std::string& text, std::string_view about);
 std::string log_text(const std::string& line);
 std::string recording_text(bool on, const RecordingEntry& entry, double seconds);
+std::string tear_text(const TearStatus& tear);
 std::string replay_text(bool on, const std::string& name);
 
 } // namespace spherecut::app

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <initializer_list>
 
 namespace spherecut::app {
 namespace {
@@ -38,10 +39,11 @@ class Writer {
     std::memcpy(bytes_.data() + at, &value, sizeof value);
   }
   void put_float(double value) { put(static_cast<float>(value)); }
-  void put_vector(const Vector3& x) {
-    for (int axis = 0; axis < 3; ++axis)
-      put_float(x[axis]);
+  void put_floats(std::initializer_list<double> values) {
+    for (const double value : values)
+      put_float(value);
   }
+  void put_vector(const Vector3& x) { put_floats({x.x(), x.y(), x.z()}); }
   template <typename T>
   void put_all(const std::vector<T>& values) {
     static_assert(std::is_trivially_copyable_v<T> || std::is_same_v<T, Eigen::Vector3f>);
@@ -109,8 +111,7 @@ void put_block(const ViewerFrame& frame, const LiveTick& tick, const FrameContex
   out.put(static_cast<std::uint32_t>(frame.topology ? frame.topology->volumes.size() : 0));
   out.put_vector(tick.hand);
   out.put_vector(record.device.position);
-  for (const double part : {turn.x(), turn.y(), turn.z(), turn.w()})
-    out.put_float(part);
+  out.put_floats({turn.x(), turn.y(), turn.z(), turn.w()});
   out.put_vector(tick.axis);
   out.put_vector(record.tissue);
   out.put_vector(record.force);
@@ -121,20 +122,11 @@ void put_block(const ViewerFrame& frame, const LiveTick& tick, const FrameContex
   out.put(static_cast<std::uint32_t>(record.active));
   out.put(static_cast<std::uint32_t>(frame.nodes));
   out.put(static_cast<std::uint32_t>(frame.degradation));
-  out.put_float(context.rates.ticks);
-  out.put_float(context.rates.solves);
-  out.put_float(context.rates.pictures);
-  out.put_float(context.rates.tick_seconds);
+  out.put_floats({context.rates.ticks, context.rates.solves, context.rates.pictures, context.rates.tick_seconds});
   out.put(static_cast<std::uint32_t>(record.device.tick));
   out.put(static_cast<std::uint32_t>(tick.overruns));
-  out.put_float(tick.worst_latency);
-  out.put_float(frame.solve_seconds);
-  out.put_float(frame.cut_area);
-  out.put_float(frame.front_length);
-  out.put_float(frame.opening);
-  out.put_float(frame.opening_volume);
-  out.put_float(record.energy);
-  out.put_float(frame.largest_displacement);
+  out.put_floats({tick.worst_latency, frame.solve_seconds, frame.cut_area, frame.front_length, frame.opening,
+                  frame.opening_volume, record.energy, frame.largest_displacement});
   out.put(context.left_out);
   out.put(std::uint32_t{0});
 }
@@ -179,9 +171,8 @@ void put_pick(const PickedNode& pick, Writer& out) {
 void put_slice(const FieldSlice& field, Writer& out) {
   out.begin(Section::slice);
   out.put(static_cast<std::uint32_t>(field.count));
-  out.put_vector(field.corner);
-  out.put_vector(field.along);
-  out.put_vector(field.up);
+  for (const Vector3& x : {field.corner, field.along, field.up})
+    out.put_vector(x);
   out.put_all(field.organ);
   out.put_all(field.cut);
   out.end();
@@ -239,9 +230,8 @@ std::string encode_frame(const ViewerFrame& frame, const LiveTick& tick, const F
   if (overlays.stages) {
     const SessionProfile& profile = frame.profile;
     out.begin(Section::stages);
-    for (const double seconds : {profile.press, profile.sprinkle, profile.discretise, profile.condense,
-                                 profile.topology, profile.level_sets, profile.evaluate, frame.picture_seconds})
-      out.put_float(seconds);
+    out.put_floats({profile.press, profile.sprinkle, profile.discretise, profile.condense, profile.topology,
+                    profile.level_sets, profile.evaluate, frame.picture_seconds});
     out.end();
   }
   return out.finish();

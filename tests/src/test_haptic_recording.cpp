@@ -59,7 +59,7 @@ void write_made_up(const std::filesystem::path& file, std::uint64_t ticks, bool 
   for (std::uint64_t t = 0; t < ticks; ++t) {
     if (t % 10 == 0) {
       SolveRecord solve;
-      solve.event = {t / 10 + 1, t, SolveEvent::never, static_cast<int>(t / 10 % 3), t / 10 % 2 == 1};
+      solve.event = {t / 10 + 1, t, SolveEvent::never, static_cast<int>(t / 10 % 3), t / 10 % 2 == 1, t / 10 % 5 == 1};
       solve.topology = 7 * t;
       solve.force = {0, 0.1, static_cast<double>(t)};
       writer.add(solve);
@@ -143,6 +143,8 @@ TEST_CASE("A recording keeps every value, and a session that was killed all that
   CHECK(recording.solves[34].topology == 7 * 340);
   CHECK_FALSE(recording.solves[34].event.swaps);
   CHECK(recording.solves[35].event.swaps);
+  CHECK_FALSE(recording.solves[35].event.aside);
+  CHECK(recording.solves[36].event.aside);
 }
 
 TEST_CASE("A recording moves a device and stays where it ends") {

@@ -9,45 +9,43 @@
 namespace spherecut::tests {
 namespace {
 
-namespace asio = boost::asio;
 namespace beast = boost::beast;
-namespace http = beast::http;
-namespace websocket = beast::websocket;
-using asio::ip::tcp;
+using boost::asio::ip::tcp;
 
 std::string host_of(const std::string& host, int port) {
   return host.empty() ? "127.0.0.1:" + std::to_string(port) : host;
 }
 
 tcp::endpoint endpoint_of(int port) {
-  return {asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port)};
+  return {boost::asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port)};
 }
 
 } // namespace
 
 HttpAnswer http_request(int port, const std::string& target, const std::string& host, const std::string& method,
                         const std::string& more_headers) {
-  asio::io_context context;
+  boost::asio::io_context context;
   tcp::socket socket(context);
   socket.connect(endpoint_of(port));
   const std::string request = method + " " + target + " HTTP/1.1\r\nHost: " + host_of(host, port) + "\r\n" +
                               (more_headers.empty() ? "Connection: close\r\n" : more_headers) + "\r\n";
-  asio::write(socket, asio::buffer(request));
+  boost::asio::write(socket, boost::asio::buffer(request));
   beast::flat_buffer buffer;
-  http::response_parser<http::string_body> parser;
+  beast::http::response_parser<beast::http::string_body> parser;
   parser.skip(method == "HEAD");
   beast::error_code error;
-  http::read(socket, buffer, parser, error);
-  if (error && error != http::error::end_of_stream)
+  beast::http::read(socket, buffer, parser, error);
+  if (error && error != beast::http::error::end_of_stream)
     return {};
-  const http::response<http::string_body> response = parser.release();
+  const beast::http::response<beast::http::string_body> response = parser.release();
   return {static_cast<int>(response.result_int()), response.body(),
-          std::string(response[http::field::content_type].data(), response[http::field::content_type].size())};
+          std::string(response[beast::http::field::content_type].data(),
+                      response[beast::http::field::content_type].size())};
 }
 
 struct WebSocketClient::Data {
-  asio::io_context context;
-  websocket::stream<tcp::socket> socket{context};
+  boost::asio::io_context context;
+  beast::websocket::stream<tcp::socket> socket{context};
   beast::flat_buffer buffer;
   bool open = false, reading = false, arrived = false;
   int status = 0, close_code = 0;
@@ -56,9 +54,9 @@ struct WebSocketClient::Data {
 WebSocketClient::WebSocketClient(int port, const std::string& origin, const std::string& host)
     : data_(std::make_unique<Data>()) {
   data_->socket.next_layer().connect(endpoint_of(port));
-  data_->socket.set_option(websocket::stream_base::decorator([origin](websocket::request_type& request) {
+  data_->socket.set_option(beast::websocket::stream_base::decorator([origin](beast::websocket::request_type& request) {
     if (!origin.empty())
-      request.set(http::field::origin, origin);
+      request.set(beast::http::field::origin, origin);
   }));
   data_->socket.read_message_max(std::size_t{64} << 20U);
   beast::error_code error;
@@ -89,13 +87,13 @@ int WebSocketClient::close_code() const {
 void WebSocketClient::send(const std::string& text) {
   beast::error_code error;
   data_->socket.text(true);
-  data_->socket.write(asio::buffer(text), error);
+  data_->socket.write(boost::asio::buffer(text), error);
 }
 
 void WebSocketClient::send_binary(const std::string& bytes) {
   beast::error_code error;
   data_->socket.binary(true);
-  data_->socket.write(asio::buffer(bytes), error);
+  data_->socket.write(boost::asio::buffer(bytes), error);
 }
 
 std::optional<WebMessage> WebSocketClient::receive(double seconds) {
@@ -110,7 +108,8 @@ std::optional<WebMessage> WebSocketClient::receive(double seconds) {
       if (!error)
         return;
       data_->open = false;
-      data_->close_code = error == websocket::error::closed ? static_cast<int>(data_->socket.reason().code) : 1006;
+      data_->close_code =
+          error == beast::websocket::error::closed ? static_cast<int>(data_->socket.reason().code) : 1006;
     });
   }
   const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);

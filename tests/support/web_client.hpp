@@ -38,9 +38,9 @@ class WebSocketClient {
   void send(const std::string& text);
   void send_binary(const std::string& bytes);
   /// The next message; none within the time, or when the connection has ended.
-  std::optional<WebMessage> receive(double seconds = 5);
+  std::optional<WebMessage> receive(double seconds = 30);
   /// Receives until the connection ends; false: not within the time.
-  bool wait_for_close(double seconds = 5);
+  bool wait_for_close(double seconds = 30);
 
  private:
   struct Data;

@@ -85,9 +85,12 @@ bool echoes(WebSocketClient& client) {
 
 template <typename Condition>
 bool soon(const Condition& condition) {
-  for (int i = 0; i < 1000 && !condition(); ++i)
+  for (int i = 0; i < 1000; ++i) {
+    if (condition())
+      return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  return condition();
+  }
+  return false;
 }
 
 } // namespace

@@ -1,7 +1,7 @@
 // How long it takes from a pose of the hand to the picture that answers it: to the first that knows this pose or a later
 // one. Every pose counts, also one that a later one overtook.
 
-const remembered = 600;
+const remembered = 1000;
 
 export class Latency {
   private readonly sent = new Map<number, number>(); // pose number: ms

@@ -8,8 +8,8 @@ import { Keyboard } from './keys';
 import { Latency } from './latency';
 import { Messages } from './messages';
 import type { Snapshot } from './body';
-import { Panels } from './panels';
-import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Topology, Vec3, Welcome } from './protocol';
+import { Panels, tearInWords } from './panels';
+import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Tear, Topology, Vec3, Welcome } from './protocol';
 import { savePicture } from './screenshot';
 import { castRay, type Hit } from './surface';
 import { type Ray, Stylus } from './stylus';
@@ -23,8 +23,11 @@ export class Page {
   readonly view = new View(element('scene', HTMLCanvasElement));
   readonly latency = new Latency(); // to the picture of the body that was solved for the pose
   readonly toolLatency = new Latency(); // to the picture of the tool and its force that follow the pose
+  pictures = 0; // drawn so far
+  seenVertices = 0; // frames with new vertices so far
   session: SessionStart | null = null;
   frame: Frame | null = null;
+  tear: Tear | null = null; // null: nothing tears here
   holder: number | null = null;
   id = -1;
   private readonly messages = new Messages(byId('messages'));
@@ -34,6 +37,7 @@ export class Page {
   private readonly keyboard: Keyboard;
   private readonly connection: Connection;
   private pending: Frame[] = [];
+  private tearEpoch = -1; // of the session that `tear` is of
   private taken = 0; // frames that the last picture shows
   private completed = true; // that picture is done
   private pointer = { x: -1, y: -1 }; // px, of the stylus
@@ -121,6 +125,8 @@ export class Page {
         return this.messages.say('error', message.text);
       case 'log':
         return this.messages.say(message.level === 'warning' ? 'warning' : 'info', message.text);
+      case 'tear':
+        return this.showTear(message);
       case 'recording':
         button('record').setAttribute('aria-pressed', String(message.on));
         if (!message.on) this.panels.addRecording(message);
@@ -150,6 +156,11 @@ export class Page {
     this.toolLatency.clear();
     this.chart.clear();
     this.scalars = this.nodes = this.support = this.slice = this.stages = null;
+    if (session.epoch !== this.tearEpoch) {
+      this.tearEpoch = session.epoch;
+      this.tear = null;
+      this.panels.showTear(null);
+    }
     byId('link').textContent = 'live';
     this.view.tool.setSession(session);
     if (!same) this.view.setSession(session);
@@ -158,6 +169,14 @@ export class Page {
     this.showDepth();
     this.look();
     if (this.pointer.x < 0) this.centrePointer();
+  }
+
+  private showTear(tear: Tear): void {
+    const before = this.tear;
+    this.tear = tear;
+    this.panels.showTear(tear);
+    if (tear.state === before?.state || tear.state === 'none' || tear.state === 'intact') return;
+    this.messages.say(tear.state === 'refused' ? 'warning' : 'info', tearInWords(tear));
   }
 
   private newTopology(topology: Topology): void {
@@ -219,6 +238,7 @@ export class Page {
     if (this.view.busy()) return false;
     this.completed = true;
     const now = performance.now();
+    this.pictures += 1;
     this.drawn.push(now);
     while ((this.drawn[0] ?? now) < now - 1000) this.drawn.shift();
     if (this.frame) {
@@ -233,6 +253,8 @@ export class Page {
     const body = this.view.body;
     if (frame.epoch !== this.session?.epoch || frame.topology !== body.topology?.topology) return;
     this.frame = frame;
+    this.stylus.answered(frame.poseInSolve);
+    if (frame.vertices) this.seenVertices += 1;
     if (frame.vertices && moves) body.setVertices(frame.vertices);
     if (frame.vertices || frame.scalars) this.scalars = frame.scalars;
     this.nodes = frame.nodes ?? this.nodes;

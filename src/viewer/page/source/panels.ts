@@ -14,6 +14,7 @@ import {
   type SliceRequest,
   stageNames,
   State,
+  type Tear,
   type Vec3,
 } from './protocol';
 import type { SliceShows } from './overlays';
@@ -167,6 +168,14 @@ export class Panels {
     );
   }
 
+  /** What the tears are at; null: nothing tears in this session. */
+  showTear(tear: Tear | null): void {
+    const line = element('tear-state', HTMLElement);
+    line.hidden = tear === null || tear.state === 'none';
+    line.dataset['state'] = tear?.state ?? 'none';
+    if (tear) write(line, tearInWords(tear));
+  }
+
   showRates(frame: Frame, display: number, latency: Latency, stages: Float32Array | null): void {
     const share = frame.ticks > 0 ? ` (${((100 * frame.misses) / frame.ticks).toFixed(2)} %)` : '';
     const p95 = latency.quantile(0.95);
@@ -227,6 +236,27 @@ export class Panels {
     const input = document.querySelector(`input[name=mode][value=${mode}]`);
     if (!(input instanceof HTMLInputElement)) throw new Error(`the document has no mode '${mode}'`);
     return input;
+  }
+}
+
+/** What the tears are at, and why they go no further. */
+export function tearInWords({ state, text, area }: Tear): string {
+  const torn = `${(area * 1e4).toPrecision(3)} cm²`;
+  switch (state) {
+    case 'none':
+      return '';
+    case 'intact':
+      return `No tear: ${text}.`;
+    case 'growing':
+      return `Tearing, ${torn} so far.`;
+    case 'unstable':
+      return `The tear is unstable, it runs on by itself: ${torn} so far.`;
+    case 'arrested':
+      return `The tear is arrested at ${torn}: ${text}.`;
+    case 'refused':
+      return `The tear has stopped at ${torn}, its front was refused: ${text}.`;
+    case 'severed':
+      return `The tear has parted the organ: ${torn}.`;
   }
 }
 

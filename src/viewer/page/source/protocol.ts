@@ -59,6 +59,14 @@ export interface SessionStart {
   settings: Settings;
 }
 
+/** What the tears of the session are at. */
+export interface Tear {
+  type: 'tear';
+  state: 'none' | 'intact' | 'growing' | 'unstable' | 'arrested' | 'refused' | 'severed';
+  text: string; // why it does not grow
+  area: number; // m2 torn
+}
+
 export type ServerText =
   | Welcome
   | SessionStart
@@ -67,6 +75,7 @@ export type ServerText =
   | { type: 'building'; what: string }
   | { type: 'error'; code: string; text: string; about?: string }
   | { type: 'log'; level: string; text: string }
+  | Tear
   | { type: 'recording'; on: boolean; name: string; seconds: number; bytes: number; url: string }
   | { type: 'replay'; name: string | null; on: boolean };
 
@@ -101,7 +110,7 @@ export type ClientText =
   | { type: 'record'; on: boolean }
   | { type: 'replay'; name: string | null };
 
-const textTypes = ['welcome', 'session', 'holder', 'mode', 'building', 'error', 'log', 'recording', 'replay'];
+const textTypes = ['welcome', 'session', 'holder', 'mode', 'building', 'error', 'log', 'tear', 'recording', 'replay'];
 
 /** A text message; null: of a type this page does not know. Throws ProtocolError when it is not a JSON object with a type. */
 export function decodeText(text: string): ServerText | null {

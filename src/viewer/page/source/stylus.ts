@@ -30,6 +30,7 @@ const hoverSpeed = 0.45; // m/s
 const plungeSpeed = 0.03; // m/s
 const withdrawSpeed = 0.12; // m/s
 const gripDepth = 0.001; // m, at which the jaws close
+const settling = 2e-5; // m, by which the hand goes on until they have: every motion is solved for
 
 export class Stylus {
   mode: Mode = 'probe';
@@ -45,6 +46,8 @@ export class Stylus {
   private height = new Vector3(); // hand in hovering
   private heading = new Vector3(1, 0, 0); // of the blade
   private gripped = false;
+  private gripAt = 0; // number of the pose that the jaws were closed at
+  private solved = 0; // newest pose that the body has been solved for
   private wantsPress = false;
   private wantsPark = false;
   private park = new Vector3();
@@ -62,6 +65,11 @@ export class Stylus {
 
   get pressing(): boolean {
     return this.wantsPress;
+  }
+
+  /** The body has been solved for pose `n`. */
+  answered(n: number): void {
+    this.solved = n;
   }
 
   /** The hand's newest pose number. */
@@ -208,11 +216,14 @@ export class Stylus {
     }
     const withdrawing = this.stage === 'withdrawing';
     let goal = withdrawing ? -clearance[this.mode] : this.depths[this.mode];
+    // The jaws take hold in a solve: pulled away before that they would hold nothing.
     if (this.mode === 'grasper' && !withdrawing && !this.gripped) goal = gripDepth;
+    else if (this.gripped && this.solved < this.gripAt) goal = gripDepth + settling;
     const pace = (withdrawing ? withdrawSpeed : plungeSpeed) * seconds;
     this.depth += Math.min(Math.max(goal - this.depth, -pace), pace);
     if (this.mode === 'grasper' && !withdrawing && !this.gripped && this.depth >= gripDepth) {
       this.gripped = true;
+      this.gripAt = this.number + 1;
       this.send({ type: 'grip', closed: true });
     }
     if (!withdrawing) this.follow(place, workSpeed[this.mode] * seconds);

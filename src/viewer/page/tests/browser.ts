@@ -50,6 +50,14 @@ export async function until(tab: Tab, what: string, condition: () => boolean, se
   try {
     await tab.waitForFunction(condition, undefined, { timeout: 1000 * seconds, polling: 50 });
   } catch (error) {
-    throw new Error(`not within ${seconds} s: ${what} (${String(error).split('\n')[0]})`);
+    const seen = await tab
+      .evaluate(() => {
+        const { frame, session, tear } = globalThis.spherecut!;
+        const { epoch, solve, mode, depth, state, force, tip, hand, solveSeconds } = frame!;
+        const messages = document.getElementById('messages')!.innerText;
+        return JSON.stringify({ epoch, session: session?.epoch, solve, mode, depth, state, force, tip, hand, solveSeconds, tear, messages });
+      })
+      .catch(() => 'nothing');
+    throw new Error(`not within ${seconds} s: ${what} (${String(error).split('\n')[0]}); the page has ${seen}`);
   }
 }

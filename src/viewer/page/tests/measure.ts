@@ -1,42 +1,94 @@
-// Rates of the page beside the live liver of 20,000 triangles, drawn by the processor: node measure.mjs BUILD_FOLDER SOURCE_FOLDER
+// Rates and latencies of the live liver of 20,000 triangles, drawn by the processor: node measure.mjs BUILD_FOLDER SOURCE_FOLDER
+// A press that slides and a cut, first through the page alone, then with a second client that only reads the feed.
 import { join } from 'node:path';
+import type { Page as Tab } from 'playwright-core';
 import { launch, openPage, until } from './browser';
-import { above, hover, look, ready } from './hand';
+import { Feed } from './feed';
+import { above, chooseMode, hover, look, ready } from './hand';
 import { serve } from './server';
 
 const [build = '.', source = '.'] = process.argv.slice(2);
-const served = await serve(build, join(source, 'scenarios/liver_live.toml'));
-const browser = await launch();
-try {
-  const { tab } = await openPage(browser, served.address, { width: 1280, height: 720 });
-  await ready(tab);
-  await hover(tab, -0.03, -0.01);
-  const middle = await above(tab, -0.03, -0.01);
-  await tab.mouse.down();
-  await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
-  const before = { time: Date.now(), seen: await look(tab), ...(await counters()) };
-  while (Date.now() - before.time < 12_000) {
-    const angle = (Date.now() - before.time) / 700;
-    await tab.mouse.move(middle.x + 25 * Math.sin(angle), middle.y + 12 * Math.sin(1.7 * angle));
+
+const ms = (seconds: number | null): string => (seconds === null ? '-' : `${(1000 * seconds).toFixed(0)} ms`);
+
+/** What the page counts since its start. */
+function counters(tab: Tab): Promise<{ frame: number; vertices: number; pictures: number }> {
+  return tab.evaluate(() => {
+    const { frame, seenVertices, pictures } = globalThis.spherecut!;
+    return { frame: frame!.number, vertices: seenVertices, pictures };
+  });
+}
+
+/** Does `act` and says what came meanwhile. */
+async function measured(tab: Tab, feed: Feed | null, what: string, act: () => Promise<void>): Promise<void> {
+  await tab.evaluate(() => [globalThis.spherecut!.latency, globalThis.spherecut!.toolLatency].forEach((latency) => latency.clear()));
+  const [before, seen, start] = [await counters(tab), await look(tab), performance.now()];
+  feed?.take();
+  await act();
+  const seconds = (performance.now() - start) / 1000;
+  const [after, end, read] = [await counters(tab), await look(tab), feed?.take()];
+  const rate = (count: number): string => (count / seconds).toFixed(1);
+  console.log(
+    `${what}: page ${rate(after.frame - before.frame)} frames a second, ${rate(after.vertices - before.vertices)} with new vertices, ` +
+      `${rate(after.pictures - before.pictures)} pictures; ${rate(end.solve - seen.solve)} solves a second, cut ${(1e4 * (end.cutArea - seen.cutArea)).toFixed(2)} cm2`,
+  );
+  const [body, tool, picture] = await tab.evaluate(() => {
+    const { latency, toolLatency, view } = globalThis.spherecut!;
+    const of = (list: typeof latency): (number | null)[] => [list.quantile(0.5), list.quantile(0.95), list.count];
+    return [of(latency), of(toolLatency), [view.pictureSeconds, view.canvas.width, view.canvas.height]] as const;
+  });
+  console.log(
+    `  from hand to picture, median and 95 %: tool and force ${ms(tool[0]!)}, ${ms(tool[1]!)} (${tool[2]} poses); ` +
+      `body solved at it ${ms(body[0]!)}, ${ms(body[1]!)} (${body[2]}); a picture takes ${ms(picture[0]!)} at ${picture[1]} x ${picture[2]}`,
+  );
+  if (read) {
+    console.log(
+      `  client that only reads: ${read.frames.toFixed(1)} frames a second, ${read.vertices.toFixed(1)} with new vertices, ` +
+        `${read.megabytes.toFixed(2)} MB/s, longest wait ${ms(read.longest)}`,
+    );
+  }
+}
+
+/** Moves the pressed pointer about for `seconds`; `way` in pixels at a time in s. */
+async function drag(tab: Tab, from: { x: number; y: number }, seconds: number, way: (time: number) => [number, number]): Promise<void> {
+  const start = performance.now();
+  for (let time = 0; time < seconds; time = (performance.now() - start) / 1000) {
+    const [dx, dy] = way(time);
+    await tab.mouse.move(from.x + dx, from.y + dy);
     await tab.waitForTimeout(25);
   }
-  const seconds = (Date.now() - before.time) / 1000;
-  const end = { seen: await look(tab), ...(await counters()) };
-  const per = (a: number, b: number): string => ((b - a) / seconds).toFixed(1);
-  console.log(`frames ${per(before.frames, end.frames)} a second, solves ${per(before.seen.solve, end.seen.solve)} a second`);
-  console.log(
-    await tab.evaluate(() => {
-      const { latency, view } = globalThis.spherecut!;
-      const ms = (q: number): string => (1000 * (latency.quantile(q) ?? NaN)).toFixed(0);
-      return `hand to picture, ms: median ${ms(0.5)}, p95 ${ms(0.95)} of ${latency.count}; a picture takes ${(1000 * view.pictureSeconds).toFixed(0)} ms at ${view.canvas.width} x ${view.canvas.height} pixels`;
-    }),
-  );
+}
 
-  async function counters(): Promise<{ frames: number }> {
-    return tab.evaluate(() => ({ frames: globalThis.spherecut!.frame!.number }));
+for (const reads of [false, true]) {
+  const served = await serve(build, join(source, 'scenarios/liver_live.toml'));
+  const browser = await launch();
+  const feed = reads ? new Feed(served.address) : null;
+  try {
+    const { tab } = await openPage(browser, served.address, { width: 1280, height: 720 });
+    await ready(tab);
+    await hover(tab, -0.03, -0.01);
+    const middle = await above(tab, -0.03, -0.01);
+    await tab.mouse.down();
+    await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
+    const name = reads ? ', with a client that only reads' : '';
+    await measured(tab, feed, `sliding under pressure${name}`, () =>
+      drag(tab, middle, 12, (time) => [25 * Math.sin(time / 0.7), 12 * Math.sin(1.7 * (time / 0.7))]),
+    );
+    await tab.mouse.up();
+    await chooseMode(tab, '2', 'blade');
+    await hover(tab, -0.06, 0.004);
+    const [start, end] = [await above(tab, -0.06, 0.004), await above(tab, 0.01, 0)];
+    await tab.mouse.move(start.x, start.y);
+    await tab.mouse.down();
+    await until(tab, 'the blade goes in', () => globalThis.spherecut!.frame!.depth > 0.004);
+    await measured(tab, feed, `cutting${name}`, () =>
+      drag(tab, start, 12, (time) => [((end.x - start.x) * time) / 12, ((end.y - start.y) * time) / 12]),
+    );
+    await tab.mouse.up();
+  } finally {
+    feed?.close();
+    await browser.close();
+    await served.stop();
   }
-} finally {
-  await browser.close();
-  await served.stop();
 }
 process.exit(0);

@@ -1,9 +1,9 @@
 // Pictures of the page for README and docs: node pictures.mjs BUILD_FOLDER SOURCE_FOLDER OUTPUT_FOLDER [liver|flap]
 import { join } from 'node:path';
 import type { Page as Tab } from 'playwright-core';
-import { launch, openPage, until } from './browser';
+import { launch, openPage, type Opened, until } from './browser';
 import { chooseMode, hover, look, ready, stroke } from './hand';
-import { serve } from './server';
+import { coarserFlap, serve } from './server';
 
 const [build = '.', source = '.', out = '.', which = ''] = process.argv.slice(2);
 /** A picture with smooth edges, small enough to be kept: below 150 kB. */
@@ -16,13 +16,26 @@ async function photograph(tab: Tab, name: string): Promise<void> {
   await tab.evaluate(() => globalThis.spherecut!.view.sharpen(1));
 }
 
-// Nodes stay as fine as they are however long a cut takes.
-async function liver(): Promise<void> {
-  const served = await serve(build, join(source, 'scenarios/liver_live.toml'), (text) => text.replace(/^budget = .*$/m, 'budget = 60.0'));
+/** Serves a scenario, its text changed, and hands its page to `act`. */
+async function withPage(scenario: string, change: (text: string) => string, act: (opened: Opened, phone: () => Promise<Opened>) => Promise<void>): Promise<void> {
+  const served = await serve(build, join(source, 'scenarios', scenario), change);
   const browser = await launch();
   try {
-    const { tab, context } = await openPage(browser, served.address, { width: 1280, height: 800 });
-    await ready(tab);
+    const opened = await openPage(browser, served.address, { width: 1280, height: 800 });
+    await ready(opened.tab);
+    await act(opened, () => openPage(browser, served.address, { width: 390, height: 760, touch: true }));
+  } catch (error) {
+    console.error(served.said());
+    throw error;
+  } finally {
+    await browser.close();
+    await served.stop();
+  }
+}
+
+// Nodes stay as fine as they are however long a cut takes.
+async function liver(): Promise<void> {
+  await withPage('liver_live.toml', (text) => text.replace(/^budget = .*$/m, 'budget = 60.0'), async ({ tab, context }, openPhone) => {
     const keep = async (name: string): Promise<void> => {
       await tab.evaluate(() => document.getElementById('messages')!.replaceChildren());
       await tab.waitForTimeout(700);
@@ -77,7 +90,7 @@ async function liver(): Promise<void> {
     await tab.waitForTimeout(1500);
     await keep('slice');
     await context.close();
-    const phone = await openPage(browser, served.address, { width: 390, height: 760, touch: true });
+    const phone = await openPhone();
     await ready(phone.tab);
     await phone.tab.getByText('Probe', { exact: true }).tap();
     await phone.tab.waitForTimeout(2000);
@@ -85,27 +98,12 @@ async function liver(): Promise<void> {
     await phone.tab.tap('#press-hold');
     await phone.tab.waitForTimeout(3500);
     await photograph(phone.tab, 'phone');
-  } catch (error) {
-    console.error(served.said());
-    throw error;
-  } finally {
-    await browser.close();
-    await served.stop();
-  }
+  });
 }
 
 /** The flap held by the grasper, before and after it has torn on. */
 async function flap(): Promise<void> {
-  const served = await serve(build, join(source, 'scenarios/liver_flap.toml'), (text) =>
-    text
-      .replace('fine_spacing = 0.004', 'fine_spacing = 0.006')
-      .replace('coarse_spacing = 0.020', 'coarse_spacing = 0.026')
-      .replace('fine_radius = 0.006', 'fine_radius = 0.008'),
-  );
-  const browser = await launch();
-  try {
-    const { tab } = await openPage(browser, served.address, { width: 1280, height: 800 });
-    await ready(tab);
+  await withPage('liver_flap.toml', coarserFlap, async ({ tab }) => {
     await hover(tab, -0.062, 0.003);
     await tab.mouse.down();
     await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3, 120);
@@ -125,13 +123,7 @@ async function flap(): Promise<void> {
     await tab.waitForTimeout(6000);
     await photograph(tab, 'tear');
     console.log('tear', JSON.stringify(await look(tab)));
-  } catch (error) {
-    console.error(served.said());
-    throw error;
-  } finally {
-    await browser.close();
-    await served.stop();
-  }
+  });
 }
 
 if (which !== 'flap') await liver();

@@ -12,9 +12,15 @@ export interface Served {
   stop(): Promise<void>;
 }
 
-/** Serves a scenario on a free port. `change` edits its text. */
-export async function serve(build: string, scenario: string, change: (text: string) => string = (text) => text): Promise<Served> {
+/** Serves a scenario on a free port. `change` edits its text; `others` lie beside it, by their names. */
+export async function serve(
+  build: string,
+  scenario: string,
+  change: (text: string) => string = (text) => text,
+  others: Record<string, string> = {},
+): Promise<Served> {
   const folder = mkdtempSync(join(tmpdir(), 'spherecut-page-'));
+  for (const [name, text] of Object.entries(others)) writeFileSync(join(folder, name), text);
   const file = join(folder, 'scenario.toml');
   writeFileSync(file, change(readFileSync(scenario, 'utf8')));
   const child = spawn(join(build, 'spherecut'), ['serve', file, '--port', '0', '--out', join(folder, 'out'), '--page', join(build, 'page')], {
@@ -44,6 +50,13 @@ export async function serve(build: string, scenario: string, change: (text: stri
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
 }
+
+/** The flap of the liver with fewer nodes: the same tear, sooner. */
+export const coarserFlap = (text: string): string =>
+  text
+    .replace('fine_spacing = 0.004', 'fine_spacing = 0.006')
+    .replace('coarse_spacing = 0.020', 'coarse_spacing = 0.026')
+    .replace('fine_radius = 0.006', 'fine_radius = 0.008');
 
 /** Force on the hand at every tick of a recording (docs/haptics.md has the layout). */
 export function recordedForces(bytes: Buffer): { time: number; force: [number, number, number] }[] {

@@ -5,7 +5,7 @@ import test, { after, before } from 'node:test';
 import type { Browser } from 'playwright-core';
 import { launch, type Opened, openPage, until } from './browser';
 import { hover, look, ready } from './hand';
-import { serve, type Served } from './server';
+import { coarserFlap, serve, type Served } from './server';
 
 const [build = '.', source = '.'] = process.argv.slice(2);
 const flap = { x: -0.062, y: 0.003 }; // m, where it is held
@@ -14,14 +14,8 @@ let browser: Browser;
 let opened: Opened;
 
 before(async () => {
-  // The flap of the liver with fewer triangles and nodes: the same tear, sooner.
-  served = await serve(build, join(source, 'scenarios/liver_flap.toml'), (text) =>
-    text
-      .replace('triangles = 20000', 'triangles = 5000')
-      .replace('fine_spacing = 0.004', 'fine_spacing = 0.006')
-      .replace('coarse_spacing = 0.020', 'coarse_spacing = 0.026')
-      .replace('fine_radius = 0.006', 'fine_radius = 0.008'),
-  );
+  // With fewer triangles too.
+  served = await serve(build, join(source, 'scenarios/liver_flap.toml'), (text) => coarserFlap(text).replace('triangles = 20000', 'triangles = 5000'));
   browser = await launch();
   opened = await openPage(browser, served.address);
 });
@@ -59,6 +53,8 @@ test('Pulled further it tears: the cut grows and its sides part', async () => {
   const torn = await look(tab);
   assert.ok(torn.cutArea > 1.02 * before.cutArea, `${before.cutArea} m2 became ${torn.cutArea}`);
   assert.ok(torn.lips > before.lips + 5e-4, `${before.lips} m became ${torn.lips}`);
+  await until(tab, 'the page says what the tear is at', () => (globalThis.spherecut!.tear?.area ?? 0) > 0);
+  assert.match((await tab.textContent('#tear-state')) ?? '', /^(Tearing,|The tear) .*cm²/);
 });
 
 test('Let go, it is without force, and what is torn stays torn', async () => {
@@ -68,6 +64,9 @@ test('Let go, it is without force, and what is torn stays torn', async () => {
   await until(tab, 'it has let go', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0, 150);
   const after = await look(tab);
   assert.ok(after.cutArea >= before.cutArea);
+  // At rest it grows no more, and the page says why.
+  await until(tab, 'the tear has come to rest', () => ['arrested', 'refused', 'severed'].includes(globalThis.spherecut!.tear?.state ?? ''), 150);
+  assert.match((await tab.textContent('#tear-state')) ?? '', /^The tear (is arrested at|has stopped at|has parted) .*[a-z]/);
 });
 
 test('By keyboard: a reset, then the grasper takes hold and pulls', async () => {
@@ -77,6 +76,7 @@ test('By keyboard: a reset, then the grasper takes hold and pulls', async () => 
   await tab.keyboard.press('r');
   await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 90_000 });
   await until(tab, 'a frame', () => globalThis.spherecut!.frame?.epoch === globalThis.spherecut!.session!.epoch);
+  await until(tab, 'the tear of the session before is forgotten', () => !globalThis.spherecut!.tear?.area);
   await tab.focus('#scene');
   await tab.keyboard.down('ArrowLeft');
   await tab.waitForTimeout(120);

@@ -1,0 +1,265 @@
+// The haptic thread of `spherecut serve`, single-stepped: how many instructions a tick takes, with and without viewers.
+// A count, not a time: it is the same on a slow or busy machine, and where there are no hardware counters.
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/support/web_client.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <ctime>
+#include <fcntl.h>
+#include <fstream>
+#include <sched.h>
+#include <stdexcept>
+#include <sys/ptrace.h>
+#include <sys/syscall.h>
+#include <sys/user.h>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+
+using namespace spherecut::tests;
+
+namespace {
+
+constexpr const char* block = R"(
+[organ]
+shape = "block"
+size = [0.06, 0.06, 0.03]
+[material]
+young_modulus = 10000.0
+poisson_ratio = 0.3
+[[fixed]]
+name = "base"
+region = "box"
+lower = [-0.04, -0.04, -0.001]
+upper = [0.04, 0.04, 0.001]
+[nodes]
+fine_spacing = 0.008
+coarse_spacing = 0.012
+fine_radius = 0.01
+[tool]
+shape = "sphere_tip"
+radius = 0.008
+step = 0.1
+[tool.approach]
+target = [0.0, 0.0, 0.03]
+direction = [0.0, 0.0, -1.0]
+depth = 0.002
+clearance = 0.002
+duration = 1.0
+)";
+
+/// The program as a child of this one, which may step it therefore.
+class Server {
+ public:
+  Server() {
+    const std::string scenario = write_file(folder_.path() / "block.toml", block).string();
+    const std::string out = (folder_.path() / "out").string(), said = (folder_.path() / "said").string();
+    child_ = fork();
+    if (child_ == 0) {
+      const int file = open(said.c_str(), O_WRONLY | O_CREAT, 0600);
+      dup2(file, 1);
+      dup2(file, 2);
+      execl(SPHERECUT_BINARY, SPHERECUT_BINARY, "serve", scenario.c_str(), "--port", "0", "--out", out.c_str(),
+            static_cast<char*>(nullptr));
+      _exit(127);
+    }
+    static constexpr const char* address = "http://127.0.0.1:";
+    for (int i = 0; i < 6000 && port_ == 0 && waitpid(child_, nullptr, WNOHANG) == 0; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      const std::string text = read_file(said);
+      if (const auto at = text.find(address); at != std::string::npos && text.find('/', at + 17) != std::string::npos)
+        port_ = std::stoi(text.substr(at + std::strlen(address)));
+    }
+    if (port_ == 0)
+      throw std::runtime_error("the server did not start: " + read_file(said));
+  }
+  ~Server() {
+    kill(child_, SIGKILL);
+    waitpid(child_, nullptr, 0);
+  }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  [[nodiscard]] int port() const { return port_; }
+  /// The thread of that name; 0: there is none.
+  [[nodiscard]] pid_t thread(const std::string& name) const {
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/" + std::to_string(child_) + "/task")) {
+      std::string line;
+      std::getline(std::ifstream(entry.path() / "comm"), line);
+      if (line == name)
+        return std::stoi(entry.path().filename().string());
+    }
+    return 0;
+  }
+
+ private:
+  TemporaryFolder folder_;
+  pid_t child_ = 0;
+  int port_ = 0;
+};
+
+/// Steps a thread from one reading of its processor time to the next. A tick reads it once before and once after its
+/// work, so two stretches on end are a whole tick, waiting left out: a stepped thread is always late.
+class Stepper {
+ public:
+  explicit Stepper(pid_t thread) : thread_(thread) {
+    if (ptrace(PTRACE_SEIZE, thread_, nullptr, nullptr) != 0)
+      throw std::runtime_error(std::string("this process may not trace its child: ") + std::strerror(errno));
+    ptrace(PTRACE_INTERRUPT, thread_, nullptr, nullptr);
+    wait();
+  }
+  ~Stepper() { ptrace(PTRACE_DETACH, thread_, nullptr, nullptr); }
+  Stepper(const Stepper&) = delete;
+  Stepper& operator=(const Stepper&) = delete;
+
+  /// Instructions of the shortest of some ticks on end: now and then the clock is read anew within a reading.
+  long shortest_tick(int ticks) {
+    long least = 0;
+    long before = -1; // of the stretch before; unknown at first
+    for (int i = 0; i < 2 * ticks + 2; ++i) {
+      const long now = stretch();
+      if (i > 0 && before >= 0 && (least == 0 || before + now < least))
+        least = before + now;
+      before = i > 0 ? now : -1; // the first began anywhere
+    }
+    return least;
+  }
+
+ private:
+  void wait() const {
+    int status = 0;
+    if (waitpid(thread_, &status, __WALL) != thread_ || !WIFSTOPPED(status))
+      throw std::runtime_error("the haptic thread has ended");
+  }
+  long stretch() const {
+    for (long count = 1; count < 10'000'000; ++count) {
+      user_regs_struct registers{};
+      ptrace(PTRACE_GETREGS, thread_, nullptr, &registers);
+      const bool reads = registers.rax == SYS_clock_gettime && registers.rdi == CLOCK_THREAD_CPUTIME_ID &&
+                         (ptrace(PTRACE_PEEKTEXT, thread_, registers.rip, nullptr) & 0xffff) == 0x050f; // syscall
+      ptrace(PTRACE_SINGLESTEP, thread_, nullptr, nullptr);
+      wait();
+      if (reads)
+        return count;
+    }
+    throw std::runtime_error("the haptic thread does not read its processor time any more: the ticks cannot be told");
+  }
+  pid_t thread_;
+};
+
+/// Watches until it is told to stop.
+class Viewer {
+ public:
+  explicit Viewer(int port) : socket_(port) {
+    socket_.send(R"({"type":"hello","version":1})");
+    socket_.send(R"({"type":"credit","frames":2})");
+    thread_ = std::thread([this] {
+      while (!stop_) {
+        if (const auto message = socket_.receive(0.2); message && message->binary && message->bytes[0] == 2) {
+          ++frames_;
+          socket_.send(R"({"type":"credit","frames":1})");
+        }
+      }
+    });
+  }
+  ~Viewer() {
+    stop_ = true;
+    thread_.join();
+  }
+  Viewer(const Viewer&) = delete;
+  Viewer& operator=(const Viewer&) = delete;
+
+  [[nodiscard]] int frames() const { return frames_; }
+
+ private:
+  WebSocketClient socket_; // the thread's
+  std::atomic<bool> stop_{false};
+  std::atomic<int> frames_{0};
+  std::thread thread_;
+};
+
+/// Comes and goes with nonsense until it is told to stop.
+class Noise {
+ public:
+  explicit Noise(int port) {
+    thread_ = std::thread([this, port] {
+      while (!stop_) {
+        WebSocketClient client(port);
+        client.send(visits % 3 == 0   ? std::string("{\"type\":\"pose\",\"n\":1}")
+                    : visits % 3 == 1 ? std::string("\xff\x00 nonsense", 11)
+                                      : R"({"type":"hello","version":7})");
+        if (client.wait_for_close(1))
+          ++ended;
+        ++visits;
+      }
+    });
+  }
+  ~Noise() {
+    stop_ = true;
+    thread_.join();
+  }
+  Noise(const Noise&) = delete;
+  Noise& operator=(const Noise&) = delete;
+  std::atomic<int> visits{0}, ended{0};
+
+ private:
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+template <typename Condition>
+bool soon(const Condition& condition) {
+  for (int i = 0; i < 6000; ++i) {
+    if (condition())
+      return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+} // namespace
+
+TEST_CASE("Viewers, nonsense and reconnects cost the haptic thread not one instruction of a tick") {
+  const Server server;
+  pid_t haptic = 0;
+  REQUIRE(soon([&] { return (haptic = server.thread("haptic")) != 0; }));
+  // A stepped thread and the one that steps it take turns: where that is allowed, before what else there is to do.
+  sched_param priority{};
+  priority.sched_priority = 10;
+  static_cast<void>(sched_setscheduler(0, SCHED_FIFO, &priority));
+  try {
+    const Stepper probe(haptic);
+  } catch (const std::runtime_error& error) {
+    WARN("NOT COUNTED: " << error.what());
+    return;
+  }
+  const auto count = [&] { return Stepper(haptic).shortest_tick(10); };
+  const long alone = count();
+  CHECK(alone > 1000);
+  CHECK(count() == alone);
+  std::array<std::unique_ptr<Viewer>, 4> viewers;
+  for (auto& viewer : viewers)
+    viewer = std::make_unique<Viewer>(server.port());
+  CHECK(
+      soon([&] { return std::all_of(viewers.begin(), viewers.end(), [](const auto& v) { return v->frames() > 3; }); }));
+  CHECK(count() == alone);
+  {
+    const Noise noise(server.port());
+    CHECK(soon([&] { return noise.visits > 3; }));
+    const int before = noise.visits;
+    CHECK(count() == alone);
+    CHECK(noise.visits > before); // while it was counted
+    CHECK(soon([&] { return noise.ended > 10; }));
+  }
+  for (auto& viewer : viewers)
+    viewer.reset();
+  CHECK(count() == alone);
+  std::printf("instructions from one tick to the next: %ld\n", alone);
+}
