@@ -117,10 +117,8 @@ StepResult Session::step(const StepSample& sample) {
   }
   if (cuts())
     result.cut.emplace();
-  grip_memory_.reset();
-  if (scenario_.contact.condition == solvers::ContactCondition::frictional && model_.state && !grasps() &&
-      !model_.patch.nodes.empty())
-    grip_memory_ = solvers::remember(model_.patch, model_.state->tool, scenario_.contact.friction);
+  const auto kept = std::exchange(kept_grip_, std::nullopt);
+  grip_memory_ = model_.state ? remembered_grip() : kept;
   if (without_blade_) {
     model_.field = std::move(*without_blade_);
     without_blade_.reset();
@@ -163,6 +161,14 @@ StepResult Session::step(const StepSample& sample) {
     report_cut(*result.cut);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
+}
+
+// What friction has to know of the solution, should the nodes change.
+std::optional<solvers::GripMemory> Session::remembered_grip() const {
+  if (scenario_.contact.condition != solvers::ContactCondition::frictional || !model_.state || grasps() ||
+      model_.patch.nodes.empty())
+    return std::nullopt;
+  return solvers::remember(model_.patch, model_.state->tool, scenario_.contact.friction);
 }
 
 void Session::prepare(const StepSample& sample) {

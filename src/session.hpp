@@ -145,6 +145,7 @@ class Session {
   [[nodiscard]] topology::SurfaceContact centre_of(const topology::SurfaceContact& contact,
                                                    const topology::ToolPose& pose) const;
   [[nodiscard]] bool must_follow(const topology::SurfaceContact& contact) const;
+  [[nodiscard]] std::optional<solvers::GripMemory> remembered_grip() const;
   [[nodiscard]] topology::SurfaceContact next_zone(const topology::SurfaceContact& contact) const;
   void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
   [[nodiscard]] solvers::SprinkleOptions sprinkle_options(const BodyModel& model) const;
@@ -269,6 +270,7 @@ class Session {
   bool force_only_ = false;
   bool updating_ = true;
   std::optional<solvers::GripMemory> grip_memory_; // friction at the start of the step, should its nodes change
+  std::optional<solvers::GripMemory> kept_grip_;   // of a body that another has taken over from since the last step
   bool recondensing_on_ = false;
   std::unique_ptr<Recondensing> recondensing_, given_up_; // null: none
   topology::SurfaceMesh recondensing_way_;                // for which it is condensed

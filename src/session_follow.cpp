@@ -15,7 +15,7 @@ void Session::set_following_aside(bool on) {
 // The contact has come so far from the middle of the fine zone that this must follow.
 void Session::follow_aside(const StepSample& sample, const topology::SurfaceContact& centre) {
   if (!following_) {
-    begin_following(centre);
+    begin_following(next_zone(centre));
     return;
   }
   if ((centre.point - zone_contact_->point).norm() <= zone_.spacing.radius)
@@ -54,6 +54,7 @@ void Session::take_following() {
   BodyModel next = following.made.get();
   drop_recondensing();
   without_blade_.reset();
+  kept_grip_ = remembered_grip();
   zone_contact_ = following.centre;
   zone_.spacing.centres = {following.centre.point};
   model_ = std::move(next);
