@@ -13,6 +13,7 @@
 #include <optional>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/resource.h>
 #include <thread>
 
 namespace spherecut::app {
@@ -101,6 +102,8 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
 void simulation_thread(const HapticSettings& settings, HapticSimulation& simulation, Shared& shared, ViewerFeed& feed,
                        const RealtimeOptions& options, std::uint64_t& lost, RealtimeReport& report) {
   pthread_setname_np(pthread_self(), "simulation");
+  if (options.niceness > 0)
+    static_cast<void>(setpriority(PRIO_PROCESS, 0, options.niceness)); // of this thread alone
   DegradationRule rule(settings.budget);
   std::uint64_t sequence = 0;
   std::optional<DeviceState> solved; // the last that was

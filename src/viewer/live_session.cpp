@@ -12,6 +12,7 @@ namespace {
 
 constexpr std::uint64_t flush_ticks = 256;               // between two writes of a recording
 constexpr std::uint64_t most_recorded_ticks = 3'600'000; // an hour: then it ends
+constexpr int solver_niceness = 5;                       // the viewer that draws beside the solver goes before it
 constexpr double parking = 0.15;                         // of the organ's diagonal, beyond where the tool starts
 
 PathPose start_of(const std::vector<StepSample>& steps, bool blade) {
@@ -72,6 +73,7 @@ void LiveSession::run() {
   options.keep = false;
   options.solve_at_rest = false;
   options.follow_aside = true;
+  options.niceness = solver_niceness;
   // Between solves the tangent force is that of the body all the same; more of them than pictures are of no use, and
   // the viewer may need the processor.
   if (scenario_.haptics.model == ForceModelKind::tangent)
