@@ -98,9 +98,13 @@ std::string_view to_string(Element element);
 std::unique_ptr<BackEnd> make_fem_remesh(const Scenario& scenario, const Resolution& resolution, Element element,
                                          double limit);
 
-/// The mesh is carried along with the front, the far part stays condensed; meshed anew when it is worn.
+/// The tetrahedra about the new strip of the cut are taken out and others put in, the rest stays and its far part
+/// condensed. Without TetGen every increment is recorded as a failure.
 std::unique_ptr<BackEnd> make_fem_local_remesh(const Scenario& scenario, const Resolution& resolution, Element element,
                                                double limit);
+/// The mesh is carried along with the front, the far part stays condensed; meshed anew when it is worn.
+std::unique_ptr<BackEnd> make_fem_carried(const Scenario& scenario, const Resolution& resolution, Element element,
+                                          double limit);
 /// Linear tetrahedra split along the sheet.
 std::unique_ptr<BackEnd> make_fem_split(const Scenario& scenario, const Resolution& resolution, double limit);
 /// Tetrahedra of the uncut organ, enriched at the cut; GetFEM cuts them. Null where the build has no GetFEM.

@@ -70,6 +70,24 @@ std::vector<std::vector<Vector3>> mesh_features(const Scenario& scenario, int in
   return features;
 }
 
+CutCurves cut_curves(const Scenario& scenario, int increment) {
+  const std::vector<Vector3> front = front_of(scenario, increment).points;
+  const std::vector<Vector2> outline = scenario.outline(increment);
+  const double rounding = 1e-9 * scenario.size;
+  CutCurves curves;
+  for (auto& piece : mesh_features(scenario, increment)) {
+    if (std::any_of(piece.begin(), piece.end(),
+                    [&](const Vector3& x) { return std::abs(scenario.height(x)) > rounding; }))
+      continue;
+    const Vector3 middle = 0.5 * (piece[piece.size() / 2] + piece[(piece.size() - 1) / 2]);
+    if (distance_to(front, middle) < rounding)
+      curves.front.push_back(std::move(piece));
+    else if (inside(outline, scenario.in_plane(middle)))
+      curves.border.push_back(std::move(piece));
+  }
+  return curves;
+}
+
 MeshRequest mesh_request(const Scenario& scenario, int increment, const Grading& grading) {
   MeshRequest request;
   // Where the plane leaves a curved organ at a thin margin the faces meet at sharp angles, and refinement would not

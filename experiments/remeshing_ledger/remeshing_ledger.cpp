@@ -1,9 +1,11 @@
 // Problem:   one growing cut, several back ends: finite spheres that follow it by local updates or are built anew, and
-//            finite elements that mesh the organ anew or move their mesh along. A penny crack under pressure that grows
-//            in a cube; a cut that runs 40 mm into a block in 50 increments; an incision into a liver.
+//            finite elements that mesh the organ, or a cavity in its mesh, anew or move their mesh along. A penny crack
+//            under pressure that grows in a cube; a cut that runs 40 mm into a block in 50 increments; an incision into
+//            a liver.
 // Reference: the penny's opening [Sneddon 1946]; for the others quadratic tetrahedra with quarter-point tips on a fine
 //            mesh, checked against a second reference of another kind.
 // Command:   spherecut experiment run remeshing_ledger --out DIR
+#include "experiments/remeshing_ledger/cavity_fill.hpp"
 #include "experiments/remeshing_ledger/ledger.hpp"
 #include "experiments/remeshing_ledger/run.hpp"
 #include "experiments/support/statistics.hpp"
@@ -32,34 +34,37 @@ Contender spheres(bool galerkin, Upkeep upkeep, std::vector<double> sizes) {
   return c;
 }
 
-Contender remesh(Element element, std::vector<double> sizes, double limit = mesher_limit) {
+/// A rival of several kinds of elements.
+using MakeRival = std::unique_ptr<BackEnd> (*)(const Scenario&, const Resolution&, Element, double);
+Contender rival(const char* name, MakeRival make, Element element, std::vector<double> sizes,
+                double limit = mesher_limit) {
   Contender c;
-  c.make = [=](const Scenario& s, const Resolution& r) { return make_fem_remesh(s, r, element, limit); };
-  c.name = fmt::format("fem_remesh_{}", to_string(element));
+  c.make = [=](const Scenario& s, const Resolution& r) { return make(s, r, element, limit); };
+  c.name = fmt::format("{}_{}", name, to_string(element));
   c.sizes = std::move(sizes);
   return c;
 }
 
-Contender local_remesh(Element element, std::vector<double> sizes) {
-  Contender c;
-  c.make = [=](const Scenario& s, const Resolution& r) { return make_fem_local_remesh(s, r, element, mesher_limit); };
-  c.name = fmt::format("fem_local_remesh_{}", to_string(element));
-  c.sizes = std::move(sizes);
-  return c;
+Contender remesh(Element element, std::vector<double> sizes, double limit = mesher_limit) {
+  return rival("fem_remesh", make_fem_remesh, element, std::move(sizes), limit);
+}
+
+Contender local_remesh(std::vector<double> sizes) {
+  return rival("fem_local_remesh", make_fem_local_remesh, Element::quarter_point, std::move(sizes));
+}
+
+Contender carried(std::vector<double> sizes) {
+  return rival("fem_carried", make_fem_carried, Element::quarter_point, std::move(sizes));
+}
+
+Contender xfem(Element element, std::vector<double> sizes) {
+  return rival("xfem", make_xfem, element, std::move(sizes));
 }
 
 Contender split(std::vector<double> sizes) {
   Contender c;
-  c.make = [=](const Scenario& s, const Resolution& r) { return make_fem_split(s, r, mesher_limit); };
+  c.make = [](const Scenario& s, const Resolution& r) { return make_fem_split(s, r, mesher_limit); };
   c.name = "fem_split";
-  c.sizes = std::move(sizes);
-  return c;
-}
-
-Contender xfem(Element element, std::vector<double> sizes) {
-  Contender c;
-  c.make = [=](const Scenario& s, const Resolution& r) { return make_xfem(s, r, element, mesher_limit); };
-  c.name = fmt::format("xfem_{}", to_string(element));
   c.sizes = std::move(sizes);
   return c;
 }
@@ -99,7 +104,7 @@ void check_convergence(const std::vector<Run>& runs, const std::vector<Contender
 std::vector<Contender> penny_contenders(bool quick) {
   std::vector<Contender> contenders{
       spheres(true, Upkeep::update, quick ? std::vector{0.85, 0.6} : std::vector{1.1, 0.85, 0.6, 0.45, 0.35}),
-      local_remesh(Element::quarter_point, quick ? std::vector{0.8, 0.45} : std::vector{0.8, 0.6, 0.45, 0.33, 0.25}),
+      carried(quick ? std::vector{0.8, 0.45} : std::vector{0.8, 0.6, 0.45, 0.33, 0.25}),
       remesh(Element::quarter_point, quick ? std::vector{0.8, 0.45} : std::vector{0.8, 0.6, 0.45, 0.33, 0.25}),
       remesh(Element::quadratic, quick ? std::vector{0.6, 0.35} : std::vector{0.6, 0.4, 0.25, 0.16}),
       remesh(Element::linear, quick ? std::vector{0.4, 0.25} : std::vector{0.4, 0.25, 0.15, 0.1}),
@@ -107,6 +112,8 @@ std::vector<Contender> penny_contenders(bool quick) {
       spheres(true, Upkeep::scratch, quick ? std::vector{0.85, 0.6} : std::vector{1.1, 0.85, 0.6, 0.45, 0.35}),
       spheres(false, Upkeep::scratch, quick ? std::vector{0.6} : std::vector{0.6, 0.45, 0.33}),
   };
+  if (has_cavity_mesher())
+    contenders.push_back(local_remesh(quick ? std::vector{0.8, 0.45} : std::vector{0.8, 0.6, 0.45, 0.33, 0.25}));
   if (has_xfem()) {
     contenders.push_back(xfem(Element::linear, quick ? std::vector{0.8} : std::vector{1.1, 0.8, 0.6, 0.4}));
     contenders.push_back(
@@ -119,17 +126,17 @@ std::vector<Contender> penny_contenders(bool quick) {
 
 std::vector<Contender> edge_contenders(bool quick) {
   if (quick)
-    return {spheres(true, Upkeep::update, {0.007}), local_remesh(Element::quarter_point, {0.007}), split({0.005})};
+    return has_cavity_mesher() ? std::vector{spheres(true, Upkeep::update, {0.007}), carried({0.007}),
+                                             local_remesh({0.007}), split({0.005})}
+                               : std::vector{spheres(true, Upkeep::update, {0.007}), carried({0.007}), split({0.005})};
   std::vector<Contender> contenders{
-      spheres(true, Upkeep::update, {0.007, 0.005, 0.0037}),
-      local_remesh(Element::quarter_point, {0.014, 0.01, 0.007}),
-      remesh(Element::quarter_point, {0.014, 0.01, 0.007}),
-      remesh(Element::quadratic, {0.0065, 0.0045, 0.003}),
-      remesh(Element::linear, {0.0045, 0.003, 0.002}),
-      split({0.0045, 0.003, 0.002}),
-      spheres(true, Upkeep::scratch, {0.007, 0.005, 0.0037}),
-      spheres(false, Upkeep::exchange, {0.007, 0.005}),
+      spheres(true, Upkeep::update, {0.007, 0.005, 0.0037}),  carried({0.014, 0.01, 0.007}),
+      remesh(Element::quarter_point, {0.014, 0.01, 0.007}),   remesh(Element::quadratic, {0.0065, 0.0045, 0.003}),
+      remesh(Element::linear, {0.0045, 0.003, 0.002}),        split({0.0045, 0.003, 0.002}),
+      spheres(true, Upkeep::scratch, {0.007, 0.005, 0.0037}), spheres(false, Upkeep::exchange, {0.007, 0.005}),
   };
+  if (has_cavity_mesher())
+    contenders.push_back(local_remesh({0.014, 0.01, 0.007, 0.005}));
   if (has_xfem()) {
     contenders.push_back(xfem(Element::linear, {0.014, 0.01, 0.007}));
     contenders.push_back(xfem(Element::quadratic, {0.028, 0.02, 0.014, 0.01}));
@@ -138,11 +145,12 @@ std::vector<Contender> edge_contenders(bool quick) {
 }
 
 std::vector<Contender> liver_contenders() {
-  std::vector<Contender> contenders{
-      spheres(true, Upkeep::update, {0.008}),  local_remesh(Element::quarter_point, {0.008}),
-      remesh(Element::quarter_point, {0.008}), split({0.004}),
-      remesh(Element::quadratic, {0.006}),     remesh(Element::linear, {0.004}),
-      spheres(true, Upkeep::scratch, {0.008})};
+  std::vector<Contender> contenders{spheres(true, Upkeep::update, {0.008}),  carried({0.008}),
+                                    remesh(Element::quarter_point, {0.008}), split({0.004}),
+                                    remesh(Element::quadratic, {0.006}),     remesh(Element::linear, {0.004}),
+                                    spheres(true, Upkeep::scratch, {0.008})};
+  if (has_cavity_mesher())
+    contenders.push_back(local_remesh({0.008}));
   if (has_xfem())
     contenders.push_back(xfem(Element::quadratic, {0.012}));
   return contenders;
@@ -192,6 +200,8 @@ std::vector<Check> run_remeshing_ledger(const ExperimentContext& context) {
         ratios.push_back(ratio);
     write_tables(all, ratios, context);
   };
+  if (!has_cavity_mesher())
+    context.say("fem_local_remesh: this build found no TetGen (libtet1.5-dev); the back end is left out");
   if (!has_xfem())
     context.say("xfem: this build found no GetFEM (libgetfem-dev); the back end is left out");
   const Scenario penny = growing_penny(context.quick ? 1 : 6);
@@ -207,10 +217,12 @@ std::vector<Check> run_remeshing_ledger(const ExperimentContext& context) {
       edge, remesh(Element::quarter_point, {context.quick ? 0.004 : 0.002}, reference_limit),
       context.quick ? remesh(Element::quadratic, {0.003}, reference_limit) : spheres(true, Upkeep::scratch, {0.0025}),
       context.quick ? 0.15 : 0.05, context, checks);
-  const std::vector<Run> edge_runs = run_all(edge, edge_contenders(context.quick), edge_reference,
-                                             counted(edge.increments, context.quick ? 1 : 10), 1, context);
+  const std::vector<Run> edge_runs =
+      run_all(edge, edge_contenders(context.quick), edge_reference, counted(edge.increments, context.quick ? 1 : 10),
+              context.quick ? 1 : 3, context);
   for (const Run& run : edge_runs)
-    checks.push_back({fmt::format("edge_{}_h{:.4f}_error_reported", run.name, run.fine), run.error, ">=", 0});
+    if (run.repeat == 0)
+      checks.push_back({fmt::format("edge_{}_h{:.4f}_error_reported", run.name, run.fine), run.error, ">=", 0});
   keep(edge_runs, {0.10, 0.05, 0.02});
   if (context.quick)
     return checks;
@@ -223,10 +235,11 @@ std::vector<Check> run_remeshing_ledger(const ExperimentContext& context) {
     return checks;
   }
   const std::vector<Run> liver_runs =
-      run_all(liver, liver_contenders(), liver_reference, counted(liver.increments, 10), 1, context);
+      run_all(liver, liver_contenders(), liver_reference, counted(liver.increments, 10), 3, context);
   for (const Run& run : liver_runs)
-    checks.push_back(
-        {fmt::format("liver_{}_failures_reported", run.name), static_cast<double>(run.failures()), ">=", 0});
+    if (run.repeat == 0)
+      checks.push_back(
+          {fmt::format("liver_{}_failures_reported", run.name), static_cast<double>(run.failures()), ">=", 0});
   keep(liver_runs, {});
   return checks;
 }

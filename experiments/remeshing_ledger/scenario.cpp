@@ -205,6 +205,14 @@ Front front_of(const Scenario& scenario, int increment) {
   return front;
 }
 
+std::vector<Vector3> leading_edge(const Scenario& scenario, int increment) {
+  Front front = front_of(scenario, increment);
+  if (front.closed)
+    return std::move(front.points);
+  const std::vector<Vector2> outline = scenario.outline(increment);
+  return {scenario.in_space(outline[1]), scenario.in_space(outline[2])};
+}
+
 double distance_to(const std::vector<Vector3>& polyline, const Vector3& x) {
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i + 1 < polyline.size(); ++i) {

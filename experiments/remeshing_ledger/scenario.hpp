@@ -67,6 +67,9 @@ struct Front {
 };
 Front front_of(const Scenario& scenario, int increment);
 
+/// The part of the front that moves: a closed one whole, of an open one its leading edge.
+std::vector<Vector3> leading_edge(const Scenario& scenario, int increment);
+
 /// Distance to a polyline, m.
 double distance_to(const std::vector<Vector3>& polyline, const Vector3& x);
 

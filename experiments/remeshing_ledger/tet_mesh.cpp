@@ -16,28 +16,6 @@ namespace {
 
 constexpr std::array<std::array<int, 3>, 4> face_of{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}}; // outward
 
-struct TetFace {
-  std::array<int, 3> key; // ascending
-  int tet, face;
-};
-
-/// Faces of all tetrahedra; those of two stand beside one another.
-std::vector<TetFace> sorted_faces(const TetMesh& mesh) {
-  std::vector<TetFace> faces;
-  faces.reserve(4 * mesh.tets.size());
-  for (int t = 0; t < std::ssize(mesh.tets); ++t)
-    for (int f = 0; f < 4; ++f) {
-      std::array<int, 3> key;
-      for (int k = 0; k < 3; ++k)
-        key[k] = mesh.tets[t][face_of[f][k]];
-      std::sort(key.begin(), key.end());
-      faces.push_back({key, t, f});
-    }
-  std::sort(faces.begin(), faces.end(),
-            [](const TetFace& a, const TetFace& b) { return a.key != b.key ? a.key < b.key : a.tet < b.tet; });
-  return faces;
-}
-
 /// Corners of cut faces around which the material above and below is joined by tetrahedra that share whole faces: the
 /// front, where the tetrahedra ahead of it cross the plane.
 std::vector<char> joined_ahead(const TetMesh& mesh, const std::vector<TetFace>& faces,
@@ -80,6 +58,22 @@ std::vector<char> joined_ahead(const TetMesh& mesh, const std::vector<TetFace>& 
 
 } // namespace
 
+std::vector<TetFace> sorted_faces(const std::vector<std::array<int, 4>>& tets) {
+  std::vector<TetFace> faces;
+  faces.reserve(4 * tets.size());
+  for (int t = 0; t < std::ssize(tets); ++t)
+    for (int f = 0; f < 4; ++f) {
+      std::array<int, 3> key;
+      for (int k = 0; k < 3; ++k)
+        key[k] = tets[t][face_of[f][k]];
+      std::sort(key.begin(), key.end());
+      faces.push_back({key, t, f});
+    }
+  std::sort(faces.begin(), faces.end(),
+            [](const TetFace& a, const TetFace& b) { return a.key != b.key ? a.key < b.key : a.tet < b.tet; });
+  return faces;
+}
+
 double six_volumes(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
   return (b - a).cross(c - a).dot(d - a);
 }
@@ -106,7 +100,7 @@ CutMesh uncut(const TetMesh& mesh) {
   std::iota(whole.original.begin(), whole.original.end(), 0);
   whole.front.assign(mesh.vertices.size(), 0);
   whole.skin = whole.front;
-  const std::vector<TetFace> faces = sorted_faces(mesh);
+  const std::vector<TetFace> faces = sorted_faces(mesh.tets);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     if (i + 1 < faces.size() && faces[i + 1].key == faces[i].key) {
       ++i;
@@ -133,7 +127,7 @@ CutMesh part(const TetMesh& mesh, const Scenario& scenario, int increment, doubl
       sum += in_plane[v] != 0 ? 0 : scenario.height(mesh.vertices[v]);
     return sum > 0;
   };
-  const std::vector<TetFace> faces = sorted_faces(mesh);
+  const std::vector<TetFace> faces = sorted_faces(mesh.tets);
   CutMesh cut;
   cut.vertices = mesh.vertices;
   cut.tets = mesh.tets;

@@ -9,6 +9,13 @@
 
 namespace spherecut::experiments::ledger {
 
+struct TetFace {
+  std::array<int, 3> key; // its vertices, ascending
+  int tet, face;
+};
+/// Faces of all tetrahedra; those of two stand beside one another.
+std::vector<TetFace> sorted_faces(const std::vector<std::array<int, 4>>& tets);
+
 /// The mesh with the faces of the cut doubled. Vertices behind the front have one copy on either side, those on it are
 /// shared.
 struct CutMesh {
