@@ -54,13 +54,14 @@ void SubStructure::condense(const FemNodes& nodes, const Scenario& scenario, std
     const StageClock clock(times, Stage::factorisation); // the order of elimination
     near_ = std::move(near);
     Sides sides = sides_of(nodes, near_);
-    std::ptrdiff_t free = 0, between = 0;
+    std::ptrdiff_t free = 0, between = 0, beyond = 0;
     for (std::size_t i = 0; i < sides.by_near.size(); ++i)
       if (nodes.held[i] == 0 && (sides.by_near[i] != 0 || sides.by_far[i] != 0)) {
         ++free;
         between += sides.by_near[i] != 0 && sides.by_far[i] != 0 ? 1 : 0;
+        beyond += sides.by_near[i] == 0 ? 1 : 0;
       }
-    if (static_cast<double>(between) > most_between * static_cast<double>(free)) {
+    if (static_cast<double>(between) > most_between * static_cast<double>(free) || beyond < between) {
       near_.assign(near_.size(), 1);
       sides = sides_of(nodes, near_);
     }

@@ -15,8 +15,8 @@ std::vector<NodeKey> node_keys(const CutMesh& mesh, const FemNodes& nodes);
 
 class SubStructure {
  public:
-  /// `near`, by element: of the near part. Where too many nodes would lie between, all elements are near. Orders the
-  /// unknowns, then assembles and factors the far part.
+  /// `near`, by element: of the near part. Where too many nodes would lie between, or more than beyond, all are. Orders
+  /// the unknowns, then assembles and factors the far part.
   void condense(const FemNodes& nodes, const Scenario& scenario, std::vector<char> near, StageTimes& times);
   /// Has the far part found again in other numberings of the nodes; after condense().
   void remember(const std::vector<NodeKey>& keys);
