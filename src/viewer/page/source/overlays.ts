@@ -22,7 +22,8 @@ import {
   Vector2,
 } from 'three';
 import { diverging, sequential } from './colours';
-import type { Nodes, Slice, Support } from './protocol';
+import type { Nodes, Slice, Support, Vec3 } from './protocol';
+import type { Ray } from './stylus';
 
 const kindColours = ['#7f93a3', '#62b6cb', '#b79be0', '#ffb454'].map((hex) => new Color(hex));
 const seenColour = new Color('#79d18d');
@@ -59,6 +60,24 @@ function discMaterial(ring: boolean): ShaderMaterial {
 
 /** Which of the two level sets a slice shows. */
 export type SliceShows = 'organ' | 'cut';
+
+/** The node under a ray that is nearest to the eye; -1: none is. */
+export function nodeAlong(nodes: Nodes, ray: Ray): number {
+  let best = -1;
+  let least = Infinity;
+  for (let i = 0; i < nodes.count; ++i) {
+    const offset = [0, 1, 2].map((d) => (nodes.spheres[4 * i + d] ?? 0) - (ray.origin[d] ?? 0)) as Vec3;
+    const along = offset.reduce((sum, value, d) => sum + value * (ray.direction[d] ?? 0), 0);
+    const away = Math.sqrt(Math.max(offset.reduce((sum, value) => sum + value * value, 0) - along * along, 0));
+    // Beside the ray counts more than behind other nodes.
+    const cost = away + 0.1 * along;
+    if (away < 0.02 * along && cost < least) {
+      least = cost;
+      best = i;
+    }
+  }
+  return best;
+}
 
 export class Overlays {
   readonly group = new Group();

@@ -9,10 +9,11 @@ import { Latency } from './latency';
 import { Messages } from './messages';
 import type { Snapshot } from './body';
 import { Panels, tearInWords } from './panels';
-import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Tear, Topology, Vec3, Welcome } from './protocol';
+import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Tear, Topology, Welcome } from './protocol';
 import { savePicture } from './screenshot';
 import { castRay, type Hit } from './surface';
 import { type Ray, Stylus } from './stylus';
+import { nodeAlong } from './overlays';
 import { View } from './view';
 
 const button = (id: string): HTMLButtonElement => element(id, HTMLButtonElement);
@@ -403,19 +404,7 @@ export class Page {
   private pickAlong(ray: Ray): boolean {
     const nodes = this.nodes;
     if (!this.panels.supports.checked || !nodes) return false;
-    let best = -1;
-    let least = Infinity;
-    for (let i = 0; i < nodes.count; ++i) {
-      const offset = [0, 1, 2].map((d) => (nodes.spheres[4 * i + d] ?? 0) - (ray.origin[d] ?? 0)) as Vec3;
-      const along = offset.reduce((sum, value, d) => sum + value * (ray.direction[d] ?? 0), 0);
-      const away = Math.sqrt(Math.max(offset.reduce((sum, value) => sum + value * value, 0) - along * along, 0));
-      // Beside the ray counts more than behind other nodes.
-      const cost = away + 0.1 * along;
-      if (away < 0.02 * along && cost < least) {
-        least = cost;
-        best = i;
-      }
-    }
+    const best = nodeAlong(nodes, ray);
     if (best < 0) return false;
     this.panels.pick(best);
     return true;
