@@ -19,6 +19,7 @@ namespace {
 using Edge = std::array<int, 2>; // ascending
 
 constexpr double on_surface = 1e-6;   // of the organ's size: a vertex lies on a plane or a curve
+constexpr double coarse = 2.0;        // sizes: longer edges are too long
 constexpr double volume_share = 0.03; // a curved skin triangulated anew encloses so much more or less
 
 Edge edge_between(int a, int b) {
@@ -65,7 +66,10 @@ class CavityMaker {
     cavity_.removed.assign(mesh_.tets.size(), 0);
     for (std::size_t t = 0; t < mesh_.tets.size(); ++t)
       cavity_.removed[t] =
-          std::any_of(mesh_.tets[t].begin(), mesh_.tets[t].end(), [&](int v) { return within[v] != 0; }) ? 1 : 0;
+          std::any_of(mesh_.tets[t].begin(), mesh_.tets[t].end(), [&](int v) { return within[v] != 0; }) ||
+                  is_coarse(mesh_, static_cast<int>(t), size_)
+              ? 1
+              : 0;
     // No kept tetrahedron sticks out into it.
     for (int pass = 0; pass < 4; ++pass) {
       const std::vector<TetFace> faces = local_faces();
@@ -397,6 +401,18 @@ class CavityMaker {
 };
 
 } // namespace
+
+bool is_coarse(const TetMesh& mesh, int tet, const Grading& size) {
+  const auto& t = mesh.tets[tet];
+  Vector3 middle = Vector3::Zero();
+  double longest = 0;
+  for (int i = 0; i < 4; ++i) {
+    middle += mesh.vertices[t[i]] / 4;
+    for (int j = 0; j < i; ++j)
+      longest = std::max(longest, (mesh.vertices[t[i]] - mesh.vertices[t[j]]).norm());
+  }
+  return longest > coarse * size.fine && longest > coarse * size(middle);
+}
 
 Cavity open_cavity(const TetMesh& mesh, const Scenario& scenario, int before, int now, const Grading& size,
                    double reach, double tolerance) {

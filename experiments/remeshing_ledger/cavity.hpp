@@ -14,10 +14,13 @@ struct Cavity {
   double volume = 0;                     // m3
 };
 
-/// Everything within `reach` m of where the front moved from increment `before` to `now`. The triangles shared with
-/// kept tetrahedra stay. The skin is triangulated anew where the cut meets it, and so is the cut: graded by `size`,
-/// with the new front and the new mouth as edges. Vertices within `tolerance` m of the cut's plane belong to it. Throws
-/// NumericalError where the hole cannot be bounded.
+/// Whether a tetrahedron is far larger than the sizes ask for, as those are that the front has come near to.
+bool is_coarse(const TetMesh& mesh, int tet, const Grading& size);
+
+/// Everything that is_coarse, or lies within `reach` m of where the front moved from increment `before` to `now`. The
+/// triangles shared with kept tetrahedra stay. The skin is triangulated anew where the cut meets it, and so is the cut:
+/// graded by `size`, with the new front and the new mouth as edges. Vertices within `tolerance` m of the cut's plane
+/// belong to it. Throws NumericalError where the hole cannot be bounded.
 Cavity open_cavity(const TetMesh& mesh, const Scenario& scenario, int before, int now, const Grading& size,
                    double reach, double tolerance);
 

@@ -127,10 +127,15 @@ class FemLocalRemesh final : public BackEnd {
         scenario_.increments,
         number_ + std::max(1, static_cast<int>(std::lround(way_ahead * resolution_.fine / scenario_.advance))));
     std::vector<std::vector<Vector3>> edges;
+    std::vector<Grading> sizes;
     const int stations =
         std::max(1, static_cast<int>(std::ceil((last - number_) * scenario_.advance / (0.4 * resolution_.fine))));
-    for (int i = 0; i <= stations; ++i)
-      edges.push_back(leading_edge(scenario_, number_ + (last - number_) * i / stations));
+    for (int i = 0; i <= stations; ++i) {
+      const int number = number_ + (last - number_) * i / stations;
+      edges.push_back(leading_edge(scenario_, number));
+      sizes.push_back(grading(edge_share));
+      sizes.back().front = front_of(scenario_, number).points;
+    }
     std::vector<char> within(mesh_.vertices.size());
     for (std::size_t i = 0; i < within.size(); ++i)
       within[i] =
@@ -141,8 +146,14 @@ class FemLocalRemesh final : public BackEnd {
               ? 1
               : 0;
     near_.clear();
-    for (const auto& t : mesh_.tets)
-      near_.push_back(std::any_of(t.begin(), t.end(), [&](int v) { return within[v] != 0; }) ? 1 : 0);
+    for (int t = 0; t < std::ssize(mesh_.tets); ++t) {
+      const auto& tet = mesh_.tets[t];
+      near_.push_back(std::any_of(tet.begin(), tet.end(), [&](int v) { return within[v] != 0; }) ||
+                              std::any_of(sizes.begin(), sizes.end(),
+                                          [&](const Grading& size) { return is_coarse(mesh_, t, size); })
+                          ? 1
+                          : 0);
+    }
   }
 
   /// Leaves out vertices that no tetrahedron has.
