@@ -188,7 +188,7 @@ class Discretisation {
   [[nodiscard]] virtual std::vector<Vector3> constraint_forces(const Field& field) const = 0;
 
   /// Largest unbalanced force of any unconstrained row under the field's loads and the given nodal forces, relative to
-  /// the largest force in the system.
+  /// the largest force in the system; of a mixed form also what continuity misses, taken as a force mu / h per m3.
   [[nodiscard]] virtual double residual(const Field& field, const std::vector<int>& loaded_nodes = {},
                                         const std::vector<Vector3>& nodal_forces = {}) const = 0;
 };

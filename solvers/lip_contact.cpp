@@ -183,25 +183,6 @@ ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const s
   return held;
 }
 
-std::string_view to_string(LipCondition condition) {
-  switch (condition) {
-  case LipCondition::open:
-    return "open";
-  case LipCondition::frictionless:
-    return "frictionless";
-  case LipCondition::sticking:
-    return "sticking";
-  }
-  return "unknown";
-}
-
-LipCondition lip_condition_from_string(std::string_view name) {
-  for (LipCondition condition : {LipCondition::open, LipCondition::frictionless, LipCondition::sticking})
-    if (name == to_string(condition))
-      return condition;
-  throw InputError(fmt::format("lip contact '{}' does not exist; there are: open, frictionless, sticking", name));
-}
-
 std::vector<LipPair> lip_pairs(const NodeCloud& nodes) {
   std::vector<int> lips;
   std::vector<Vector3> positions;

@@ -3,14 +3,12 @@
 // Reference: the direction of largest hoop stress [Erdogan and Sih 1963] of the exact intensities: 70.5 degrees in mode
 //            II alone.
 // Command:   spherecut experiment run kink --out DIR
-#include "experiments/analytic/cracks.hpp"
 #include "experiments/registered.hpp"
-#include "experiments/support/cut_body.hpp"
 #include "experiments/support/statistics.hpp"
+#include "experiments/support/straight_crack.hpp"
 
 #include "solvers/tearing.hpp"
 #include "src/figure.hpp"
-#include "topology/cut_sheets.hpp"
 #include "topology/front_growth.hpp"
 
 #include <Eigen/Geometry>
@@ -23,8 +21,7 @@ namespace spherecut::experiments {
 
 namespace {
 
-const solvers::Material material{1, 0.3, 0};
-const CutFrame crack = tilted_frame({0.03, 0.01, 0.04}, {0.12, -0.17, 0.1});
+const CutFrame& crack = straight_crack_frame();
 constexpr double degrees = 180 / std::numbers::pi;
 
 /// Angle of the triangles that a sheet has gained over the middle of the front, rad, by their area.
@@ -54,16 +51,10 @@ std::vector<Check> run_kink(const ExperimentContext& context) {
     std::vector<std::vector<double>> errors(mixes.size());
     app::Series points{std::string(solvers::to_string(method)), {}, {}, app::SeriesStyle::points};
     for (int seed = 1; seed <= seeds; ++seed) {
-      CutBodyCase cut;
-      cut.domain = topology::make_box_domain({-1, -0.5, -1}, {1, 0.5, 1}, 0.25);
-      cut.sheets = {
-          topology::make_rectangle_sheet(crack.origin - 1.5 * crack.ahead, crack.normal, crack.ahead, 4, 3, 0.1)};
-      cut.nodes = 350;
-      cut.seed = static_cast<std::uint64_t>(seed);
-      CutBody body = cut_body(cut);
-      body.problem.material = material;
+      CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.1);
+      const solvers::Material& material = body.problem.material;
       solvers::Intensities acting = Vector3::Zero();
-      hold_whole_surface(body.problem, [&acting](const Vector3& x) {
+      hold_whole_surface(body.problem, [&acting, material](const Vector3& x) {
         return straight_crack_displacement(material, crack, acting, x);
       });
       const auto discretisation = solvers::discretise(body.problem, options);

@@ -6,14 +6,12 @@
 //            middle 80 % of the front; K is the mean of three places along it, by displacement correlation and by
 //            interaction integral.
 // Command:   spherecut experiment run precut_straight --out DIR
-#include "experiments/analytic/cracks.hpp"
 #include "experiments/registered.hpp"
-#include "experiments/support/cut_body.hpp"
 #include "experiments/support/precut_series.hpp"
 #include "experiments/support/statistics.hpp"
+#include "experiments/support/straight_crack.hpp"
 
 #include "src/figure.hpp"
-#include "topology/cut_sheets.hpp"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -22,9 +20,8 @@ namespace spherecut::experiments {
 
 namespace {
 
-const solvers::Material material{1, 0.3, 0};
-const Vector3 half_size(1, 0.5, 1); // m
-const CutFrame crack = tilted_frame({0.03, 0.01, 0.04}, {0.12, -0.17, 0.1});
+constexpr double half_thickness = 0.5; // m, of the block along the front
+const CutFrame& crack = straight_crack_frame();
 constexpr std::array<const char*, 3> mode_names{"I", "II", "III"};
 constexpr std::array<int, 3> opening_component{1, 0, 2}; // in the axes (ahead, normal, tangent)
 
@@ -39,11 +36,12 @@ Opening opening_of(const solvers::Discretisation& body, const solvers::Field& fi
   double error = 0, size = 0;
   for (int i = 0; i < 60; ++i)
     for (int j = 0; j < 5; ++j) {
-      const double s = 0.8 * std::pow((i + 0.5) / 60, 2), along = half_size.y() * (1.6 * (j + 0.5) / 5 - 0.8);
+      const double s = 0.8 * std::pow((i + 0.5) / 60, 2), along = half_thickness * (1.6 * (j + 0.5) / 5 - 0.8);
       const Vector3 x = crack.origin - s * crack.ahead + along * crack.tangent;
       const Vector3 jump = opening_at(body, field, x, crack.normal, spacing);
       const double computed = crack.local(crack.origin + jump)[opening_component[mode]];
-      const double exact = 2 * solvers::tip_field(material, k, -s, 1e-15 * s).displacement[opening_component[mode]];
+      const double exact =
+          2 * solvers::tip_field(body.problem().material, k, -s, 1e-15 * s).displacement[opening_component[mode]];
       error += (computed - exact) * (computed - exact);
       size += exact * exact;
       if (j == 2) {
@@ -71,16 +69,10 @@ std::vector<Check> run_precut_straight(const ExperimentContext& context) {
   for (const PrecutMethod& method : precut_methods(context.quick)) {
     std::array<ErrorSeries, 3> errors;
     for (int seed = 1; seed <= seeds; ++seed) {
-      CutBodyCase cut;
-      cut.domain = topology::make_box_domain(-half_size, half_size, 0.25);
-      cut.sheets = {
-          topology::make_rectangle_sheet(crack.origin - 1.5 * crack.ahead, crack.normal, crack.ahead, 4, 3, 0.3)};
-      cut.nodes = 350;
-      cut.seed = static_cast<std::uint64_t>(seed);
-      CutBody body = cut_body(cut);
-      body.problem.material = material;
+      CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.3);
+      const solvers::Material material = body.problem.material;
       solvers::Intensities acting = Vector3::Zero();
-      hold_whole_surface(body.problem, [&acting](const Vector3& x) {
+      hold_whole_surface(body.problem, [&acting, material](const Vector3& x) {
         return straight_crack_displacement(material, crack, acting, x);
       });
       const auto discretisation = solvers::discretise(body.problem, method.options());

@@ -3,10 +3,9 @@
 // Reference: the fields themselves [Williams 1957; Kassir and Sih 1966]. Errors are over the largest intensity. The
 //            integral must not depend on the tube it is taken over.
 // Command:   spherecut experiment run sif --out DIR
-#include "experiments/analytic/cracks.hpp"
 #include "experiments/registered.hpp"
-#include "experiments/support/cut_body.hpp"
 #include "experiments/support/statistics.hpp"
+#include "experiments/support/straight_crack.hpp"
 
 #include "solvers/tearing.hpp"
 #include "src/figure.hpp"
@@ -50,18 +49,12 @@ void add_errors(const solvers::Discretisation& body, const solvers::Field& field
 
 /// Largest errors along the middle of the front of a straight crack.
 std::array<double, 4> straight(std::uint64_t seed, solvers::Method method) {
-  const solvers::Material material{1, 0.3, 0};
-  const CutFrame crack = tilted_frame({0.03, 0.01, 0.04}, {0.12, -0.17, 0.1});
+  const CutFrame& crack = straight_crack_frame();
   const solvers::Intensities exact(1, 0.6, 0.4);
-  CutBodyCase cut;
-  cut.domain = topology::make_box_domain({-1, -0.5, -1}, {1, 0.5, 1}, 0.25);
-  cut.sheets = {topology::make_rectangle_sheet(crack.origin - 1.5 * crack.ahead, crack.normal, crack.ahead, 4, 3, 0.3)};
-  cut.nodes = 350;
-  cut.seed = seed;
-  CutBody body = cut_body(cut);
-  body.problem.material = material;
-  hold_whole_surface(body.problem,
-                     [&](const Vector3& x) { return straight_crack_displacement(material, crack, exact, x); });
+  CutBody body = straight_crack_body(seed, 0.3);
+  hold_whole_surface(body.problem, [&crack, exact, material = body.problem.material](const Vector3& x) {
+    return straight_crack_displacement(material, crack, exact, x);
+  });
   solvers::DiscretisationOptions options;
   options.method = method;
   const auto discretisation = solvers::discretise(body.problem, options);
