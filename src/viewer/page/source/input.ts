@@ -68,7 +68,6 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: S
       host.moved(place.x, place.y);
       stylus.point(host.ray(place.x, place.y));
       if (event.pointerType === 'pen' && event.pressure > 0) stylus.setDepth(event.pressure * 2 * depthAtStart);
-      host.changed();
     } else if (gesture === 'turn') {
       orbit.turn(0.008 * dx, 0.008 * dy);
       host.changed();

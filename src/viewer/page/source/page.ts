@@ -89,7 +89,7 @@ export class Page {
       onState: (state, reason) => this.linkChanged(state, reason),
       onText: (message) => this.read(message),
       onTopology: (topology) => this.newTopology(topology),
-      onFrame: (frame) => this.pending.push(frame),
+      onFrame: (frame) => this.arrived(frame),
     });
     setInterval(() => this.step(), 16);
     requestAnimationFrame(() => this.paint());
@@ -217,6 +217,16 @@ export class Page {
 
   private paint(): void {
     requestAnimationFrame(() => this.paint());
+    this.show();
+  }
+
+  /** Where the processor draws, a picture takes longer than the screen: it begins at once. */
+  private arrived(frame: Frame): void {
+    this.pending.push(frame);
+    if (this.view.software && !document.hidden) this.show();
+  }
+
+  private show(): void {
     if (!this.complete()) return;
     const frames = this.pending;
     this.pending = [];
@@ -354,7 +364,6 @@ export class Page {
       ? castRay(frozen.positions, frozen.triangles, frozen.normals, ray.origin, ray.direction)
       : this.view.body.cast(ray.origin, ray.direction);
     this.view.setMark(this.holding && !frozen ? hit : null);
-    this.view.change();
     return hit;
   }
 

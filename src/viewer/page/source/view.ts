@@ -58,6 +58,7 @@ export class View {
 
   /** Where the stylus is on the surface; null: nowhere. */
   setMark(hit: Hit | null): void {
+    if (hit || this.mark.visible) this.change();
     this.mark.visible = hit !== null;
     if (!hit) return;
     this.mark.position.set(...hit.point);

@@ -2,6 +2,7 @@
 // node soak.mjs BUILD_FOLDER SOURCE_FOLDER SECONDS [SEED] prints one line every ten seconds and what was seen at the end;
 // exit status 1 when something died, was not a number, grew, or was never done.
 import { readFileSync } from 'node:fs';
+import { loadavg } from 'node:os';
 import { join } from 'node:path';
 import type { Page as Tab } from 'playwright-core';
 import { launch, openPage, until } from './browser';
@@ -154,7 +155,7 @@ try {
       const ms = (list: number[]): string => (1000 * (list[list.length - 1] ?? NaN)).toFixed(0);
       console.log(
         `${((reported - start) / 1000).toFixed(0)} s, ${actions} actions, server ${server[server.length - 1]?.toFixed(0)} MB, page ${heap?.toFixed(0)} MB, ` +
-          `hand to picture 95 % ${ms(tools)} ms, of the body ${ms(bodies)} ms, ${grown.cuts} cuts ${(grown.cutArea * 1e4).toFixed(2)} cm2, ` +
+          `load ${loadavg()[0]?.toFixed(0)}, hand to picture 95 % ${ms(tools)} ms, of the body ${ms(bodies)} ms, ${grown.cuts} cuts ${(grown.cutArea * 1e4).toFixed(2)} cm2, ` +
           `${grown.tears} tears ${(grown.tornArea * 1e4).toFixed(2)} cm2`,
       );
     }
