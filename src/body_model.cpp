@@ -189,7 +189,7 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
   solvers::Problem problem = problem_of(scenario, domain, model);
   model.not_following = way_ahead.triangles.empty() ? "the body was built without a cut ahead"
                         : solvers::window_share(problem, options, way_ahead) > largest_share
-                            ? "the cut concerns most of the body"
+                            ? most_of_body
                             : "";
   model.window_way = {};
   model.added_nodes = 0;

@@ -65,6 +65,9 @@ solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Do
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
               const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
 
+/// Reason not to follow: the window would hold more of the body than pays.
+inline constexpr const char* most_of_body = "the cut concerns most of the body";
+
 /// Nodes that updates may add before a body is condensed anew.
 inline constexpr int growth_room = 150;
 
