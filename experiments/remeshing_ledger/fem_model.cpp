@@ -462,4 +462,20 @@ FemSolution solve_fem(const CutMesh& mesh, const Scenario& scenario, Element ele
   return solution;
 }
 
+void part_and_solve(const TetMesh& mesh, const Scenario& scenario, Element element, double tolerance,
+                    Increment& increment, FemSolution& solution) {
+  try {
+    CutMesh cut;
+    {
+      const StageClock clock(increment.times, Stage::meshing);
+      cut = part(mesh, scenario, increment.number, tolerance);
+    }
+    solution = solve_fem(cut, scenario, element, increment.times);
+    increment.unknowns = solution.unknowns;
+    increment.quality = smallest_quality(cut.vertices, cut.tets);
+  } catch (const NumericalError& error) {
+    increment.failure = error.what();
+  }
+}
+
 } // namespace spherecut::experiments::ledger

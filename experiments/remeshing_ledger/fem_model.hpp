@@ -65,4 +65,8 @@ struct FemSolution {
 };
 FemSolution solve_fem(const CutMesh& mesh, const Scenario& scenario, Element element, StageTimes& times);
 
+/// Parts a mesh along the cut of the increment's number, solves and books it; `solution` stays where that fails.
+void part_and_solve(const TetMesh& mesh, const Scenario& scenario, Element element, double tolerance,
+                    Increment& increment, FemSolution& solution);
+
 } // namespace spherecut::experiments::ledger

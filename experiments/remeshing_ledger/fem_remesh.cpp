@@ -2,7 +2,6 @@
 #include "experiments/remeshing_ledger/fem_model.hpp"
 #include "experiments/remeshing_ledger/mesh_request.hpp"
 #include "experiments/remeshing_ledger/own_process.hpp"
-#include "topology/errors.hpp"
 
 #include <fmt/format.h>
 
@@ -41,20 +40,8 @@ class FemRemesh final : public BackEnd {
     }
     const TetMesh meshed = mesh_for(
         increment, [&] { return mesh_volume(request); }, limit_);
-    if (!increment.failure.empty())
-      return increment;
-    try {
-      CutMesh mesh;
-      {
-        const StageClock clock(increment.times, Stage::meshing);
-        mesh = part(meshed, scenario_, number_, 1e-3 * resolution_.fine);
-      }
-      solution_ = solve_fem(mesh, scenario_, element_, increment.times);
-      increment.unknowns = solution_.unknowns;
-      increment.quality = smallest_quality(mesh.vertices, mesh.tets);
-    } catch (const NumericalError& error) {
-      increment.failure = error.what();
-    }
+    if (increment.failure.empty())
+      part_and_solve(meshed, scenario_, element_, 1e-3 * resolution_.fine, increment, solution_);
     return increment;
   }
 

@@ -4,7 +4,6 @@
 #include "experiments/remeshing_ledger/fem_model.hpp"
 #include "experiments/remeshing_ledger/mesh_request.hpp"
 #include "experiments/remeshing_ledger/own_process.hpp"
-#include "topology/errors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -106,19 +105,11 @@ class FemSplit final : public BackEnd {
 
   Increment cut(Increment increment) {
     increment.number = number_;
-    try {
-      CutMesh mesh;
-      {
-        const StageClock clock(increment.times, Stage::meshing);
-        split_edges();
-        mesh = part(mesh_, scenario_, number_, in_plane * resolution_.fine);
-      }
-      solution_ = solve_fem(mesh, scenario_, Element::linear, increment.times);
-      increment.unknowns = solution_.unknowns;
-      increment.quality = smallest_quality(mesh.vertices, mesh.tets);
-    } catch (const NumericalError& error) {
-      increment.failure = error.what();
+    {
+      const StageClock clock(increment.times, Stage::meshing);
+      split_edges();
     }
+    part_and_solve(mesh_, scenario_, Element::linear, in_plane * resolution_.fine, increment, solution_);
     return increment;
   }
 
