@@ -54,7 +54,7 @@ class PointerHand : public Device {
   void move_tip() noexcept;
   void put_down() noexcept;
 
-  static constexpr std::size_t remembered = 8192; // ticks
+  static constexpr std::size_t remembered = 1U << 16U; // ticks, longer than solves take
   HandSettings settings_;
   double rate_, speed_;
   TripleBuffer<PointerHandState> states_;

@@ -378,8 +378,10 @@ std::uint32_t Hub::state_bits(const LiveTick& tick) const {
 }
 
 void Hub::send_frames(const LiveTick& tick) {
-  if (session_->fetch_frame())
+  if (session_->fetch_frame()) {
+    number_in_solve_ = session_->number_at(session_->frame().pose_tick); // later that tick may be forgotten
     tell_tear();
+  }
   const ViewerFrame& frame = session_->frame();
   if (frame.number == 0)
     return;
@@ -418,7 +420,7 @@ void Hub::send_frame(int id, Client& client, const LiveTick& tick, bool picture)
   context.message = ++client.messages;
   context.epoch = epoch_;
   context.state = state_bits(tick);
-  context.number_in_solve = session_->number_at(frame.pose_tick);
+  context.number_in_solve = number_in_solve_;
   context.left_out = client.left_out;
   context.rates = rates_;
   const Overlays overlays = client.overlays;

@@ -127,7 +127,8 @@ class Hub {
   std::uint64_t ticks_before_ = 0, solves_before_ = 0, pictures_before_ = 0;
   double compute_before_ = 0; // s
   std::uint64_t cuts_seen_ = 0;
-  TearStatus tear_; // as told
+  TearStatus tear_;                   // as told
+  std::uint32_t number_in_solve_ = 0; // of the viewer's message that the newest picture's solve followed
   Clock::time_point cut_at_;
   LiveRates rates_;
 };

@@ -140,6 +140,7 @@ void Hub::finish_building() {
     ticks_before_ = solves_before_ = pictures_before_ = cuts_seen_ = 0;
     compute_before_ = 0;
     tear_ = {};
+    number_in_solve_ = 0;
     session_->start();
     send_all(session_text(*session_, epoch_, target_.mode));
   } else {
