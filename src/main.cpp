@@ -77,7 +77,8 @@ int default_threads(bool is_real_time) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App commands("Spherecut: palpation of soft tissue by the method of finite spheres", "spherecut");
+  CLI::App commands("Spherecut: pressing, cutting and tearing of soft tissue by the method of finite spheres",
+                    "spherecut");
   commands.set_version_flag("--version", fmt::format("spherecut {}", app::version()));
   commands.require_subcommand(1);
   std::string scenario;
@@ -146,6 +147,19 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& success) { // --help, --version
     return commands.exit(success);
   } catch (const CLI::ParseError& error) {
+    const CLI::App* at = &commands;
+    for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
+      const std::vector<const CLI::App*> below = at->get_subcommands([](const CLI::App*) { return true; });
+      const auto named = [&](const CLI::App* command) { return command->get_name() == argv[i]; };
+      const auto found = std::find_if(below.begin(), below.end(), named);
+      if (below.empty())
+        break;
+      if (found == below.end())
+        return complain(fmt::format("unknown command '{}' ({} --help)", argv[i],
+                                    at == &commands ? "spherecut" : "spherecut " + at->get_name()),
+                        status_bad_input);
+      at = *found;
+    }
     return complain(fmt::format("{} (spherecut --help)", error.what()), status_bad_input);
   }
 

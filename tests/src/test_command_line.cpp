@@ -54,6 +54,14 @@ topology::SurfaceMesh joined(topology::SurfaceMesh a, const topology::SurfaceMes
 
 } // namespace
 
+TEST_CASE("An unknown command is named") {
+  const ProgramResult unknown = run_spherecut({"bogus"});
+  CHECK(unknown.status == 2);
+  CHECK_THAT(unknown.err, Catch::Contains("unknown command 'bogus'"));
+  CHECK_THAT(run_spherecut({"experiment", "hertz"}).err, Catch::Contains("unknown command 'hertz'"));
+  CHECK_THAT(run_spherecut({"run", "a.toml"}).err, Catch::Contains("--out is required"));
+}
+
 TEST_CASE("Help, version and scenario-help succeed") {
   CHECK(run_spherecut({"--help"}).status == 0);
   const ProgramResult version = run_spherecut({"--version"});

@@ -132,6 +132,23 @@ TEST_CASE("The fine zone follows a sliding tool and the force hardly jumps, with
   CHECK(followed >= 2);
 }
 
+TEST_CASE("A deep tip between nodes too coarse for it is told") {
+  const std::string fine = path({{0, "[0, 0, 0.031]"}, {1, "[0, 0, 0.0265]"}});
+  Session good = session_of(fine);
+  run(good);
+  const auto told = [](const Session& session) {
+    std::string all;
+    for (const std::string& warning : session.warnings())
+      all += warning + "\n";
+    return all;
+  };
+  CHECK_THAT(told(good), !Contains("too coarse"));
+  Session coarse = session_of(replaced(replaced(fine, "fine_spacing = 0.004", "fine_spacing = 0.02"),
+                                       "coarse_spacing = 0.012", "coarse_spacing = 0.02"));
+  run(coarse);
+  CHECK_THAT(told(coarse), Contains("too coarse for a tip of 0.01 m") && Contains("nodes.fine_spacing"));
+}
+
 TEST_CASE("Gravity alone bends the organ by its weight") {
   Session session = session_of(small_scenario + "[gravity]\nacceleration = [0, 0, -9.81]\n");
   const StepResult first = session.step(session.steps().front());
