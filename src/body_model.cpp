@@ -188,9 +188,8 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
   solvers::Problem problem = problem_of(scenario, domain, model);
   model.not_following = way_ahead.triangles.empty() ? "the body was built without a cut ahead"
-                        : solvers::window_share(problem, options, way_ahead) > largest_share
-                            ? most_of_body
-                            : "";
+                        : solvers::window_share(problem, options, way_ahead) > largest_share ? most_of_body
+                                                                                             : "";
   model.window_way = {};
   model.added_nodes = 0;
   if (model.not_following[0] != '\0') {

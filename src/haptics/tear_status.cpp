@@ -31,14 +31,13 @@ TearStatus tear_status(const StepResult& result, const TearStatus& before) {
   const bool refused = now.reason.rfind(refusal, 0) == 0;
   if (refused)
     now.reason.erase(0, refusal.size());
-  if (report.severed)
+  const bool moves = report.increments.size() > 1;
+  if (report.severed || (before.state == TearState::severed && !moves && !refused))
     now.state = TearState::severed;
-  else if (report.increments.size() > 1)
+  else if (moves)
     now.state = report.unstable ? TearState::unstable : TearState::growing;
   else if (refused)
     now.state = TearState::refused;
-  else if (before.state == TearState::severed)
-    now.state = TearState::severed;
   else if (report.area > 0)
     now.state = TearState::arrested;
   return now;

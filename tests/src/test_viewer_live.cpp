@@ -492,9 +492,9 @@ TEST_CASE("Serving what cannot be served is refused in words, and Ctrl-C ends it
   refused({"serve", scenario, "--port", "0", "--address", "nowhere"}, "not an IP address");
   refused({"serve", (folder.path() / "missing.toml").string(), "--port", "0"}, "missing.toml");
   refused({"serve", scenario, "--port", "0", "--page", (folder.path() / "none").string()}, "no such folder");
-  const ProgramResult ended =
-      run_shell("timeout --foreground --preserve-status -s INT 2 " + spherecut_command({"serve", scenario, "--port", "0", "--out",
-                                                                           (folder.path() / "recordings").string()}));
+  const ProgramResult ended = run_shell(
+      "timeout --foreground --preserve-status -s INT 2 " +
+      spherecut_command({"serve", scenario, "--port", "0", "--out", (folder.path() / "recordings").string()}));
   CHECK(ended.status == 0);
   CHECK_THAT(ended.out, Catch::Contains("serving at http://127.0.0.1:") && Catch::Contains("ended"));
 }

@@ -21,8 +21,8 @@
 #include <sys/user.h>
 #include <sys/wait.h>
 #include <thread>
-#include <utility>
 #include <unistd.h>
+#include <utility>
 
 using namespace spherecut::tests;
 
