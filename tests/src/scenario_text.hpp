@@ -1,6 +1,7 @@
 // A small valid scenario, and the same with single lines changed, for tests of the reader and of the command line.
 #pragma once
 
+#include <fmt/format.h>
 #include <stdexcept>
 #include <string>
 
@@ -82,5 +83,41 @@ inline std::string replaced(std::string text, const std::string& from, const std
     throw std::logic_error("'" + from + "' is not in the text");
   return text.replace(at, from.size(), to);
 }
+
+/// A bar held at both ends and stretched between them.
+inline std::string stretched_bar(double strain, double toughness, const std::string& more) {
+  return fmt::format(R"([organ]
+shape = "block"
+size = [0.04, 0.016, 0.01]
+edge = 0.004
+[material]
+young_modulus = 1e4
+poisson_ratio = 0.3
+toughness = {}
+pretension = [{}, 0, 0]
+[[fixed]]
+region = "half_space"
+point = [-0.0199, 0, 0]
+normal = [1, 0, 0]
+[[fixed]]
+region = "half_space"
+point = [0.0199, 0, 0]
+normal = [-1, 0, 0]
+[nodes]
+fine_spacing = 0.0027
+coarse_spacing = 0.005
+{})",
+                     toughness, strain, more);
+}
+
+/// And a notch into it from one side.
+inline const std::string bar_notch = R"([[precut]]
+shape = "rectangle"
+centre = [0.0007, -0.008, 0.005]
+normal = [1, 0.03, 0.02]
+up = [0, 1, 0]
+width = 0.02
+height = 0.010
+)";
 
 } // namespace spherecut::tests

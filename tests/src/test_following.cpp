@@ -153,36 +153,7 @@ TEST_CASE("A fixed region too small for coarser nodes keeps the node that it had
 
 TEST_CASE("A tear that goes on solve by solve is told as unstable, then that it has parted the body") {
   // A bar that is stretched between its ends, with a notch from one side: it runs away.
-  Session session(scenario_of(R"([organ]
-shape = "block"
-size = [0.04, 0.016, 0.01]
-edge = 0.004
-[material]
-young_modulus = 1e4
-poisson_ratio = 0.3
-toughness = 0.05
-pretension = [0.15, 0, 0]
-[[fixed]]
-region = "half_space"
-point = [-0.0199, 0, 0]
-normal = [1, 0, 0]
-[[fixed]]
-region = "half_space"
-point = [0.0199, 0, 0]
-normal = [-1, 0, 0]
-[nodes]
-fine_spacing = 0.0027
-coarse_spacing = 0.005
-[[precut]]
-shape = "rectangle"
-centre = [0.0007, -0.008, 0.005]
-normal = [1, 0.03, 0.02]
-up = [0, 1, 0]
-width = 0.02
-height = 0.010
-[tearing]
-step = 1.0
-)"));
+  Session session(scenario_of(stretched_bar(0.15, 0.05, bar_notch + "[tearing]\nstep = 1.0\n")));
   session.set_tear_gradually(true);
   TearStatus status;
   bool unstable = false, severed = false;

@@ -62,40 +62,6 @@ position = [-0.03, 0, 0.033]
 [tearing]
 )";
 
-/// A bar held at both ends and stretched between them, with a notch from one side.
-std::string bar(double strain, double toughness, const std::string& more) {
-  return fmt::format(R"([organ]
-shape = "block"
-size = [0.04, 0.016, 0.01]
-edge = 0.004
-[material]
-young_modulus = 1e4
-poisson_ratio = 0.3
-toughness = {}
-pretension = [{}, 0, 0]
-[[fixed]]
-region = "half_space"
-point = [-0.0199, 0, 0]
-normal = [1, 0, 0]
-[[fixed]]
-region = "half_space"
-point = [0.0199, 0, 0]
-normal = [-1, 0, 0]
-[nodes]
-fine_spacing = 0.0027
-coarse_spacing = 0.005
-{})",
-                     toughness, strain, more);
-}
-const std::string notch = R"([[precut]]
-shape = "rectangle"
-centre = [0.0007, -0.008, 0.005]
-normal = [1, 0.03, 0.02]
-up = [0, 1, 0]
-width = 0.02
-height = 0.010
-)";
-
 double balance(const EnergyLedger& ledger) {
   return std::abs(ledger.imbalance()) / (ledger.surface + ledger.dissipation);
 }
@@ -135,7 +101,7 @@ TEST_CASE("A grasper that pulls tears a cut on along a weak plane, and the accou
 }
 
 TEST_CASE("A notch in a stretched bar runs away, parts the bar, and says so") {
-  Session session(scenario_of(bar(0.15, 0.05, notch + "[tearing]\nstep = 1.0\n")));
+  Session session(scenario_of(stretched_bar(0.15, 0.05, bar_notch + "[tearing]\nstep = 1.0\n")));
   const StepResult result = session.step(session.steps().front());
   REQUIRE(result.tear);
   CHECK(result.tear->severed);
@@ -148,7 +114,7 @@ TEST_CASE("A notch in a stretched bar runs away, parts the bar, and says so") {
 }
 
 TEST_CASE("A notch in a bar that is tough enough stays as it is") {
-  Session session(scenario_of(bar(0.05, 50, notch + "[tearing]\n")));
+  Session session(scenario_of(stretched_bar(0.05, 50, bar_notch + "[tearing]\n")));
   const StepResult result = session.step(session.steps().front());
   CHECK(result.tear->area == 0);
   CHECK(result.tear->increments.front().release > 0);
@@ -172,7 +138,7 @@ position = [0.0009, {}, 0]
 
 TEST_CASE("A cut that a blade starts under tension runs on by itself") {
   Session session(
-      scenario_of(bar(0.15, 0.2, bar_blade(0.0065, 0.25) + "[tearing]\nstep = 1.0\nmost_increments = 3\n")));
+      scenario_of(stretched_bar(0.15, 0.2, bar_blade(0.0065, 0.25) + "[tearing]\nstep = 1.0\nmost_increments = 3\n")));
   const std::vector<StepResult> steps = run(session);
   CHECK(steps.front().tear->area == 0);
   CHECK(steps.back().tear->area > 1e-5);
@@ -188,7 +154,7 @@ TEST_CASE("A cut that a blade starts under tension runs on by itself") {
 
 TEST_CASE("A blade feels the toughness where the tissue tears, and less of it where that is drawn apart") {
   const auto pressed = [](double strain, const std::string& tearing) {
-    Session session(scenario_of(bar(strain, 2, bar_blade(0.007, 0.2) + tearing)));
+    Session session(scenario_of(stretched_bar(strain, 2, bar_blade(0.007, 0.2) + tearing)));
     const std::vector<StepResult> steps = run(session);
     CHECK(steps.back().cut->area > 1e-5);
     require_sound(session);
@@ -204,11 +170,11 @@ TEST_CASE("A blade feels the toughness where the tissue tears, and less of it wh
 }
 
 TEST_CASE("Two half cuts that run towards each other part a strip between them") {
-  const std::string other = replaced(replaced(notch, "[0.0007, -0.008, 0.005]", "[0.0007, 0.008, 0.005]"),
+  const std::string other = replaced(replaced(bar_notch, "[0.0007, -0.008, 0.005]", "[0.0007, 0.008, 0.005]"),
                                      "normal = [1, 0.03, 0.02]", "normal = [1, 0, 0]");
-  Session session(scenario_of(
-      bar(0.15, 0.05,
-          replaced(notch, "normal = [1, 0.03, 0.02]", "normal = [1, 0, 0]") + other + "[tearing]\nstep = 1.0\n")));
+  Session session(scenario_of(stretched_bar(0.15, 0.05,
+                                            replaced(bar_notch, "normal = [1, 0.03, 0.02]", "normal = [1, 0, 0]") +
+                                                other + "[tearing]\nstep = 1.0\n")));
   const StepResult result = session.step(session.steps().front());
   INFO(result.tear->reason);
   CHECK(result.tear->severed);
@@ -283,13 +249,14 @@ TEST_CASE("The patch of a grasper stays as it is while a tear exchanges the node
 
 TEST_CASE("A tear starts without a cut where the averaged stress reaches the strength, across it") {
   // E strain = 1500 Pa along x in the middle of the bar.
-  Session weak(scenario_of(bar(0.15, 0.02, "[tearing]\nstrength = 1000\nlength = 0.003\nmost_increments = 1\n")));
+  Session weak(
+      scenario_of(stretched_bar(0.15, 0.02, "[tearing]\nstrength = 1000\nlength = 0.003\nmost_increments = 1\n")));
   const StepResult result = weak.step(weak.steps().front());
   CHECK(result.tear->seeded);
   REQUIRE(weak.incision() != nullptr);
   CHECK(std::abs(topology::triangle_normal(weak.incision()->sheets().front(), 0).x()) > 0.9);
   require_sound(weak);
-  Session strong(scenario_of(bar(0.15, 0.02, "[tearing]\nstrength = 4000\nlength = 0.003\n")));
+  Session strong(scenario_of(stretched_bar(0.15, 0.02, "[tearing]\nstrength = 4000\nlength = 0.003\n")));
   CHECK_FALSE(strong.step(strong.steps().front()).tear->seeded);
   CHECK(strong.incision() == nullptr);
 }
@@ -312,7 +279,7 @@ TEST_CASE("Scenarios that cannot tear or grasp are refused with the reason") {
                     Contains("the grasper cannot reach the organ") && Contains("0.016 m from the surface"));
   CHECK_THROWS_WITH(scenario_of(replaced(peel, "step = 0.5", "step = 0.5\nrelease = 0\ngrasp = 0.1")),
                     Contains("tool.release = 0 s: not after it takes hold"));
-  CHECK_THROWS_WITH(scenario_of(bar(0.1, 1, "[tearing]\n")), Contains("without tearing.strength no tear"));
+  CHECK_THROWS_WITH(scenario_of(stretched_bar(0.1, 1, "[tearing]\n")), Contains("without tearing.strength no tear"));
 }
 
 TEST_CASE("A grasper that lets go leaves the organ as it was, and its work is booked as lost") {
@@ -383,9 +350,10 @@ TEST_CASE("Tears under random loads: no crash, nothing that is not finite, surfa
                     "= {}\n",
                     between(-0.008, 0.008), between(-0.008, 0.008), between(0.001, 0.009), between(-1, 1),
                     between(-1, 1), between(-1, 1), between(0.003, 0.006), between(0, 200));
-    const std::string text = bar(between(-0.1, 0.2), std::pow(10, between(-2, 0.5)),
-                                 cut + "[cut]\nunheld = \"hold\"\n[gravity]\nacceleration = [0, 0, -9.81]\n[tearing]\n"
-                                       "step = 1.0\nmost_increments = 3\n");
+    const std::string text =
+        stretched_bar(between(-0.1, 0.2), std::pow(10, between(-2, 0.5)),
+                      cut + "[cut]\nunheld = \"hold\"\n[gravity]\nacceleration = [0, 0, -9.81]\n[tearing]\n"
+                            "step = 1.0\nmost_increments = 3\n");
     INFO(text);
     std::optional<Session> session;
     try {

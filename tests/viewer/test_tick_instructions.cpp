@@ -1,5 +1,6 @@
 // The haptic thread of `spherecut serve`, single-stepped: how many instructions a tick takes, with and without viewers.
 // A count, not a time: it is the same on a slow or busy machine, and where there are no hardware counters.
+#include "tests/src/scenario_text.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/web_client.hpp"
@@ -28,39 +29,11 @@ using namespace spherecut::tests;
 
 namespace {
 
-constexpr const char* block = R"(
-[organ]
-shape = "block"
-size = [0.06, 0.06, 0.03]
-[material]
-young_modulus = 10000.0
-poisson_ratio = 0.3
-[[fixed]]
-name = "base"
-region = "box"
-lower = [-0.04, -0.04, -0.001]
-upper = [0.04, 0.04, 0.001]
-[nodes]
-fine_spacing = 0.008
-coarse_spacing = 0.012
-fine_radius = 0.01
-[tool]
-shape = "sphere_tip"
-radius = 0.008
-step = 0.1
-[tool.approach]
-target = [0.0, 0.0, 0.03]
-direction = [0.0, 0.0, -1.0]
-depth = 0.002
-clearance = 0.002
-duration = 1.0
-)";
-
 /// The program as a child of this one, which may step it therefore.
 class Server {
  public:
   Server() {
-    const std::string scenario = write_file(folder_.path() / "block.toml", block).string();
+    const std::string scenario = write_file(folder_.path() / "small.toml", small_scenario).string();
     const std::string out = (folder_.path() / "out").string(), said = (folder_.path() / "said").string();
     child_ = fork();
     if (child_ == 0) {
