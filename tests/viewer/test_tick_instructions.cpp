@@ -80,7 +80,9 @@ class Server {
 };
 
 /// Steps a thread from one reading of its processor time to the next. A tick reads it once before and once after its
-/// work, so two stretches on end are a whole tick, waiting left out: a stepped thread is always late.
+/// work, so two stretches on end are a whole tick, waiting left out: a stepped thread is always late. The kernel's page
+/// of clock readings (the vDSO) is not counted: a reading begins anew whenever the kernel has just set the clock, which
+/// a stepped thread is slow enough to meet at any time.
 class Stepper {
  public:
   explicit Stepper(pid_t thread) : thread_(thread) {
@@ -88,12 +90,18 @@ class Stepper {
       throw std::runtime_error(std::string("this process may not trace its child: ") + std::strerror(errno));
     ptrace(PTRACE_INTERRUPT, thread_, nullptr, nullptr);
     wait();
+    std::ifstream maps("/proc/" + std::to_string(thread_) + "/maps");
+    for (std::string line; std::getline(maps, line);)
+      if (line.find("[vdso]") != std::string::npos) {
+        clock_page_.first = std::stoull(line, nullptr, 16);
+        clock_page_.second = std::stoull(line.substr(line.find('-') + 1), nullptr, 16);
+      }
   }
   ~Stepper() { ptrace(PTRACE_DETACH, thread_, nullptr, nullptr); }
   Stepper(const Stepper&) = delete;
   Stepper& operator=(const Stepper&) = delete;
 
-  /// Instructions of the shortest of some ticks on end: now and then the clock is read anew within a reading.
+  /// Instructions of the shortest of some ticks on end: one in a hundred meets something to pass on.
   long shortest_tick(int ticks) {
     long least = 0;
     long before = -1; // of the stretch before; unknown at first
@@ -113,11 +121,14 @@ class Stepper {
       throw std::runtime_error("the haptic thread has ended");
   }
   long stretch() const {
-    for (long count = 1; count < 10'000'000; ++count) {
+    long count = 0;
+    for (long steps = 0; steps < 10'000'000; ++steps) {
       user_regs_struct registers{};
       ptrace(PTRACE_GETREGS, thread_, nullptr, &registers);
       const bool reads = registers.rax == SYS_clock_gettime && registers.rdi == CLOCK_THREAD_CPUTIME_ID &&
                          (ptrace(PTRACE_PEEKTEXT, thread_, registers.rip, nullptr) & 0xffff) == 0x050f; // syscall
+      if (registers.rip < clock_page_.first || registers.rip >= clock_page_.second)
+        ++count;
       ptrace(PTRACE_SINGLESTEP, thread_, nullptr, nullptr);
       wait();
       if (reads)
@@ -126,6 +137,7 @@ class Stepper {
     throw std::runtime_error("the haptic thread does not read its processor time any more: the ticks cannot be told");
   }
   pid_t thread_;
+  std::pair<unsigned long long, unsigned long long> clock_page_{0, 0}; // addresses: first, and one past the last
 };
 
 /// Watches until it is told to stop.
