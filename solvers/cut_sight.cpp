@@ -194,9 +194,11 @@ CutSight::CutSight(const Sight& sight, const std::vector<Vector3>& centres, cons
       }
     const topology::PointTree tree(present);
     double largest = 0;
+    const auto spacing_at = [&](const Vector3& x) { return spacing_of[tree.nearest(x).index]; };
     for (const topology::FrontSegment& segment : sight_.incision->front()) {
-      front_spacing_.push_back(spacing_of[tree.nearest(0.5 * (segment.from + segment.to)).index]);
-      largest = std::max(largest, front_spacing_.back());
+      const std::array<double, 2>& ends =
+          front_spacing_.emplace_back(std::array{spacing_at(segment.from), spacing_at(segment.to)});
+      largest = std::max({largest, ends[0], ends[1]});
     }
     longest_reach_ = sight_.reach * largest;
     branch_.resize(sight_.rule == SightRule::enriched ? centres.size() : 0);
@@ -230,11 +232,22 @@ void CutSight::update_radii(const std::vector<Vector3>& centres, const std::vect
   }
 }
 
+CutSight::EnrichedReach CutSight::reach_at(const Vector3& x, const FrontFrame& frame) const {
+  const topology::FrontSegment& segment = sight_.incision->front()[frame.segment];
+  const auto& [at_from, at_to] = front_spacing_[frame.segment];
+  const Vector3 along = segment.to - segment.from;
+  const double share = (x - segment.from).dot(along) / along.squaredNorm();
+  EnrichedReach reach{sight_.reach * std::lerp(at_from, at_to, std::clamp(share, 0.0, 1.0))};
+  if (share > 0 && share < 1)
+    reach.gradient = (sight_.reach * (at_to - at_from) / along.squaredNorm()) * along;
+  return reach;
+}
+
 bool CutSight::enriches(const Vector3& x) const {
   if (sight_.rule != SightRule::enriched || front_spacing_.empty())
     return false;
   const auto front = sight_.incision->front_frame(x, longest_reach_);
-  return front && front->distance < sight_.reach * front_spacing_[front->segment];
+  return front && front->distance < reach_at(x, *front).length;
 }
 
 Vector3 CutSight::off_the_sheet(const Vector3& x) const {
@@ -302,7 +315,8 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
   support.count = n;
   sight_time += Clock::now() - looked;
 
-  const double reach = front ? sight_.reach * front_spacing_[front->segment] : 0;
+  const EnrichedReach around = front ? reach_at(x, *front) : EnrichedReach{};
+  const double reach = around.length;
   const bool enriched = may_enrich && front && front->distance < reach && front->distance > 1e-9 * reach;
   if (!bent && !enriched) {
     for (int k = n; k < n + SphereGrid::lanes; ++k) {
@@ -349,8 +363,8 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
       resize(plain, n);
       solve_moments<plain_size>(scratch, n, plain_slope, plain);
       const double width = (1 - sight_.blend) * reach, t = (reach - front->distance) / width;
-      blend(out, plain, t * t * (3 - 2 * t),
-            Vector3(-6 * t * (1 - t) / (width * front->distance) * (x - front->point)));
+      const Vector3 nearness = (front->distance / reach) * around.gradient - (x - front->point) / front->distance;
+      blend(out, plain, t * t * (3 - 2 * t), Vector3((6 * t * (1 - t) / width) * nearness));
     }
   }
   if (!(out.moment_condition <= worst_condition))

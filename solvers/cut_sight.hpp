@@ -52,16 +52,24 @@ class CutSight {
 
  private:
   enum : std::uint8_t { touches_sheet = 1, near_front = 2 };
+  /// Reach of the enrichment about a point whose nearest place on the front is `frame`. It follows the node spacing
+  /// along the front, linear between the ends of a segment, so that it does not jump from one to the next.
+  struct EnrichedReach {
+    double length = 0; // m
+    Vector3 gradient = Vector3::Zero();
+  };
+  [[nodiscard]] EnrichedReach reach_at(const Vector3& x, const topology::FrontFrame& frame) const;
+
   Sight sight_;
 
-  std::vector<std::uint8_t> concern_;  // per node
-  std::vector<double> known_radii_;    // m, per node
-  std::vector<topology::Eye> eyes_;    // per node
-  std::vector<double> front_distance_; // m, per node; infinite when far
-  std::vector<Branch> branch_;         // per node; zero when far from the front
-  std::vector<double> front_spacing_;  // m, per segment of the front
-  double longest_reach_ = 0;           // m, of the enrichment
-  double smallest_radius_ = 0;         // m
+  std::vector<std::uint8_t> concern_;                // per node
+  std::vector<double> known_radii_;                  // m, per node
+  std::vector<topology::Eye> eyes_;                  // per node
+  std::vector<double> front_distance_;               // m, per node; infinite when far
+  std::vector<Branch> branch_;                       // per node; zero when far from the front
+  std::vector<std::array<double, 2>> front_spacing_; // m, at both ends of every segment of the front
+  double longest_reach_ = 0;                         // m, of the enrichment
+  double smallest_radius_ = 0;                       // m
 };
 
 /// Wall clock that this thread has spent so far on what points see around cuts (sight lines, ways around the front, the

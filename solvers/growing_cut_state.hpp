@@ -198,10 +198,10 @@ struct GrowingCut::State {
     if (problem.incision != nullptr && nodes_may_coarsen) {
       const Nearness to_way(places);
       const SpacingAt spacing_at(problem.nodes, removed);
+      const auto may_change = [&](const Vector3& x) { return to_way(x) < exchange_reach * spacing_at(x); };
       for (const topology::FrontSegment& segment : problem.incision->front())
-        if (const Vector3 middle = 0.5 * (segment.from + segment.to);
-            to_way(middle) < exchange_reach * spacing_at(middle))
-          for (const Vector3& x : {segment.from, middle, segment.to})
+        if (may_change(segment.from) || may_change(segment.to))
+          for (const Vector3& x : {segment.from, Vector3(0.5 * (segment.from + segment.to)), segment.to})
             front.push_back(x);
     }
     std::vector<Vector3> all_front = front;

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <optional>
 #include <random>
 
 using namespace spherecut;
@@ -139,6 +140,39 @@ TEST_CASE("First derivatives around a cut agree with finite differences of the v
   CHECK(errors[errors.size() * 95 / 100] < 1e-6);
   if (rule != SightRule::visibility)
     CHECK(errors.back() < 1e-4);
+}
+
+TEST_CASE("Along a front beside which the spacing changes the enriched basis does not jump", "[cut_sight]") {
+  CutBlock block = cut_block(8, false, 7);
+  const CutFrame& frame = block.frame;
+  for (int i = 0; i < block.nodes.size(); ++i)
+    block.nodes.spacings[i] *= 1 + 0.3 * std::sin(7 * (block.nodes.positions[i] - frame.origin).dot(frame.tangent));
+  const Spheres spheres = spheres_of(block, SightRule::enriched, 2.4);
+  const auto field = [](const Vector3& x) { return std::sin(9 * x.x()) * std::cos(8 * x.y()) + std::cos(10 * x.z()); };
+  ShapeFunctions shape;
+  // Places ahead of the front and above the sheet where the enrichment fades.
+  for (const auto& [ahead, above] : {std::pair(0.16, 0.01), std::pair(0.1, 0.1), std::pair(-0.02, 0.15)}) {
+    INFO("line " << ahead << " m ahead of the front, " << above << " m above the sheet");
+    const Vector3 start = frame.origin + ahead * frame.ahead + above * frame.normal;
+    const auto at = [&](double along) {
+      REQUIRE(evaluate(spheres, start + along * frame.tangent, shape));
+      return combine(block.nodes.positions, shape, field);
+    };
+    constexpr double step = 1e-3;
+    Sum before = at(-0.42);
+    double steepest = 0, off = 0;
+    for (int k = 1; k <= 840; ++k) {
+      const Sum now = at(-0.42 + k * step);
+      const double slope = 0.5 * (before.gradient + now.gradient).dot(frame.tangent);
+      steepest = std::max(steepest, std::abs(now.value - before.value) / step);
+      off = std::max(off, std::abs(now.value - before.value - step * slope));
+      before = now;
+    }
+    CHECK(steepest < 10); // the field's own slope is at most 20
+    CHECK(off < 1e-3);
+    for (const double end : {-0.4, 0.0, 0.4}) // of a segment of the front
+      CHECK(std::abs(at(end + 1e-9).value - at(end - 1e-9).value) < 1e-7);
+  }
 }
 
 TEST_CASE("No point has a node from beyond a cut through the body, and pairs on its faces stand apart", "[cut_sight]") {
