@@ -6,12 +6,39 @@
 #include <cholmod.h>
 #include <cmath>
 #include <cstring>
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <umfpack.h>
 
 namespace spherecut::solvers {
 
 namespace {
+
+/// No OpenMP threads for the calling thread while this lives: Debian's CHOLMOD opens four to add up its fronts,
+/// whatever it is told, which then spin for more work on the cores of the others.
+class WithoutOpenMp {
+ public:
+  WithoutOpenMp() {
+    using Get = int (*)();
+    if (void* const get = dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"))
+      if (void* const set = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels")) {
+        set_ = reinterpret_cast<Set>(set);
+        levels_ = reinterpret_cast<Get>(get)();
+        set_(0);
+      }
+  }
+  ~WithoutOpenMp() {
+    if (set_ != nullptr)
+      set_(levels_);
+  }
+  WithoutOpenMp(const WithoutOpenMp&) = delete;
+  WithoutOpenMp& operator=(const WithoutOpenMp&) = delete;
+
+ private:
+  using Set = void (*)(int);
+  Set set_ = nullptr;
+  int levels_ = 0;
+};
 
 /// CHOLMOD's workspace, started and finished with the object that owns it.
 struct CholmodCommon {
@@ -57,7 +84,10 @@ class CholeskyFactorisation final : public OrderedCholesky {
     factor_ = cholmod_analyze(&matrix, &common);
     if (factor_ == nullptr)
       throw NumericalError(fmt::format("Cholesky analysis failed (CHOLMOD status {})", common.status));
-    cholmod_factorize(&matrix, factor_, &common);
+    {
+      const WithoutOpenMp one_thread;
+      cholmod_factorize(&matrix, factor_, &common);
+    }
     if (common.status == CHOLMOD_NOT_POSDEF || factor_->minor < factor_->n) {
       const std::size_t column = factor_->minor;
       cholmod_free_factor(&factor_, &common);

@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 namespace spherecut::solvers {
 
@@ -105,13 +107,80 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
   return points;
 }
 
+namespace {
+
+/// Gathers centroids of small triangles of one sheet: those that lie together and face the same way make one point,
+/// with their whole area vector, on the sheet under their mean.
+class SmallTriangles {
+ public:
+  explicit SmallTriangles(const topology::Incision& incision) : incision_(incision) {}
+
+  void add(int sheet, const SurfacePoint& point, double spacing) {
+    // The opening goes with the root of the distance to the front: finer there.
+    const auto front = incision_.front_frame(point.position, spacing);
+    const int level = std::ilogb(largest_group * (front ? std::max(front->distance, finest * spacing) : spacing));
+    const double edge = std::ldexp(1.0, level);
+    std::array<long, 6> key{sheet, level, 0, 0, 0, 0};
+    for (int c = 0; c < 3; ++c)
+      key[2 + c] = std::lround(std::floor(point.position[c] / edge));
+    for (;; ++key[5]) { // of the groups at this place the first that faces this way
+      const auto [found, is_new] = group_at_.try_emplace(key, groups_.size());
+      if (is_new)
+        groups_.push_back({point.normal, Vector3::Zero(), Vector3::Zero(), 0, spacing, edge, sheet, 0});
+      Group& group = groups_[found->second];
+      if (group.normal.dot(point.normal) < same_way)
+        continue;
+      group.moment += point.weight * point.position;
+      group.area += point.weight * point.normal;
+      group.weight += point.weight;
+      ++group.count;
+      return;
+    }
+  }
+
+  /// Calls push(point on the sheet, spacing) for every group in the order in which they were begun.
+  template <typename Push>
+  void for_each(const Push& push) const {
+    for (const Group& group : groups_) {
+      SurfacePoint point{group.moment / group.weight, group.area.normalized(), group.area.norm()};
+      if (group.count > 1)
+        if (const auto face = incision_.closest(point.position, group.edge); face && face->sheet == group.sheet) {
+          point.position = face->point;
+          if (face->normal.dot(point.normal) > 0) // off the triangle that it lies on, then
+            point.normal = face->normal;
+        }
+      push(point, group.spacing);
+    }
+  }
+
+ private:
+  static constexpr double largest_group = 0.5, finest = 0.25, same_way = 0.95; // spacings, spacings; a cosine
+  struct Group {
+    Vector3 normal, moment, area;
+    double weight, spacing, edge;
+    int sheet, count;
+  };
+  const topology::Incision& incision_;
+  std::map<std::array<long, 6>, std::size_t> group_at_;
+  std::vector<Group> groups_;
+};
+
+} // namespace
+
 std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge,
                                          double centroid_below, const BoundingBox* region) {
   const topology::PointTree tree(nodes.positions);
   const topology::Domain& domain = *incision.domain();
   std::vector<SurfacePoint> points, face;
   std::vector<Corners> pending;
-  for (const topology::SurfaceMesh& sheet : incision.sheets())
+  SmallTriangles small_triangles(incision);
+  const auto push_both_sides = [&](const SurfacePoint& point, double spacing) {
+    for (const double side : {1.0, -1.0})
+      points.push_back(
+          {point.position + side * lip_offset * spacing * point.normal, -side * point.normal, point.weight});
+  };
+  for (int s = 0; s < std::ssize(incision.sheets()); ++s) {
+    const topology::SurfaceMesh& sheet = incision.sheets()[s];
     for (const Triangle& triangle : sheet.triangles) {
       pending.push_back({sheet.vertices[triangle[0]], sheet.vertices[triangle[1]], sheet.vertices[triangle[2]]});
       while (!pending.empty()) {
@@ -126,14 +195,20 @@ std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, con
           push_quarters(t, pending);
           continue;
         }
+        // Sheets are made in strips as narrow as the steps of the blade: triangles count by their area.
+        const double small = centroid_below * spacing, area = 0.5 * (t[1] - t[0]).cross(t[2] - t[0]).norm();
+        const bool is_small = area < 0.25 * std::sqrt(3.0) * small * small;
         face.clear();
-        push_negative(t, distances(t, domain), longest < centroid_below * spacing, face);
+        push_negative(t, distances(t, domain), is_small, face);
         for (const SurfacePoint& point : face)
-          for (const double side : {1.0, -1.0})
-            points.push_back(
-                {point.position + side * lip_offset * spacing * point.normal, -side * point.normal, point.weight});
+          if (is_small)
+            small_triangles.add(s, point, spacing);
+          else
+            push_both_sides(point, spacing);
       }
     }
+  }
+  small_triangles.for_each(push_both_sides);
   return points;
 }
 

@@ -2,8 +2,8 @@
 // command line, 3 numerical failure, 130 interrupted.
 #include "experiments/experiment.hpp"
 #include "solvers/parallel.hpp"
-#include "src/blas_threads.hpp"
 #include "src/haptics/run_haptics.hpp"
+#include "src/process_settings.hpp"
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
 #include "src/version.hpp"
@@ -192,6 +192,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN); // a run goes on when nobody reads its progress
   app::use_one_blas_thread();
+  app::keep_freed_memory();
   try {
     return run(argc, argv);
   } catch (const InputError& error) {

@@ -1,6 +1,6 @@
 #include "src/session.hpp"
 
-#include "src/blas_threads.hpp"
+#include "src/process_settings.hpp"
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
 

@@ -6,10 +6,12 @@
 #include "topology/errors.hpp"
 
 #include "tests/support/cut_block.hpp"
+#include "tests/support/cut_sheets.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
+#include <numbers>
 #include <random>
 
 using namespace spherecut;
@@ -117,6 +119,50 @@ TEST_CASE("Both faces of a cut are integrated as far as they lie in the body", "
   }
   CHECK(plus == Approx(area / 2).epsilon(1e-12));
   CHECK(area == Approx(2 * block.incision->area()).epsilon(2e-3));
+}
+
+TEST_CASE("Narrow strips of a curved cut are integrated together: area vector exact, points on the faces, few",
+          "[cut_galerkin]") {
+  // A quarter of a cylinder of radius 0.4 about x, whose front is the edge at 90 degrees, in 80 strips.
+  const topology::SurfaceMesh sheet = mapped_sheet(24, 80, [](double s, double t) {
+    const double turn = 0.5 * std::numbers::pi * t;
+    return Vector3(0.6 * s - 0.3, 0.4 * std::sin(turn), 0.4 * std::cos(turn) - 0.2);
+  });
+  const auto field = [](const Vector3& x) { return std::exp(x.x()) * std::cos(2 * x.y()); };
+  Vector3 area_vector = Vector3::Zero();
+  double area = 0, integral = 0;
+  for (const Triangle& t : sheet.triangles) {
+    const Vector3 &a = sheet.vertices[t[0]], &b = sheet.vertices[t[1]], &c = sheet.vertices[t[2]];
+    const Vector3 part = 0.5 * (b - a).cross(c - a);
+    area_vector += part;
+    area += part.norm();
+    integral += part.norm() * field((a + b + c) / 3);
+  }
+  const auto domain = topology::make_box_domain(Vector3::Constant(-0.5), Vector3::Constant(0.5), 0.05);
+  const topology::Incision incision({sheet}, domain);
+  NodeCloud nodes;
+  const double spacing = GENERATE(0.1, 0.2);
+  for (double x = -0.5; x <= 0.5; x += spacing)
+    for (double y = -0.5; y <= 0.5; y += spacing)
+      for (double z = -0.5; z <= 0.5; z += spacing)
+        nodes.add({x, y, z}, spacing, NodeKind::interior, Vector3::Zero());
+  const std::vector<SurfacePoint> points = lip_quadrature(incision, nodes);
+  Vector3 found_vector = Vector3::Zero();
+  double found_area = 0, found_integral = 0;
+  for (const SurfacePoint& point : points) {
+    const auto face = incision.closest(point.position, spacing);
+    REQUIRE(face);
+    CHECK(face->distance == Approx(lip_offset * spacing).epsilon(0.02));
+    const double side = face->normal.dot(point.position - face->point);
+    CHECK(side * face->normal.dot(point.normal) < 0); // out of the material on this side
+    found_vector += side > 0 ? Vector3(-point.weight * point.normal) : Vector3(point.weight * point.normal);
+    found_area += point.weight;
+    found_integral += point.weight * field(point.position);
+  }
+  CHECK((found_vector / 2 - area_vector).norm() < 0.005 * area);
+  CHECK(found_area / 2 == Approx(area).epsilon(0.01));
+  CHECK(found_integral / 2 == Approx(integral).epsilon(0.01));
+  CHECK(points.size() < sheet.triangles.size()); // two faces of them
 }
 
 TEST_CASE("A linear field with its tractions on the faces of the cut passes the patch test", "[cut_galerkin]") {
