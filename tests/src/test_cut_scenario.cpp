@@ -1,4 +1,5 @@
 #include "src/scenario.hpp"
+#include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -13,24 +14,8 @@ using Catch::Contains;
 
 namespace {
 
-std::string complaint(const std::string& text) {
-  const TemporaryFolder folder;
-  const auto file = write_file(folder.path() / "case.toml", text);
-  try {
-    static_cast<void>(read_scenario(file));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
-
 std::string complaint_about(const std::string& addition) {
   return complaint(cut_block + addition);
-}
-
-Scenario read(const std::string& text) {
-  const TemporaryFolder folder;
-  return read_scenario(write_file(folder.path() / "case.toml", text));
 }
 
 const std::string two_poses = "[[blade.path]]\ntime = 0\nposition = [0, 0, 0]\n"
@@ -39,7 +24,7 @@ const std::string two_poses = "[[blade.path]]\ntime = 0\nposition = [0, 0, 0]\n"
 } // namespace
 
 TEST_CASE("Cuts are read with their values and the documented defaults") {
-  const Scenario scenario = read(cut_block + R"(
+  const Scenario scenario = scenario_of(cut_block + R"(
 [[precut]]
 shape = "disc"
 centre = [0, 0, 0.015]
@@ -47,7 +32,7 @@ normal = [0, 0, 2]
 radius = 0.01
 pressure = 100
 )" + rectangle_precut("[0.01, 0, 0.02]", "[1, 0, 0]", "[1, 0, 1]", "0.02", "0.01") +
-                                 R"([[precut]]
+                                        R"([[precut]]
 shape = "polygon"
 points = [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0]]
 [blade]
@@ -85,10 +70,10 @@ TEST_CASE("Pretension is read as three normal or six components") {
   const auto with = [](const std::string& value) {
     return replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = " + value) + disc_precut;
   };
-  CHECK(read(with("[0.1, 0.2, 0]")).pretension.isApprox(Matrix3(Vector3(0.1, 0.2, 0).asDiagonal())));
+  CHECK(scenario_of(with("[0.1, 0.2, 0]")).pretension.isApprox(Matrix3(Vector3(0.1, 0.2, 0).asDiagonal())));
   Matrix3 full;
   full << 0.1, 0.03, 0.02, 0.03, 0.2, 0.01, 0.02, 0.01, 0;
-  CHECK(read(with("[0.1, 0.2, 0, 0.01, 0.02, 0.03]")).pretension.isApprox(full));
+  CHECK(scenario_of(with("[0.1, 0.2, 0, 0.01, 0.02, 0.03]")).pretension.isApprox(full));
   CHECK_THAT(complaint(with("[0.1, 0.2]")), Contains("material.pretension") && Contains("three or six numbers"));
   CHECK_THAT(complaint(with("[0.1, 0.2, 0.9]")), Contains("material.pretension") && Contains("<= 0.5"));
 }
@@ -98,8 +83,9 @@ TEST_CASE("Toughness makes a blade that is resisted; without it there is none") 
   const auto tough = [](const std::string& value) {
     return replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = " + value);
   };
-  CHECK(read(cut_block + edge + two_poses).toughness == 0);
-  const Scenario scenario = read(tough("50") + edge + "sharpness = 0.8\nfriction = 30\nflank = 0.004\n" + two_poses);
+  CHECK(scenario_of(cut_block + edge + two_poses).toughness == 0);
+  const Scenario scenario =
+      scenario_of(tough("50") + edge + "sharpness = 0.8\nfriction = 30\nflank = 0.004\n" + two_poses);
   CHECK(scenario.toughness == 50);
   CHECK(scenario.blade->sharpness == 0.8);
   CHECK(scenario.blade->friction == 30);
@@ -107,7 +93,7 @@ TEST_CASE("Toughness makes a blade that is resisted; without it there is none") 
   CHECK_THAT(complaint(tough("-1") + edge + two_poses), Contains("material.toughness") && Contains("0 < value"));
   CHECK_THAT(complaint(tough("50") + edge + "advance = 0.5\n" + two_poses),
              Contains("blade.advance = 0.5") && Contains("allowed: one of them"));
-  CHECK(read(cut_block + edge + "advance = 0.5\n" + two_poses).blade->advance == 0.5);
+  CHECK(scenario_of(cut_block + edge + "advance = 0.5\n" + two_poses).blade->advance == 0.5);
   CHECK_THAT(complaint(tough("50") + "[method]\nname = \"published\"\n" + edge + two_poses),
              Contains("material.toughness") && Contains("galerkin or collocation"));
 }

@@ -1,4 +1,5 @@
 #include "src/session.hpp"
+#include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -17,18 +18,6 @@ using namespace spherecut::tests;
 using Catch::Contains;
 
 namespace {
-
-Session session_of(const std::string& text) {
-  const TemporaryFolder folder;
-  return Session(read_scenario(write_file(folder.path() / "case.toml", text)));
-}
-
-std::vector<StepResult> run(Session& session) {
-  std::vector<StepResult> results;
-  for (const StepSample& sample : session.steps())
-    results.push_back(session.step(sample));
-  return results;
-}
 
 // A blade with its edge along y, from pose to pose.
 std::string blade(const std::vector<std::string>& positions, double half_length, const std::string& step) {

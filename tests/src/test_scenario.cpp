@@ -1,6 +1,7 @@
 #include "src/scenario.hpp"
 #include "src/scenario_document.hpp"
 #include "src/scenario_keys.hpp"
+#include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -14,18 +15,6 @@ using namespace spherecut::tests;
 using Catch::Contains;
 
 namespace {
-
-// What read_scenario says about the text; empty when it takes it.
-std::string complaint(const std::string& text) {
-  const TemporaryFolder folder;
-  const auto file = write_file(folder.path() / "case.toml", text);
-  try {
-    static_cast<void>(read_scenario(file));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 std::string complaint_after(const std::string& from, const std::string& to) {
   return complaint(replaced(small_scenario, from, to));

@@ -1,4 +1,5 @@
 #include "src/session.hpp"
+#include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -12,18 +13,6 @@ using namespace spherecut::tests;
 using Catch::Contains;
 
 namespace {
-
-Session session_of(const std::string& text) {
-  const TemporaryFolder folder;
-  return Session(read_scenario(write_file(folder.path() / "case.toml", text)));
-}
-
-std::vector<StepResult> run(Session& session) {
-  std::vector<StepResult> steps;
-  for (const StepSample& sample : session.steps())
-    steps.push_back(session.step(sample));
-  return steps;
-}
 
 std::string with_motion(const std::string& motion) {
   const auto from = small_scenario.find("[tool.approach]");

@@ -1,6 +1,7 @@
 // Tears in runs: a grasper that pulls, pre-strain that drives, growth that runs away, starts without a cut, accounts.
 #include "src/haptics/virtual_loop.hpp"
 #include "src/session.hpp"
+#include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/mesh_checks.hpp"
 #include "tests/support/run_program.hpp"
@@ -19,18 +20,6 @@ using namespace spherecut::tests;
 using Catch::Contains;
 
 namespace {
-
-Scenario scenario_of(const std::string& text) {
-  const TemporaryFolder folder;
-  return read_scenario(write_file(folder.path() / "case.toml", text));
-}
-
-std::vector<StepResult> run(Session& session) {
-  std::vector<StepResult> results;
-  for (const StepSample& sample : session.steps())
-    results.push_back(session.step(sample));
-  return results;
-}
 
 /// The half of a block above a cut is pulled up; a weak plane leads the tear.
 const std::string peel = R"([organ]
