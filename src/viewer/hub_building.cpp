@@ -53,7 +53,9 @@ void Hub::replay(int client, const std::optional<std::string>& name) {
 std::filesystem::path Hub::unused_recording() const {
   for (int number = 1;; ++number) {
     std::filesystem::path file = options_.recordings / fmt::format("session-{}{}", number, recording_extension);
-    if (std::error_code error; !std::filesystem::exists(file, error))
+    // A link that leads nowhere is a name in use too: writing would follow it out of the folder.
+    if (std::error_code error;
+        std::filesystem::symlink_status(file, error).type() == std::filesystem::file_type::not_found)
       return file;
   }
 }

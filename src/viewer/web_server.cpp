@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
@@ -87,6 +88,11 @@ struct WebServer::Data::Client : std::enable_shared_from_this<Client> {
     socket.set_option(websocket::stream_base::decorator(
         [](websocket::response_type& response) { response.set(http::field::server, "spherecut"); }));
     socket.read_message_max(data.options.message_bytes);
+    // Pings are answered without take_message(); they count like messages. In here nothing may be closed.
+    socket.control_callback([this](websocket::frame_type, beast::string_view) {
+      if (!spend())
+        asio::post(socket.get_executor(), [self = shared_from_this()] { self->close(self->too_many()); });
+    });
     socket.async_accept(request, [self = shared_from_this()](beast::error_code error) {
       if (error || self->data.stopping) {
         self->drop();
@@ -109,19 +115,28 @@ struct WebServer::Data::Client : std::enable_shared_from_this<Client> {
     });
   }
 
-  void take_message() {
+  /// Whether one message more is within the rate.
+  bool spend() {
     const Clock::time_point now = Clock::now();
     tokens = std::min(data.options.messages_per_second,
                       tokens + data.options.messages_per_second * std::chrono::duration<double>(now - told).count());
     told = now;
+    if (tokens < 1)
+      return false;
+    tokens -= 1;
+    return true;
+  }
+  [[nodiscard]] CloseReason too_many() const {
+    return {CloseCode::policy, fmt::format("more than {:g} messages a second", data.options.messages_per_second)};
+  }
+
+  void take_message() {
     std::optional<CloseReason> reason;
-    if (tokens < 1) {
-      reason = CloseReason{CloseCode::policy,
-                           fmt::format("more than {:g} messages a second", data.options.messages_per_second)};
+    if (!spend()) {
+      reason = too_many();
     } else if (!socket.got_text()) {
       reason = CloseReason{CloseCode::unsupported, "binary messages are not taken"};
     } else {
-      tokens -= 1;
       const auto bytes = buffer.cdata();
       reason = data.handlers.message(id, {static_cast<const char*>(bytes.data()), bytes.size()});
     }
@@ -247,6 +262,8 @@ struct HttpConnection : std::enable_shared_from_this<HttpConnection> {
     const std::string host(view(request[http::field::host]));
     const std::string origin(view(request[http::field::origin]));
     const bool keep = request.keep_alive();
+    if (request.count(http::field::host) > 1 || request.count(http::field::origin) > 1)
+      return say(http::status::bad_request, "one Host and one Origin", false);
     if (!host_allowed(host, options.address, port))
       return say(http::status::forbidden, "this name does not belong to this server", keep);
     const std::string_view target = view(request.target());

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # The page of `spherecut serve` under test: run.sh BUILD_FOLDER KIND [ARGUMENTS]
 #   unit             the protocol's decoder and the surface, under node
-#   browser          the page in Chromium against the server
+#   browser [FOLDER] the page in Chromium against the server; pictures of it into a folder
+#   controls         likewise: every control of the page, on a small block
 #   tear             likewise: the grasper lifts a flap that tears
 #   pictures FOLDER  pictures of the page, JPEG below 150 kB, for docs/images
-#   measure          frame rate and latency at 20,000 triangles
+#   measure          frame rate and latency at 20,000 triangles; exits 1 when they are not what was asked for
 #   soak SECONDS [SEED]  random pressing and cutting
 # Exits 77 (skipped) and says why when the page was not built or there is no browser.
 set -euo pipefail
@@ -20,8 +21,8 @@ skip() {
 node=$(command -v node || command -v nodejs) || skip "nodejs is not installed"
 [ -e "$build/page/index.html" ] || skip "the page is not built; that needs nodejs, npm and, once, the network"
 if [ "$kind" = unit ]; then
-  exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs"
+  exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs" "$build/page-tests/trace.test.mjs"
 fi
 command -v chromium >/dev/null || skip "the Debian package chromium is not installed"
-case $kind in browser | tear) kind=$kind.test ;; esac
+case $kind in browser | controls | tear) kind=$kind.test ;; esac
 exec "$node" "$build/page-tests/$kind.mjs" "$build" "$source" "$@"

@@ -402,6 +402,16 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     CHECK(count > 50);
     CHECK(nodes.size() == 4 + 17 * count);
     CHECK(Viewer::section(first.picture, 19).size() > 28);
+    // The slice is 80 mm wide about the middle of a block of 60 x 30 mm: outside at its corner, 14 mm deep in its
+    // middle.
+    const std::string slice = Viewer::section(first.picture, 20);
+    const auto distance = [&](std::size_t row, std::size_t column) {
+      float value = 0;
+      std::memcpy(&value, slice.data() + 40 + 4 * (16 * row + column), 4);
+      return static_cast<double>(value);
+    };
+    CHECK(distance(0, 0) == Approx(std::hypot(0.01, 0.025)).margin(2e-3));
+    CHECK(distance(7, 7) == Approx(-0.015 + 0.04 / 15).margin(2e-3));
     CHECK(Viewer::section(second.picture, 18).empty()); // only who asked
   }
 
@@ -450,7 +460,24 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     CHECK(first.session["settings"]["young_modulus"] == 2e4);
   }
 
+  SECTION("a solve that fails is told in words, and the session goes on") {
+    first.pose({0.045, 0, 0.028});
+    first.pose({0.031, 0, 0.022}); // into the side that is held
+    REQUIRE(first.until([&] { return !first.errors.empty(); }));
+    CHECK(first.errors[0]["code"] == "solver");
+    CHECK(first.errors[0]["about"] == "session");
+    CHECK(first.errors[0]["text"].get<std::string>().size() > 20);
+    first.say({{"type", "park"}});
+    first.pose({0, 0, 0.035});
+    first.pose({0, 0, 0.027});
+    CHECK(first.until([&] { return force_of(first) > 0.02 && (first.value<std::uint32_t>(44) & 32U) == 0; }));
+  }
+
   SECTION("the tool comes free with its holder, and a recording replays") {
+    // A link out of the folder that leads nowhere is no name to write to.
+    const std::filesystem::path outside = served.folder().path() / "outside";
+    std::filesystem::create_directories(served.folder().path() / "recordings");
+    std::filesystem::create_symlink(outside, served.folder().path() / "recordings" / "session-1.recording");
     first.say({{"type", "record"}, {"on", true}});
     REQUIRE(first.until([&] { return first.recording["on"] == true; }));
     first.pose({0, 0, 0.035});
@@ -459,6 +486,8 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     first.say({{"type", "record"}, {"on", false}});
     REQUIRE(first.until([&] { return first.recording["on"] == false; }));
     const std::string name = first.recording["name"];
+    CHECK(name == "session-2.recording");
+    CHECK_FALSE(std::filesystem::exists(outside));
     CHECK(std::filesystem::file_size(served.folder().path() / "recordings" / name) > 1000);
     // The same file runs again off line, bit by bit.
     const ProgramResult again =
@@ -474,6 +503,24 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
   }
   CHECK(first.sound);
   CHECK(second.sound);
+}
+
+TEST_CASE("--open shows the page in the user's browser") {
+  const TemporaryFolder folder;
+  const std::filesystem::path opener =
+      write_file(folder.path() / "xdg-open", "#!/bin/sh\nprintf %s \"$1\" > \"$0.url\"\n");
+  std::filesystem::permissions(opener, std::filesystem::perms::owner_all);
+  const ProgramResult ended =
+      run_shell("PATH=" + folder.path().string() + ":$PATH timeout --foreground --preserve-status -s INT 2 " +
+                spherecut_command({"serve", write_file(folder.path() / "live.toml", live_block).string(), "--port", "0",
+                                   "--open", "--out", (folder.path() / "recordings").string()}));
+  CHECK(ended.status == 0);
+  std::string url;
+  for (int i = 0; i < 1000 && url.empty(); ++i, std::this_thread::sleep_for(std::chrono::milliseconds(20)))
+    if (std::filesystem::exists(folder.path() / "xdg-open.url"))
+      url = read_file(folder.path() / "xdg-open.url");
+  CHECK_THAT(url, Catch::StartsWith("http://127.0.0.1:"));
+  CHECK_THAT(ended.out, Catch::Contains("serving at " + url));
 }
 
 TEST_CASE("Serving what cannot be served is refused in words, and Ctrl-C ends it cleanly") {

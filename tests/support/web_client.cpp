@@ -96,6 +96,11 @@ void WebSocketClient::send_binary(const std::string& bytes) {
   data_->socket.write(boost::asio::buffer(bytes), error);
 }
 
+void WebSocketClient::ping() {
+  beast::error_code error;
+  data_->socket.ping({}, error);
+}
+
 std::optional<WebMessage> WebSocketClient::receive(double seconds) {
   if (!data_->open)
     return std::nullopt;

@@ -37,6 +37,7 @@ class WebSocketClient {
 
   void send(const std::string& text);
   void send_binary(const std::string& bytes);
+  void ping();
   /// The next message; none within the time, or when the connection has ended.
   std::optional<WebMessage> receive(double seconds = 30);
   /// Receives until the connection ends; false: not within the time.

@@ -1,8 +1,7 @@
 // The haptic thread of `spherecut serve`, single-stepped: how many instructions a tick takes, with and without viewers.
 // A count, not a time: it is the same on a slow or busy machine, and where there are no hardware counters.
 #include "tests/src/scenario_text.hpp"
-#include "tests/support/run_program.hpp"
-#include "tests/support/temporary_folder.hpp"
+#include "tests/support/served_program.hpp"
 #include "tests/support/web_client.hpp"
 
 #include <algorithm>
@@ -13,7 +12,6 @@
 #include <csignal>
 #include <cstring>
 #include <ctime>
-#include <fcntl.h>
 #include <fstream>
 #include <sched.h>
 #include <stdexcept>
@@ -28,56 +26,6 @@
 using namespace spherecut::tests;
 
 namespace {
-
-/// The program as a child of this one, which may step it therefore.
-class Server {
- public:
-  Server() {
-    const std::string scenario = write_file(folder_.path() / "small.toml", small_scenario).string();
-    const std::string out = (folder_.path() / "out").string(), said = (folder_.path() / "said").string();
-    child_ = fork();
-    if (child_ == 0) {
-      const int file = open(said.c_str(), O_WRONLY | O_CREAT, 0600);
-      dup2(file, 1);
-      dup2(file, 2);
-      execl(SPHERECUT_BINARY, SPHERECUT_BINARY, "serve", scenario.c_str(), "--port", "0", "--out", out.c_str(),
-            static_cast<char*>(nullptr));
-      _exit(127);
-    }
-    static constexpr const char* address = "http://127.0.0.1:";
-    for (int i = 0; i < 6000 && port_ == 0 && waitpid(child_, nullptr, WNOHANG) == 0; ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      const std::string text = read_file(said);
-      if (const auto at = text.find(address); at != std::string::npos && text.find('/', at + 17) != std::string::npos)
-        port_ = std::stoi(text.substr(at + std::strlen(address)));
-    }
-    if (port_ == 0)
-      throw std::runtime_error("the server did not start: " + read_file(said));
-  }
-  ~Server() {
-    kill(child_, SIGKILL);
-    waitpid(child_, nullptr, 0);
-  }
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
-
-  [[nodiscard]] int port() const { return port_; }
-  /// The thread of that name; 0: there is none.
-  [[nodiscard]] pid_t thread(const std::string& name) const {
-    for (const auto& entry : std::filesystem::directory_iterator("/proc/" + std::to_string(child_) + "/task")) {
-      std::string line;
-      std::getline(std::ifstream(entry.path() / "comm"), line);
-      if (line == name)
-        return std::stoi(entry.path().filename().string());
-    }
-    return 0;
-  }
-
- private:
-  TemporaryFolder folder_;
-  pid_t child_ = 0;
-  int port_ = 0;
-};
 
 /// Steps a thread from one reading of its processor time to the next. A tick reads it once before and once after its
 /// work, so two stretches on end are a whole tick, waiting left out: a stepped thread is always late. The kernel's page
@@ -213,7 +161,7 @@ bool soon(const Condition& condition) {
 } // namespace
 
 TEST_CASE("Viewers, nonsense and reconnects cost the haptic thread not one instruction of a tick") {
-  const Server server;
+  const ServedProgram server(small_scenario);
   pid_t haptic = 0;
   REQUIRE(soon([&] { return (haptic = server.thread("haptic")) != 0; }));
   // A stepped thread and the one that steps it take turns: where that is allowed, before what else there is to do.

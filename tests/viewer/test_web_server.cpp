@@ -1,4 +1,5 @@
 // The web server alone, with a client of its own: what is served, who is let in, and what a client can do to it.
+#include "src/viewer/requests.hpp"
 #include "src/viewer/web_server.hpp"
 
 #include "tests/support/temporary_folder.hpp"
@@ -27,6 +28,7 @@ class TestServer {
     std::ofstream(folder_.path() / "assets" / "page.js") << "let a = 1;";
     std::ofstream(folder_.path() / ".secret") << "secret";
     std::filesystem::create_symlink("/etc/passwd", folder_.path() / "link.txt");
+    std::filesystem::create_directory_symlink("/etc", folder_.path() / "folder");
     options.port = 0;
     options.file = [this](std::string_view path) { return file_below(folder_.path(), path); };
     WebServer::Handlers handlers;
@@ -36,7 +38,11 @@ class TestServer {
       flooded_.erase(std::remove(flooded_.begin(), flooded_.end(), client), flooded_.end());
     };
     handlers.message = [this](int client, std::string_view text) -> std::optional<CloseReason> {
-      ++messages;
+      try {
+        static_cast<void>(parse_request(text)); // as the session reads it
+      } catch (const InputError&) {
+        ++refused;
+      }
       if (text == "bad")
         return CloseReason{CloseCode::invalid, "this is bad"};
       if (text == "flood")
@@ -67,7 +73,7 @@ class TestServer {
   TestServer& operator=(const TestServer&) = delete;
 
   [[nodiscard]] int port() const { return server_->port(); }
-  std::atomic<int> opened{0}, closed{0}, messages{0}, floods{0};
+  std::atomic<int> opened{0}, closed{0}, refused{0}, floods{0};
 
  private:
   TemporaryFolder folder_;
@@ -108,9 +114,27 @@ TEST_CASE("The page is served with its types, and nothing beside it") {
   CHECK(head.body.empty());
   CHECK(http_request(server.port(), "/nothing.js").status == 404);
   CHECK(http_request(server.port(), "/", {}, "POST").status == 405);
-  for (const char* escape :
-       {"/../etc/passwd", "/assets/../../etc/passwd", "/%2e%2e/etc/passwd", "/..%2f..%2fetc/passwd", "/.secret",
-        "/%2esecret", "/link.txt", "//etc/passwd", "/assets/", "/assets", "/a%00b", "/..\\index.html", "/%zz"}) {
+  for (const char* escape : {"/../etc/passwd",
+                             "/assets/../../etc/passwd",
+                             "/%2e%2e/etc/passwd",
+                             "/..%2f..%2fetc/passwd",
+                             "/.secret",
+                             "/%2esecret",
+                             "/link.txt",
+                             "//etc/passwd",
+                             "/assets/",
+                             "/assets",
+                             "/a%00b",
+                             "/..\\index.html",
+                             "/%zz",
+                             "/%252e%252e/etc/passwd",
+                             "/%c0%ae%c0%ae/etc/passwd",
+                             "/./index.html",
+                             "/%2findex.html",
+                             "/folder/passwd",
+                             "/index.html%0a",
+                             "http://127.0.0.1/etc/passwd",
+                             "file:///etc/passwd"}) {
     CAPTURE(escape);
     CHECK(http_request(server.port(), escape).status == 404);
   }
@@ -132,6 +156,11 @@ TEST_CASE("Hosts that another's DNS points here and pages from elsewhere are ref
     CHECK_FALSE(client.open());
     CHECK(client.status() == 403);
   }
+  // Two of either, one of them allowed: which one counts is not left to chance.
+  CHECK(http_request(server.port(), "/", {}, "GET", "Host: evil.example\r\n").status == 400);
+  CHECK(
+      http_request(server.port(), "/", {}, "GET", "Origin: http://localhost:" + port + "\r\nOrigin: null\r\n").status ==
+      400);
   const WebSocketClient rebound(server.port(), "http://evil.example:" + port, "evil.example:" + port);
   CHECK(rebound.status() == 403);
   CHECK(server.opened == 0);
@@ -176,11 +205,15 @@ TEST_CASE("A malformed, binary, long or too frequent message ends that client an
   CHECK((too_long == 1009 || too_long == 1006));
   CHECK(code_after([](WebSocketClient& client) { client.send("\xff\xfe"); }) == 1007);
   CHECK(code_after([](WebSocketClient& client) {
-          for (int i = 0; i < 60; ++i)
+          for (int i = 0; i < 300; ++i)
             client.send("echo");
         }) == 1008);
+  CHECK(code_after([](WebSocketClient& client) {
+          for (int i = 0; i < 300; ++i)
+            client.ping();
+        }) == 1008);
   CHECK(echoes(good));
-  CHECK(soon([&] { return server.closed == 5; }));
+  CHECK(soon([&] { return server.closed == 6; }));
 }
 
 TEST_CASE("A client that does not read costs one message, and too much text ends it") {
@@ -206,6 +239,11 @@ TEST_CASE("A thousand reconnects and ten thousand messages of noise leave the se
   WebServerOptions options;
   options.messages_per_second = 1e6;
   TestServer server(options);
+  const auto files = [] {
+    const std::filesystem::directory_iterator open("/proc/self/fd");
+    return std::distance(begin(open), end(open));
+  };
+  const auto before = files();
   for (int i = 0; i < 1000; ++i) {
     WebSocketClient client(server.port());
     REQUIRE(client.open());
@@ -213,6 +251,7 @@ TEST_CASE("A thousand reconnects and ten thousand messages of noise leave the se
       client.send("echo");
   }
   CHECK(soon([&] { return server.opened == 1000 && server.closed == 1000; }));
+  CHECK(soon([&] { return files() == before; }));
   std::uint64_t random = 1;
   std::optional<WebSocketClient> client;
   for (int i = 0; i < 10'000; ++i) {
@@ -229,6 +268,9 @@ TEST_CASE("A thousand reconnects and ten thousand messages of noise leave the se
     if (i % 500 == 499)
       CHECK(client->wait_for_close());
   }
+  CHECK(soon([&] { return server.refused >= 10'000; }));
+  client.reset();
+  CHECK(soon([&] { return files() == before; }));
   WebSocketClient last(server.port());
   CHECK(echoes(last));
 }

@@ -5,6 +5,16 @@ import type { Page } from './page';
 import type { Panels } from './panels';
 import type { Stylus } from './stylus';
 
+/** What mouse, pen and touch do, for the help. */
+export const gestures: readonly (readonly [string, string])[] = [
+  ['Move over the organ', 'the tool hovers there'],
+  ['Left button, finger or pen on the organ', 'presses, cuts or grips; drag along the surface'],
+  ['Wheel while pressing, pen pressure, slider', 'depth'],
+  ['Drag beside the organ, right button, two fingers', 'turns the view'],
+  ['Middle button, Shift and right button', 'moves the view'],
+  ['Wheel, pinch', 'zoom'],
+];
+
 export function bindings(page: Page, stylus: Stylus, orbit: Orbit, panels: Panels): Section[] {
   return [
     { title: 'Tool', bindings: toolKeys(page, stylus) },

@@ -1,9 +1,9 @@
-import { drawBar, diverging, sequential, withUnit } from './colours';
+import { withUnit } from './colours';
 import { ForceChart } from './chart';
 import { Connection, type LinkState } from './connection';
 import { element, write } from './element';
 import { attachPointer } from './input';
-import { bindings } from './bindings';
+import { bindings, gestures } from './bindings';
 import { Keyboard } from './keys';
 import { Latency } from './latency';
 import { Messages } from './messages';
@@ -38,16 +38,17 @@ export class Page {
   private readonly keyboard: Keyboard;
   private readonly connection: Connection;
   private pending: Frame[] = [];
+  private replayed: string | null = null; // name of the recording that is played
   private tearEpoch = -1; // of the session that `tear` is of
   private taken = 0; // frames that the last picture shows
   private completed = true; // that picture is done
   private pointer = { x: -1, y: -1 }; // px, of the stylus
   private frozen: Snapshot | null = null;
   private scalars: Scalars | null = null;
-  private nodes: Nodes | null = null;
-  private support: Support | null = null;
+  nodes: Nodes | null = null; // that are shown
+  support: Support | null = null; // of the picked one
   private slice: Slice | null = null;
-  private stages: Float32Array | null = null;
+  stages: Float32Array | null = null; // s, of the session so far
   private drawn: number[] = []; // times of the last pictures, ms
   private ratesShown = 0; // ms
   private chartShown = 0;
@@ -69,14 +70,7 @@ export class Page {
       (pressing) => this.showPress(pressing),
     );
     this.keyboard = new Keyboard(bindings(this, this.stylus, this.view.orbit, this.panels));
-    this.keyboard.describe(byId('help-body'), [
-      ['Move over the organ', 'the tool hovers there'],
-      ['Left button, finger or pen on the organ', 'presses, cuts or grips; drag along the surface'],
-      ['Wheel while pressing, pen pressure, slider', 'depth'],
-      ['Drag beside the organ, right button, two fingers', 'turns the view'],
-      ['Middle button, Shift and right button', 'moves the view'],
-      ['Wheel, pinch', 'zoom'],
-    ]);
+    this.keyboard.describe(byId('help-body'), gestures);
     attachPointer(this.view.canvas, this.view.orbit, this.stylus, {
       ray: (x, y) => this.view.ray(x, y),
       pick: (ray) => this.pickAlong(ray),
@@ -115,6 +109,7 @@ export class Page {
         return this.showRole();
       case 'mode':
         this.stylus.setMode(message.mode);
+        this.view.trace.clear();
         this.panels.setMode(message.mode);
         return this.showDepth();
       case 'building':
@@ -136,9 +131,8 @@ export class Page {
         return this.showRole();
       case 'replay':
         button('replay').setAttribute('aria-pressed', String(message.on));
-        byId('link').dataset['state'] = message.on ? 'replay' : 'open';
-        byId('link').textContent = message.on ? `replay of ${message.name ?? ''}` : 'live';
-        return;
+        this.replayed = message.on ? message.name : null;
+        return this.showLive();
     }
   }
 
@@ -162,9 +156,8 @@ export class Page {
       this.tear = null;
       this.panels.showTear(null);
     }
-    byId('link').textContent = 'live';
-    this.view.tool.setSession(session);
-    if (!same) this.view.setSession(session);
+    this.showLive();
+    this.view.setSession(session, same);
     this.stylus.setSession(session);
     this.panels.setSession(session);
     this.showDepth();
@@ -191,12 +184,19 @@ export class Page {
     const link = byId('link');
     link.dataset['state'] = state;
     link.textContent = { connecting: 'connecting', open: 'live', closed: 'not connected' }[state];
+    this.replayed = null;
     if (state === 'open') return;
     this.holder = null;
     this.id = -1;
     this.pending = [];
     this.showRole();
     if (state === 'closed') this.messages.say('error', `The connection to the server has ended${reason ? `: ${reason}` : ''}.`);
+  }
+
+  private showLive(): void {
+    const link = byId('link');
+    link.dataset['state'] = this.replayed === null ? 'open' : 'replay';
+    link.textContent = this.replayed === null ? 'live' : `replay of ${this.replayed}`;
   }
 
   private showRole(): void {
@@ -276,6 +276,7 @@ export class Page {
     if (frame.nodes || frame.support) this.showNodes();
     if (frame.slice) this.showSlice();
     this.view.tool.update(frame);
+    if (frame.mode === 'blade') this.view.follow(frame, this.session.blade?.edge ?? []);
     this.chart.add(frame.tickTime, Math.hypot(...frame.force));
     this.panels.showFrame(frame);
     this.view.change();
@@ -295,7 +296,7 @@ export class Page {
     }
     if (now - this.ratesShown < 250) return;
     this.ratesShown = now;
-    this.panels.showRates(frame, this.drawn.length, this.latency, this.stages);
+    this.panels.showRates(frame, this.drawn.length, this.toolLatency, this.latency, this.stages);
   }
 
   /** Applies what the switches ask for to what is known. */
@@ -319,16 +320,8 @@ export class Page {
     if (scalars) {
       const unit = scalars.quantity === 'displacement' ? 'm' : 'Pa';
       const name = scalars.quantity === 'displacement' ? 'displacement' : 'von Mises stress';
-      this.showScale(name, withUnit(scalars.low, unit), withUnit(scalars.high, unit), false);
+      this.panels.showScale(name, withUnit(scalars.low, unit), withUnit(scalars.high, unit), false);
     } else if (!this.slice) byId('scale').hidden = true;
-  }
-
-  private showScale(name: string, low: string, high: string, signed: boolean): void {
-    byId('scale').hidden = false;
-    byId('scale-name').textContent = name;
-    byId('scale-low').textContent = low;
-    byId('scale-high').textContent = high;
-    drawBar(element('scale-bar', HTMLCanvasElement), signed ? diverging : sequential);
   }
 
   private showNodes(): void {
@@ -343,8 +336,8 @@ export class Page {
       if (!this.scalars) byId('scale').hidden = true;
       return;
     }
-    if (shows === 'organ') this.showScale('distance to the surface', withUnit(ends[0], 'm'), withUnit(ends[1], 'm'), true);
-    else this.showScale('distance to the cut', withUnit(ends[1], 'm'), withUnit(0, 'm'), false);
+    if (shows === 'organ') this.panels.showScale('distance to the surface', withUnit(ends[0], 'm'), withUnit(ends[1], 'm'), true);
+    else this.panels.showScale('distance to the cut', withUnit(ends[1], 'm'), withUnit(0, 'm'), false);
   }
 
   // --- the hand -------------------------------------------------------------------------------------------------------

@@ -1,5 +1,5 @@
 // The panels beside the picture: what they show, and what they ask for.
-import { withUnit } from './colours';
+import { diverging, drawBar, sequential, withUnit } from './colours';
 import { element, write } from './element';
 import type { Latency } from './latency';
 import {
@@ -176,16 +176,28 @@ export class Panels {
     if (tear) write(line, tearInWords(tear));
   }
 
-  showRates(frame: Frame, display: number, latency: Latency, stages: Float32Array | null): void {
+  /** What colours stand for; `signed`: zero is in the middle. */
+  showScale(name: string, low: string, high: string, signed: boolean): void {
+    element('scale', HTMLElement).hidden = false;
+    element('scale-name', HTMLElement).textContent = name;
+    element('scale-low', HTMLElement).textContent = low;
+    element('scale-high', HTMLElement).textContent = high;
+    drawBar(element('scale-bar', HTMLCanvasElement), signed ? diverging : sequential);
+  }
+
+  showRates(frame: Frame, display: number, tool: Latency, body: Latency, stages: Float32Array | null): void {
     const share = frame.ticks > 0 ? ` (${((100 * frame.misses) / frame.ticks).toFixed(2)} %)` : '';
-    const p95 = latency.quantile(0.95);
+    const p95 = (latency: Latency): string => {
+      const seconds = latency.quantile(0.95);
+      return seconds === null ? '-' : withUnit(seconds, 's');
+    };
     const rows = [
       line('Haptic loop', `${frame.hapticRate.toFixed(0)} Hz${frame.state & State.realtime ? '' : ', no FIFO'}`),
       line('Deadline misses', `${frame.misses}${share}`, frame.misses > 0.01 * frame.ticks),
       line('Tick', `${withUnit(frame.tickSeconds, 's')}, wakes within ${withUnit(frame.worstWake, 's')}`),
       line('Solve', `${frame.solveRate.toFixed(1)} Hz, ${withUnit(frame.solveSeconds, 's')}`),
       line('Frames', `${frame.pictureRate.toFixed(1)} Hz sent, ${display.toFixed(0)} Hz drawn`),
-      line('Hand to picture, p95', p95 === null ? '-' : withUnit(p95, 's')),
+      line('Hand to picture, p95', `tool ${p95(tool)}, body ${p95(body)}`),
       line('Nodes', `${frame.nodeCount}, ${frame.active} in contact`),
       line('Coarsening', `level ${frame.level}`, frame.level > 0),
     ];

@@ -3,16 +3,18 @@ import { Color, DirectionalLight, HemisphereLight, Mesh, MeshBasicMaterial, Ring
 import { Body } from './body';
 import { Orbit } from './orbit';
 import { Overlays } from './overlays';
-import type { SessionStart, Vec3 } from './protocol';
+import type { Frame, SessionStart, Vec3 } from './protocol';
 import type { Ray } from './stylus';
 import type { Hit } from './surface';
 import { ToolModel } from './tool_model';
+import { crossing, Trace } from './trace';
 
 export class View {
   readonly orbit = new Orbit();
   readonly body = new Body();
   readonly tool = new ToolModel();
   readonly overlays = new Overlays();
+  readonly trace = new Trace();
   readonly software: boolean; // drawn by the processor
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
@@ -41,6 +43,7 @@ export class View {
       this.lamp.target,
       this.body.group,
       this.overlays.group,
+      this.trace.mesh,
       this.tool.group,
       this.mark,
     );
@@ -48,12 +51,21 @@ export class View {
     this.resize();
   }
 
-  setSession(session: SessionStart): void {
+  /** `same`: the organ is the one of before, and the camera stays. */
+  setSession(session: SessionStart, same: boolean): void {
     const { lower, upper } = session.bounds;
-    this.orbit.frameBox(lower, upper);
-    this.mark.scale.setScalar(0.018 * Math.hypot(upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]));
+    const size = Math.hypot(upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]);
+    if (!same) this.orbit.frameBox(lower, upper);
+    this.mark.scale.setScalar(0.018 * size);
     this.tool.setSession(session);
+    this.trace.clear(size);
     this.change();
+  }
+
+  /** The way of the blade since the solve that is shown; `edge` in the blade's frame. */
+  follow(frame: Frame, edge: readonly Vec3[]): void {
+    const cast = (origin: Vec3, direction: Vec3): Hit | null => this.body.cast(origin, direction);
+    this.trace.note(crossing(edge, frame.tip, frame.orientation, cast), frame.poseInTick, frame.poseInSolve);
   }
 
   /** Where the stylus is on the surface; null: nowhere. */

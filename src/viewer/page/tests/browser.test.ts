@@ -1,27 +1,24 @@
-// The page in Debian's Chromium against `spherecut serve`: node browser.test.mjs BUILD_FOLDER SOURCE_FOLDER
+// The page in Debian's Chromium against `spherecut serve`: node browser.test.mjs BUILD_FOLDER SOURCE_FOLDER [FOLDER_FOR_PICTURES]
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import test, { after, before } from 'node:test';
 import type { Browser } from 'playwright-core';
-import { launch, type Opened, openPage, until } from './browser';
+import { launch, type Opened, openPage, patience, until } from './browser';
 import { chooseMode, hover, look, ready, type Seen, stroke } from './hand';
-import { recordedForces, serve, type Served } from './server';
+import { photograph, shot, sideBySide } from './photograph';
+import { recordedForces, serve, type Served, withValues } from './server';
 
-const [build = '.', source = '.'] = process.argv.slice(2);
+const [build = '.', source = '.', out = ''] = process.argv.slice(2);
 let served: Served;
 let browser: Browser;
 let first: Opened;
 let pressed: Seen;
+let wounded: Buffer; // picture of the cut
 
 before(async () => {
   // The liver of the demo with fewer triangles and nodes: the same page and server, sooner through a cut.
-  served = await serve(build, join(source, 'scenarios/liver_live.toml'), (text) =>
-    text
-      .replace('triangles = 20000', 'triangles = 5000')
-      .replace('fine_spacing = 0.009', 'fine_spacing = 0.013')
-      .replace('coarse_spacing = 0.026', 'coarse_spacing = 0.032'),
-  );
+  served = await serve(build, join(source, 'scenarios/liver_live.toml'), (text) => withValues(text, { triangles: 5000, fine_spacing: 0.009 }));
   browser = await launch();
   first = await openPage(browser, served.address);
 });
@@ -37,6 +34,7 @@ test('The page loads without a complaint and takes the tool', async () => {
   const seen = await look(first.tab);
   assert.equal(seen.role, 'you hold the tool');
   assert.equal(seen.force, 0);
+  await photograph(first.tab, out, 'load');
   assert.equal(await first.tab.title(), `spherecut ${/\d+\.\d+\.\d+/.exec(await first.tab.title())?.[0]}`);
 });
 
@@ -71,9 +69,12 @@ test('The readout is the force in the recording of the server at that tick', asy
 test('A recording is replayed, and the force comes back', async () => {
   const { tab } = first;
   await tab.click('#replay');
-  await until(tab, 'the press is felt again', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03, 30);
+  await until(tab, 'the press is felt again', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
+  assert.equal(await tab.textContent('#link'), 'replay of session-1.recording');
+  await photograph(tab, out, 'replay');
   await tab.click('#replay');
   await until(tab, 'the replay has ended', () => document.getElementById('replay')!.getAttribute('aria-pressed') === 'false');
+  await until(tab, 'it is live', () => document.getElementById('link')!.textContent === 'live');
   await until(tab, 'the tool is free', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
 });
 
@@ -81,8 +82,12 @@ test('A cut across the liver opens: the lips part in the geometry and in the pic
   const { tab } = first;
   await chooseMode(tab, '2', 'blade');
   await hover(tab, -0.055, 0.004);
+  // Before a solve has opened it, the way of the edge through the surface is in the picture with the blade.
+  const ahead = tab.waitForFunction(() => globalThis.spherecut!.view.trace.length > 0.003, undefined, { polling: 20 });
   await stroke(tab, [[-0.055, 0.004], [0.01, 0.0]], 1.5);
-  await until(tab, 'the cut opens', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4, 120);
+  await ahead;
+  await until(tab, 'the cut opens', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4);
+  await until(tab, 'the wound has caught up with the blade', () => globalThis.spherecut!.view.trace.length === 0);
   await tab.mouse.up();
   await tab.keyboard.press('k');
   await until(tab, 'the lips are drawn', () => {
@@ -100,6 +105,7 @@ test('A cut across the liver opens: the lips part in the geometry and in the pic
   const seen = await look(tab);
   assert.ok(seen.cutArea > 1e-4, `area ${seen.cutArea}`);
   assert.match((await tab.textContent('#cut-state')) ?? '', /^Cut .* cm²/);
+  if (out) wounded = await shot(tab);
 });
 
 test('Nodes, supports and level sets show what the method sees', async () => {
@@ -123,6 +129,7 @@ test('A second viewer watches and cannot drive until the tool is let go', async 
   assert.match(watching.role, /^watching/);
   assert.ok(watching.lips > 2e-4, 'it does not see the wound');
   assert.ok(await second.tab.isDisabled('#take'));
+  if (out) await sideBySide(browser, [await shot(first.tab), await shot(second.tab)], out, 'two');
   assert.ok(await second.tab.isDisabled('#reset'));
   await first.tab.click('#take');
   await until(first.tab, 'it has let go', () => !globalThis.spherecut!.holding);
@@ -139,8 +146,9 @@ test('Reset makes the organ whole', async () => {
   const { tab } = first;
   const epoch = await tab.evaluate(() => globalThis.spherecut!.session!.epoch);
   await tab.keyboard.press('r');
-  await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 40_000 });
+  await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 1000 * patience });
   await until(tab, 'it is whole', () => globalThis.spherecut!.frame!.cutArea === 0 && globalThis.spherecut!.view.body.lipsApart() === 0);
+  if (out) await sideBySide(browser, [wounded, await shot(tab)], out, 'reset');
 });
 
 test('Errors of the server appear in words', async () => {
@@ -148,7 +156,7 @@ test('Errors of the server appear in words', async () => {
   await tab.evaluate(() => document.querySelectorAll('details').forEach((panel) => (panel.open = true)));
   await tab.fill('#fine', '60'); // coarser than far away
   await tab.click('#method-form button');
-  await until(tab, 'an error', () => /spacing/.test(document.querySelector('#messages [data-level=error]:last-child')?.textContent ?? ''), 40);
+  await until(tab, 'an error', () => /spacing/.test(document.querySelector('#messages [data-level=error]:last-child')?.textContent ?? ''));
 });
 
 test('Everything goes by keyboard', async () => {
@@ -164,12 +172,13 @@ test('Everything goes by keyboard', async () => {
   await tab.keyboard.down('.');
   await until(tab, 'the key is felt', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber > 8);
   await tab.keyboard.up('.');
-  await tab.waitForFunction((depth) => globalThis.spherecut!.frame!.depth > depth + 0.001, before.depth, { timeout: 40_000 });
+  await tab.waitForFunction((depth) => globalThis.spherecut!.frame!.depth > depth + 0.001, before.depth, { timeout: 1000 * patience });
   await tab.keyboard.press('Escape');
   await until(tab, 'it withdraws', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
   await tab.keyboard.press('?');
   await until(tab, 'the help', () => (document.getElementById('help') as HTMLDialogElement).open);
   assert.match((await tab.textContent('#help-body')) ?? '', /turn the blade/);
+  await photograph(tab, out, 'keyboard');
   await tab.keyboard.press('Escape');
   // Every control has a name, and Tab reaches them.
   const nameless = await tab.evaluate(() =>

@@ -30,6 +30,7 @@ export async function openPage(
     acceptDownloads: true,
     hasTouch: size.touch ?? false,
   });
+  context.setDefaultTimeout(1000 * patience);
   const tab = await context.newPage();
   const complaints: string[] = [];
   tab.on('console', (message) => {
@@ -45,8 +46,11 @@ export async function openPage(
   return { tab, context, complaints };
 }
 
+/** How long anything may take at most: a machine that is slow or busy fails no test. */
+export const patience = Number(process.env['SPHERECUT_PATIENCE'] ?? 150); // s
+
 /** Waits until `condition` holds in the page; says `what` when it does not in time. */
-export async function until(tab: Tab, what: string, condition: () => boolean, seconds = 40): Promise<void> {
+export async function until(tab: Tab, what: string, condition: () => boolean, seconds = patience): Promise<void> {
   try {
     await tab.waitForFunction(condition, undefined, { timeout: 1000 * seconds, polling: 50 });
   } catch (error) {

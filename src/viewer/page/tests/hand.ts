@@ -1,6 +1,6 @@
 // What a test does with the page, and what it sees there.
 import type { Page as Tab } from 'playwright-core';
-import { until } from './browser';
+import { patience, until } from './browser';
 
 export interface Seen {
   force: number; // N, of the frame
@@ -42,7 +42,7 @@ export function look(tab: Tab): Promise<Seen> {
 }
 
 export const ready = (tab: Tab): Promise<void> =>
-  until(tab, 'a frame, and the tool in the hand', () => Boolean(globalThis.spherecut?.frame && globalThis.spherecut.holding), 60);
+  until(tab, 'a frame, and the tool in the hand', () => Boolean(globalThis.spherecut?.frame && globalThis.spherecut.holding));
 
 /** Pixel of the window where the surface is drawn that lies below (x, y), m. */
 export async function above(tab: Tab, x: number, y: number): Promise<{ x: number; y: number }> {
@@ -71,7 +71,7 @@ export async function hover(tab: Tab, x: number, y: number): Promise<void> {
 
 export async function chooseMode(tab: Tab, key: string, mode: string): Promise<void> {
   await tab.keyboard.press(key);
-  await tab.waitForFunction((wanted) => globalThis.spherecut!.frame!.mode === wanted, mode, { timeout: 40_000 });
+  await tab.waitForFunction((wanted) => globalThis.spherecut!.frame!.mode === wanted, mode, { timeout: 1000 * patience });
 }
 
 /** Draws the tool along a way over the surface while it is pressed, each leg in about `seconds`. */

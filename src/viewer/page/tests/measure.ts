@@ -1,21 +1,27 @@
 // Rates and latencies of the live liver of 20,000 triangles, drawn by the processor: node measure.mjs BUILD_FOLDER SOURCE_FOLDER
-// A press that slides and a cut, first through the page alone, then with a second client that only reads the feed.
+// A press that slides and a cut, first through the page alone, then with a second client that only reads the feed. Ends with
+// status 1 when the feed has fewer than 20 frames a second, or the hand is later than 250 ms (95 %) in the picture.
 import { join } from 'node:path';
 import type { Page as Tab } from 'playwright-core';
 import { launch, openPage, until } from './browser';
 import { Feed } from './feed';
 import { above, chooseMode, hover, look, ready } from './hand';
+import { stageNames } from '../source/protocol';
 import { serve } from './server';
 
 const [build = '.', source = '.'] = process.argv.slice(2);
 
+const leastFrames = 20; // a second
+const mostLatency = 0.25; // s
+const misses: string[] = [];
+
 const ms = (seconds: number | null): string => (seconds === null ? '-' : `${(1000 * seconds).toFixed(0)} ms`);
 
-/** What the page counts since its start. */
-function counters(tab: Tab): Promise<{ frame: number; vertices: number; pictures: number }> {
+/** What the page counts since its start; wall clock of the session's stages, s. */
+function counters(tab: Tab): Promise<{ frame: number; vertices: number; pictures: number; stages: number[] }> {
   return tab.evaluate(() => {
-    const { frame, seenVertices, pictures } = globalThis.spherecut!;
-    return { frame: frame!.number, vertices: seenVertices, pictures };
+    const { frame, seenVertices, pictures, stages } = globalThis.spherecut!;
+    return { frame: frame!.number, vertices: seenVertices, pictures, stages: [...(stages ?? [])] };
   });
 }
 
@@ -32,6 +38,9 @@ async function measured(tab: Tab, feed: Feed | null, what: string, act: () => Pr
     `${what}: page ${rate(after.frame - before.frame)} frames a second, ${rate(after.vertices - before.vertices)} with new vertices, ` +
       `${rate(after.pictures - before.pictures)} pictures; ${rate(end.solve - seen.solve)} solves a second, cut ${(1e4 * (end.cutArea - seen.cutArea)).toFixed(2)} cm2`,
   );
+  const stages = stageNames.map((name, i) => `${name} ${ms((after.stages[i] ?? 0) - (before.stages[i] ?? 0))}`);
+  const { nodes, level } = await tab.evaluate(() => ({ nodes: globalThis.spherecut!.frame!.nodeCount, level: globalThis.spherecut!.frame!.level }));
+  console.log(`  in ${seconds.toFixed(1)} s: ${stages.join(', ')}; ${nodes} nodes, coarsening ${level}`);
   const [body, tool, picture] = await tab.evaluate(() => {
     const { latency, toolLatency, view } = globalThis.spherecut!;
     const of = (list: typeof latency): (number | null)[] => [list.quantile(0.5), list.quantile(0.95), list.count];
@@ -41,6 +50,8 @@ async function measured(tab: Tab, feed: Feed | null, what: string, act: () => Pr
     `  from hand to picture, median and 95 %: tool and force ${ms(tool[0]!)}, ${ms(tool[1]!)} (${tool[2]} poses); ` +
       `body solved at it ${ms(body[0]!)}, ${ms(body[1]!)} (${body[2]}); a picture takes ${ms(picture[0]!)} at ${picture[1]} x ${picture[2]}`,
   );
+  if ((tool[1] ?? Infinity) > mostLatency) misses.push(`${what}: hand to picture ${ms(tool[1] ?? null)} (95 %), asked for ${ms(mostLatency)}`);
+  if (read && read.frames < leastFrames) misses.push(`${what}: the feed has ${read.frames.toFixed(1)} frames a second, asked for ${leastFrames}`);
   if (read) {
     console.log(
       `  client that only reads: ${read.frames.toFixed(1)} frames a second, ${read.vertices.toFixed(1)} with new vertices, ` +
@@ -91,4 +102,5 @@ for (const reads of [false, true]) {
     await served.stop();
   }
 }
-process.exit(0);
+for (const miss of misses) console.error(`MISSED: ${miss}`);
+process.exit(misses.length > 0 ? 1 : 0);

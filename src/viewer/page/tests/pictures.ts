@@ -1,21 +1,11 @@
 // Pictures of the page for README and docs: node pictures.mjs BUILD_FOLDER SOURCE_FOLDER OUTPUT_FOLDER [liver|flap]
 import { join } from 'node:path';
-import type { Page as Tab } from 'playwright-core';
-import { launch, openPage, type Opened, until } from './browser';
+import { launch, openPage, type Opened, patience, until } from './browser';
 import { chooseMode, hover, look, ready, stroke } from './hand';
-import { coarserFlap, serve } from './server';
+import { photograph } from './photograph';
+import { coarserFlap, serve, withValues } from './server';
 
 const [build = '.', source = '.', out = '.', which = ''] = process.argv.slice(2);
-/** A picture with smooth edges, small enough to be kept: below 150 kB. */
-async function photograph(tab: Tab, name: string): Promise<void> {
-  await tab.evaluate(() => globalThis.spherecut!.view.sharpen(2));
-  for (const quality of [84, 74, 62, 50]) {
-    const bytes = await tab.screenshot({ path: join(out, `viewer_${name}.jpg`), type: 'jpeg', quality });
-    if (bytes.length < 150_000) break;
-  }
-  await tab.evaluate(() => globalThis.spherecut!.view.sharpen(1));
-}
-
 /** Serves a scenario, its text changed, and hands its page to `act`. */
 async function withPage(scenario: string, change: (text: string) => string, act: (opened: Opened, phone: () => Promise<Opened>) => Promise<void>): Promise<void> {
   const served = await serve(build, join(source, 'scenarios', scenario), change);
@@ -35,11 +25,10 @@ async function withPage(scenario: string, change: (text: string) => string, act:
 
 // Nodes stay as fine as they are however long a cut takes.
 async function liver(): Promise<void> {
-  await withPage('liver_live.toml', (text) => text.replace(/^budget = .*$/m, 'budget = 60.0'), async ({ tab, context }, openPhone) => {
+  await withPage('liver_live.toml', (text) => withValues(text, { budget: 60 }), async ({ tab, context }, openPhone) => {
     const keep = async (name: string): Promise<void> => {
-      await tab.evaluate(() => document.getElementById('messages')!.replaceChildren());
       await tab.waitForTimeout(700);
-      await photograph(tab, name);
+      await photograph(tab, out, name);
       console.log(name, JSON.stringify(await look(tab)));
     };
     await hover(tab, -0.03, -0.012);
@@ -57,7 +46,7 @@ async function liver(): Promise<void> {
     for (let i = 0; i < 6; ++i) await tab.keyboard.press('.', { delay: 150 });
     await hover(tab, -0.06, 0.004);
     await stroke(tab, [[-0.06, 0.004], [-0.035, 0.004], [-0.01, 0.001], [0.012, -0.002]], 2.5);
-    await until(tab, 'there is a cut', () => globalThis.spherecut!.frame!.cutArea > 1e-4, 120);
+    await until(tab, 'there is a cut', () => globalThis.spherecut!.frame!.cutArea > 1e-4);
     // Until the solver has caught up with the hand.
     for (let area = -1, seen = await look(tab); seen.cutArea > area; seen = await look(tab)) {
       area = seen.cutArea;
@@ -97,7 +86,7 @@ async function liver(): Promise<void> {
     await phone.tab.tap('#view', { position: { x: 170, y: 300 } });
     await phone.tab.tap('#press-hold');
     await phone.tab.waitForTimeout(3500);
-    await photograph(phone.tab, 'phone');
+    await photograph(phone.tab, out, 'phone');
   });
 }
 
@@ -106,22 +95,21 @@ async function flap(): Promise<void> {
   await withPage('liver_flap.toml', coarserFlap, async ({ tab }) => {
     await hover(tab, -0.062, 0.003);
     await tab.mouse.down();
-    await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3, 120);
+    await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3);
     await tab.keyboard.down(',');
-    await until(tab, 'the hand is far up', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber <= -15, 90);
+    await until(tab, 'the hand is far up', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber <= -15);
     await tab.keyboard.up(',');
     const before = (await look(tab)).cutArea;
-    await tab.waitForFunction((area) => globalThis.spherecut!.frame!.cutArea >= 1.02 * area, Math.min(before, 1.72e-3), { timeout: 120_000 });
+    await tab.waitForFunction((area) => globalThis.spherecut!.frame!.cutArea >= 1.02 * area, Math.min(before, 1.72e-3), { timeout: 1000 * patience });
     await tab.evaluate(() => {
       const orbit = globalThis.spherecut!.view.orbit;
       orbit.turn(0.5, -0.45);
       orbit.zoom(1.7);
       orbit.pan(0.12, -0.1);
-      document.getElementById('messages')!.replaceChildren();
       globalThis.spherecut!.view.change();
     });
     await tab.waitForTimeout(6000);
-    await photograph(tab, 'tear');
+    await photograph(tab, out, 'tear');
     console.log('tear', JSON.stringify(await look(tab)));
   });
 }

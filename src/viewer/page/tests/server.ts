@@ -43,7 +43,7 @@ export async function serve(
   for (;;) {
     const address = /http:\/\/[^\s]+/.exec(said)?.[0];
     if (address) return { address, folder, said: () => said, process: child, stop };
-    if (child.exitCode !== null || Date.now() - start > 90_000) {
+    if (child.exitCode !== null || Date.now() - start > 180_000) {
       await stop();
       throw new Error(`the server did not start: ${said}`);
     }
@@ -51,12 +51,18 @@ export async function serve(
   }
 }
 
+/** The text of a scenario with other values of some keys; every key has to be there. */
+export function withValues(text: string, values: Record<string, string | number>): string {
+  for (const [key, value] of Object.entries(values)) {
+    const line = new RegExp(`^${key} = .*$`, 'm');
+    if (!line.test(text)) throw new Error(`the scenario has no ${key}`);
+    text = text.replace(line, `${key} = ${value}`);
+  }
+  return text;
+}
+
 /** The flap of the liver with fewer nodes: the same tear, sooner. */
-export const coarserFlap = (text: string): string =>
-  text
-    .replace('fine_spacing = 0.004', 'fine_spacing = 0.006')
-    .replace('coarse_spacing = 0.020', 'coarse_spacing = 0.026')
-    .replace('fine_radius = 0.006', 'fine_radius = 0.008');
+export const coarserFlap = (text: string): string => withValues(text, { fine_spacing: 0.006, coarse_spacing: 0.026, fine_radius: 0.008 });
 
 /** Force on the hand at every tick of a recording (docs/haptics.md has the layout). */
 export function recordedForces(bytes: Buffer): { time: number; force: [number, number, number] }[] {

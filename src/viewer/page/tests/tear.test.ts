@@ -3,9 +3,9 @@ import assert from 'node:assert/strict';
 import { join } from 'node:path';
 import test, { after, before } from 'node:test';
 import type { Browser } from 'playwright-core';
-import { launch, type Opened, openPage, until } from './browser';
+import { launch, type Opened, openPage, patience, until } from './browser';
 import { hover, look, ready } from './hand';
-import { coarserFlap, serve, type Served } from './server';
+import { coarserFlap, serve, type Served, withValues } from './server';
 
 const [build = '.', source = '.'] = process.argv.slice(2);
 const flap = { x: -0.062, y: 0.003 }; // m, where it is held
@@ -15,7 +15,7 @@ let opened: Opened;
 
 before(async () => {
   // With fewer triangles too.
-  served = await serve(build, join(source, 'scenarios/liver_flap.toml'), (text) => coarserFlap(text).replace('triangles = 20000', 'triangles = 5000'));
+  served = await serve(build, join(source, 'scenarios/liver_flap.toml'), (text) => withValues(coarserFlap(text), { triangles: 5000 }));
   browser = await launch();
   opened = await openPage(browser, served.address);
 });
@@ -39,8 +39,8 @@ test('By mouse: it takes hold, pulls, and the tissue pulls back', async () => {
   const { tab } = opened;
   await hover(tab, flap.x, flap.y);
   await tab.mouse.down();
-  await until(tab, 'it pulls', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.01, 150);
-  await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3, 150);
+  await until(tab, 'it pulls', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.01);
+  await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3);
 });
 
 test('Pulled further it tears: the cut grows and its sides part', async () => {
@@ -49,7 +49,7 @@ test('Pulled further it tears: the cut grows and its sides part', async () => {
   await tab.keyboard.down(',');
   await until(tab, 'the hand is far up', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber <= -15);
   await tab.keyboard.up(',');
-  await tab.waitForFunction((area) => globalThis.spherecut!.frame!.cutArea > 1.02 * area, before.cutArea, { timeout: 120_000 });
+  await tab.waitForFunction((area) => globalThis.spherecut!.frame!.cutArea > 1.02 * area, before.cutArea, { timeout: 1000 * patience });
   const torn = await look(tab);
   assert.ok(torn.cutArea > 1.02 * before.cutArea, `${before.cutArea} m2 became ${torn.cutArea}`);
   assert.ok(torn.lips > before.lips + 5e-4, `${before.lips} m became ${torn.lips}`);
@@ -61,11 +61,11 @@ test('Let go, it is without force, and what is torn stays torn', async () => {
   const { tab } = opened;
   const before = await look(tab);
   await tab.mouse.up();
-  await until(tab, 'it has let go', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0, 150);
+  await until(tab, 'it has let go', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
   const after = await look(tab);
   assert.ok(after.cutArea >= before.cutArea);
   // At rest it grows no more, and the page says why.
-  await until(tab, 'the tear has come to rest', () => ['arrested', 'refused', 'severed'].includes(globalThis.spherecut!.tear?.state ?? ''), 150);
+  await until(tab, 'the tear has come to rest', () => ['arrested', 'refused', 'severed'].includes(globalThis.spherecut!.tear?.state ?? ''));
   assert.match((await tab.textContent('#tear-state')) ?? '', /^The tear (is arrested at|has stopped at|has parted) .*[a-z]/);
 });
 
@@ -74,7 +74,7 @@ test('By keyboard: a reset, then the grasper takes hold and pulls', async () => 
   const epoch = await tab.evaluate(() => globalThis.spherecut!.session!.epoch);
   await hover(tab, flap.x, flap.y); // the arrows go on from there
   await tab.keyboard.press('r');
-  await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 90_000 });
+  await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 1000 * patience });
   await until(tab, 'a frame', () => globalThis.spherecut!.frame?.epoch === globalThis.spherecut!.session!.epoch);
   await until(tab, 'the tear of the session before is forgotten', () => !globalThis.spherecut!.tear?.area);
   await tab.focus('#scene');
@@ -82,8 +82,8 @@ test('By keyboard: a reset, then the grasper takes hold and pulls', async () => 
   await tab.waitForTimeout(120);
   await tab.keyboard.up('ArrowLeft');
   await tab.keyboard.press('Space');
-  await until(tab, 'it pulls', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.01, 150);
+  await until(tab, 'it pulls', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.01);
   await tab.keyboard.press('Space');
-  await until(tab, 'it has let go', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0, 150);
+  await until(tab, 'it has let go', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
   assert.deepEqual(opened.complaints, []);
 });
