@@ -45,7 +45,7 @@ export class Body {
   private colours: BufferAttribute | null = null;
   private organ: Skin | null = null;
   private wall: Skin | null = null;
-  private transparent = false;
+  transparent = false; // as it is drawn
   private wireframe = false;
 
   /** Another surface; it is at rest until the first vertices come. */

@@ -227,7 +227,7 @@ export class Page {
   }
 
   private show(): void {
-    if (!this.complete()) return;
+    if (!this.complete() || this.view.resting) return;
     const frames = this.pending;
     this.pending = [];
     // Of several only the newest vertices are seen.
@@ -279,7 +279,8 @@ export class Page {
     if (frame.mode === 'blade') this.view.follow(frame, this.session.blade?.edge ?? []);
     this.chart.add(frame.tickTime, Math.hypot(...frame.force));
     this.panels.showFrame(frame);
-    this.view.change();
+    if (frame.vertices || frame.scalars || frame.nodes || frame.support || frame.slice) this.view.change();
+    else this.view.moved();
   }
 
   private showNumbers(now: number): void {

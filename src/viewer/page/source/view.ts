@@ -1,13 +1,30 @@
 // The picture: renderer, lights and what stands in it. Draws when something has changed.
-import { Color, DirectionalLight, HemisphereLight, Mesh, MeshBasicMaterial, RingGeometry, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import {
+  Color,
+  DirectionalLight,
+  Group,
+  HemisphereLight,
+  Mesh,
+  MeshBasicMaterial,
+  type PerspectiveCamera,
+  RingGeometry,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
 import { Body } from './body';
 import { Orbit } from './orbit';
 import { Overlays } from './overlays';
 import type { Frame, SessionStart, Vec3 } from './protocol';
+import { Still } from './still';
 import type { Ray } from './stylus';
 import type { Hit } from './surface';
 import { ToolModel } from './tool_model';
 import { crossing, Trace } from './trace';
+
+const backdrop = new Color('#10171c');
+const leastInterval = 30; // ms between two pictures, where the processor draws
 
 export class View {
   readonly orbit = new Orbit();
@@ -18,9 +35,15 @@ export class View {
   readonly software: boolean; // drawn by the processor
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
+  private readonly standing = new Group(); // while the tool moves
+  private readonly moving = new Group();
+  private since = 0; // ms, the last picture was ordered
+  private same = 0; // pictures in which the tool alone has changed
+  kept = false; // the last picture without the tool
   private readonly lamp = new DirectionalLight('#fff4ea', 2.3);
   private readonly mark: Mesh;
-  private stale = true;
+  private readonly still: Still | null; // the picture without the tool, where the processor draws
+  private stale: 'no' | 'tool' | 'all' = 'all'; // what has to be drawn again
   private sharpness = 1; // drawn pixels per pixel of the page, where the processor draws
   private drawSeconds = 0; // of a picture, smoothed
   private ordered: { done: WebGLSync; since: number } | null = null; // the picture that the processor is at
@@ -30,7 +53,8 @@ export class View {
     this.software = drawsInSoftware();
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, powerPreference: 'high-performance' });
     this.renderer.setPixelRatio(this.software ? 1 : Math.min(globalThis.devicePixelRatio, 2));
-    this.scene.background = new Color('#10171c');
+    this.still = this.software ? new Still(this.renderer.getContext() as WebGL2RenderingContext) : null;
+    this.scene.background = backdrop;
     this.mark = new Mesh(
       new RingGeometry(0.72, 1, 32),
       new MeshBasicMaterial({ color: '#62b6cb', transparent: true, opacity: 0.8, depthTest: false }),
@@ -41,12 +65,11 @@ export class View {
       new HemisphereLight('#e4ecf2', '#8a7672', 1.25),
       this.lamp,
       this.lamp.target,
-      this.body.group,
-      this.overlays.group,
-      this.trace.mesh,
-      this.tool.group,
-      this.mark,
+      this.standing,
+      this.moving,
     );
+    this.standing.add(this.body.group, this.overlays.group);
+    this.moving.add(this.trace.mesh, this.tool.group, this.mark);
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
   }
@@ -70,7 +93,7 @@ export class View {
 
   /** Where the stylus is on the surface; null: nowhere. */
   setMark(hit: Hit | null): void {
-    if (hit || this.mark.visible) this.change();
+    if (hit || this.mark.visible) this.moved();
     this.mark.visible = hit !== null;
     if (!hit) return;
     this.mark.position.set(...hit.point);
@@ -79,13 +102,19 @@ export class View {
 
   /** The picture has to be drawn again. */
   change(): void {
-    this.stale = true;
+    this.stale = 'all';
+  }
+
+  /** Nothing but tool, force and the blade's way has. */
+  moved(): void {
+    if (this.stale === 'no') this.stale = 'tool';
   }
 
   /** Orders a picture if anything has changed and the last one is done; true when it has. */
   draw(): boolean {
-    if (!this.stale || this.busy()) return false;
+    if (this.stale === 'no' || this.busy()) return false;
     const since = performance.now();
+    this.since = since;
     this.drawNow();
     if (!this.software) return true;
     const gl = this.renderer.getContext() as WebGL2RenderingContext;
@@ -108,20 +137,51 @@ export class View {
     return false;
   }
 
+  /** Where the processor draws it has more to do than pictures: the solver is on the same machine. */
+  get resting(): boolean {
+    return this.software && performance.now() - this.since < leastInterval;
+  }
+
   /** Wall clock of a picture, s; 0 where graphics hardware draws and does not tell. */
   get pictureSeconds(): number {
     return this.drawSeconds;
   }
 
   drawNow(): void {
-    this.stale = false;
-    const camera = this.orbit.camera;
+    const { camera } = this.orbit;
+    // Keeping costs as much as drawing: it pays from the second picture of the same organ on.
+    this.same = this.stale === 'all' ? 0 : this.same + 1;
+    this.kept = this.kept && this.same > 0;
+    this.stale = 'no';
+    // What shines through the organ cannot be drawn after it.
+    if (!this.still || this.body.transparent || this.same < 2) return this.drawAll(camera);
+    if (this.kept && this.still.kept) this.still.show();
+    else {
+      this.showing(true, false);
+      this.drawAll(camera);
+      this.kept = this.still.keep();
+    }
+    this.showing(false, true);
+    this.scene.background = null; // or the canvas is cleared
+    this.renderer.autoClear = false;
+    this.renderer.render(this.scene, camera);
+    this.renderer.autoClear = true;
+    this.scene.background = backdrop;
+    this.showing(true, true);
+  }
+
+  private drawAll(camera: PerspectiveCamera): void {
     const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
     const above = new Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
     // A lamp over the left shoulder: shading tells the shape from every side.
     this.lamp.position.copy(camera.position).addScaledVector(right, -0.35).addScaledVector(above, 0.45);
     if (this.software) this.body.leaveOutBacks(camera.position.toArray() as Vec3);
     this.renderer.render(this.scene, camera);
+  }
+
+  private showing(still: boolean, moving: boolean): void {
+    this.standing.visible = still;
+    this.moving.visible = moving;
   }
 
   ray(x: number, y: number): Ray {

@@ -121,10 +121,11 @@ async function press(tab: Tab): Promise<{ force: number; depth: number }> {
   await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
   await until(tab, 'it is at rest', () => {
     const { frame } = globalThis.spherecut!;
-    const memory = globalThis as unknown as { tip?: number[] };
-    const still = memory.tip !== undefined && Math.hypot(...frame!.tip.map((x, d) => x - memory.tip![d]!)) < 1e-7;
-    memory.tip = [...frame!.tip];
-    return still && frame!.depth > 0.003 && frame!.poseInSolve === frame!.poseInTick;
+    const memory = globalThis as unknown as { pose?: number; tip?: number[]; same?: number };
+    const still = memory.pose === frame!.poseInTick && Math.hypot(...frame!.tip.map((x, d) => x - (memory.tip?.[d] ?? 0))) < 2e-5;
+    memory.same = still && frame!.poseInSolve === frame!.poseInTick && frame!.depth > 0.003 ? (memory.same ?? 0) + 1 : 0;
+    if (!still) [memory.pose, memory.tip] = [frame!.poseInTick, [...frame!.tip]];
+    return memory.same >= 10; // times on end, 50 ms apart
   });
   const { force, depth } = await look(tab);
   return { force, depth };
@@ -148,7 +149,7 @@ test('A press shows an arrow at the tip, the spring to the hand, the readout in 
   await hover(tab, 0.001, 0.001);
   const before = await pixels(tab, 'scene', yellow);
   const flat = await pixels(tab, 'chart', yellow);
-  const { force } = await press(tab);
+  await press(tab);
   assert.ok((await pixels(tab, 'scene', yellow)) > before + 40, 'no arrow');
   assert.match((await tab.textContent('.readout .force')) ?? '', /^Force\s*\d\.\d{3} N$/);
   await until(tab, 'the readout is the force', () => {
@@ -158,9 +159,9 @@ test('A press shows an arrow at the tip, the spring to the hand, the readout in 
   await tab.waitForTimeout(600);
   assert.ok((await pixels(tab, 'chart', yellow)) > flat + 20, 'the chart does not rise');
   // The spring is as long as the force divided by its stiffness, and can be switched off.
-  const apart = await tab.evaluate(() => {
+  const { apart, force } = await tab.evaluate(() => {
     const { frame, session } = globalThis.spherecut!;
-    return Math.hypot(...frame!.hand.map((x, d) => x - frame!.tip[d]!)) * session!.spring;
+    return { apart: Math.hypot(...frame!.hand.map((x, d) => x - frame!.tip[d]!)) * session!.spring, force: Math.hypot(...frame!.force) };
   });
   assert.ok(Math.abs(apart - force) < 0.05 * force, `${apart} N in the spring, ${force} N on the tool`);
   const coil = await pixels(tab, 'scene', blue);
@@ -170,6 +171,41 @@ test('A press shows an arrow at the tip, the spring to the hand, the readout in 
   await withdraw(tab);
   await until(tab, 'a picture without force', () => globalThis.spherecut!.frame!.force[2] === 0);
   assert.ok((await pixels(tab, 'scene', yellow)) <= before + 10, 'the arrow stays');
+});
+
+test('A picture for a tool that moves is the one that is drawn as a whole', async () => {
+  const { tab } = opened;
+  await press(tab);
+  const most = await tab.evaluate(() => {
+    const { view } = globalThis.spherecut!;
+    const inside = view as unknown as { still: unknown };
+    const { still } = inside;
+    const drawn = (): Uint8ClampedArray => {
+      view.drawNow();
+      const copy = document.createElement('canvas');
+      [copy.width, copy.height] = [view.canvas.width, view.canvas.height];
+      const context = copy.getContext('2d')!;
+      context.drawImage(view.canvas, 0, 0);
+      return context.getImageData(0, 0, copy.width, copy.height).data;
+    };
+    view.change();
+    drawn();
+    let quick = drawn();
+    for (let i = 0; i < 3; ++i) {
+      view.moved();
+      quick = drawn();
+    }
+    const { kept } = view;
+    inside.still = null;
+    view.change();
+    const whole = drawn();
+    inside.still = still;
+    view.change();
+    return { kept, difference: quick.reduce((worst, value, i) => Math.max(worst, Math.abs(value - whole[i]!)), 0) };
+  });
+  assert.ok(most.kept, 'the picture without the tool could not be kept');
+  assert.ok(most.difference <= 2, `${most.difference} of 255`);
+  await withdraw(tab);
 });
 
 test('Wheel and pen pressure set the depth while pressing', async () => {
