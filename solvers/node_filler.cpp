@@ -355,9 +355,9 @@ void Filler::fill_interior() {
 
 Sprinkling Filler::finish() {
   if (size() < 4)
-    throw InputError(fmt::format("sprinkle: only {} nodes fit into the body at spacings of {} to {} m; at least 4 are "
-                                 "needed",
-                                 size(), spacing_.fine, spacing_.coarse));
+    throw InputError(
+        fmt::format("sprinkle: of at least 4 nodes only {} would fit into the body at spacings of {} to {} m", size(),
+                    spacing_.fine, spacing_.coarse));
   Sprinkling result;
   result.report = inspect_filling(domain_, options_, nodes_, volume_samples_);
   require_filled(result.report, options_.minimum_density);

@@ -1,5 +1,5 @@
 // The command line. Exit status: 0 done, 1 a check of an experiment failed or a replay differs, 2 unusable input or
-// command line, 3 numerical failure, 130 interrupted.
+// command line, 3 numerical failure, 130 interrupted. A server has no other end than an interrupt: that is 0.
 #include "experiments/experiment.hpp"
 #include "solvers/parallel.hpp"
 #include "src/haptics/run_haptics.hpp"

@@ -1,7 +1,5 @@
 #include "src/output_file.hpp"
 
-#include "topology/errors.hpp"
-
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
@@ -28,14 +26,21 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::write(std::string_view bytes) {
+  const auto whole = static_cast<off_t>(bytes.size());
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR)
       continue;
-    if (written < 0)
+    if (written < 0) {
+      const int reason = errno;
+      if (::ftruncate(descriptor_, size_) == 0) // no part of a row stays
+        ::lseek(descriptor_, size_, SEEK_SET);
+      errno = reason;
       fail("cannot be written");
+    }
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }
+  size_ += whole;
 }
 
 void OutputFile::close() {
@@ -46,7 +51,7 @@ void OutputFile::close() {
 }
 
 void OutputFile::fail(const char* what) const {
-  throw InputError(fmt::format("{}: {}: {}", file_.string(), what, std::strerror(errno)));
+  throw OutputError(fmt::format("{}: {}: {}", file_.string(), what, std::strerror(errno)));
 }
 
 void replace_file(const std::filesystem::path& file, std::string_view bytes) {
@@ -56,13 +61,19 @@ void replace_file(const std::filesystem::path& file, std::string_view bytes) {
     OutputFile out(fresh);
     out.write(bytes);
     out.close();
-  } catch (const InputError&) {
+  } catch (const OutputError&) {
     std::filesystem::remove(fresh, error);
     throw;
   }
   std::filesystem::rename(fresh, file, error);
   if (error)
-    throw InputError(fmt::format("{}: cannot be replaced: {}", file.string(), error.message()));
+    throw OutputError(fmt::format("{}: cannot be replaced: {}", file.string(), error.message()));
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (!std::filesystem::create_directory(folder, error) && error)
+    throw OutputError(fmt::format("{}: cannot be created: {}", folder.string(), error.message()));
 }
 
 void claim_results_folder(const std::filesystem::path& folder) {

@@ -10,6 +10,8 @@
 namespace spherecut::app {
 namespace {
 
+constexpr double closed_opening = 1e-9; // m, as finely as the contact of the lips is solved
+
 std::string short_text(const Session& session) {
   const topology::Domain& domain = *session.organ().domain;
   const Vector3 extent = 1e3 * domain.bounds().extent();
@@ -25,6 +27,9 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     const StepResult& peak = found.peak;
     text += fmt::format("peak force {:.4g} N at t = {:.3g} s, tool {:.3g} mm below the surface at rest\n",
                         peak.force.norm(), peak.time, 1e3 * peak.contact.depth);
+    if (const double along = peak.tangential.norm(); along > 0)
+      text += fmt::format("  {:.4g} N of it press, {:.4g} N act along the surface\n",
+                          (peak.force - peak.tangential).norm(), along);
     text += fmt::format("  on the tool [{:.4g}, {:.4g}, {:.4g}] N; contact radius {:.3g} mm, {} nodes in contact\n",
                         peak.force.x(), peak.force.y(), peak.force.z(), 1e3 * peak.contact_radius, peak.active_nodes);
     text += fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
@@ -35,11 +40,14 @@ std::string findings_text(const Session& session, const RunOutput& output, const
   }
   if (session.cuts()) {
     const CutReport& cut = found.cut;
-    text +=
-        fmt::format("cut of {:.4g} cm2 with a front of {:.3g} cm in {} increments; opens by up to {:.3g} mm, {:.3g} "
-                    "ml between its faces\n",
-                    1e4 * cut.area, 1e2 * cut.front_length, found.increments, 1e3 * found.largest_opening,
-                    1e6 * cut.opening_volume);
+    if (session.scenario().blade && found.increments == 0)
+      text += fmt::format("the blade has cut nothing in all {} steps\n", found.steps);
+    text += fmt::format("cut of {:.4g} cm2 with a front of {:.3g} cm in {} increment{}; {}\n", 1e4 * cut.area,
+                        1e2 * cut.front_length, found.increments, found.increments == 1 ? "" : "s",
+                        found.largest_opening <= closed_opening
+                            ? "it stays closed"
+                            : fmt::format("opens by up to {:.3g} mm, {:.3g} ml between its faces",
+                                          1e3 * found.largest_opening, 1e6 * cut.opening_volume));
     text += fmt::format("  {} piece{}:", cut.pieces, cut.pieces == 1 ? "" : "s");
     for (const double volume : cut.volumes)
       text += fmt::format(" {:.4g} ml", 1e6 * volume);
@@ -71,7 +79,9 @@ std::string step_text(const StepResult& step) {
   if (step.candidates > 0 || !step.cut)
     text += fmt::format(", force {:.4g} N", step.force.norm());
   if (step.cut)
-    text += fmt::format(", cut {:.3g} cm2, open {:.2g} mm", 1e4 * step.cut->area, 1e3 * step.cut->opening);
+    text += fmt::format(", cut {:.3g} cm2, {}", 1e4 * step.cut->area,
+                        step.cut->opening <= closed_opening ? "closed"
+                                                            : fmt::format("open {:.2g} mm", 1e3 * step.cut->opening));
   if (step.cut && step.cut->blade.edge_force > 0)
     text += fmt::format(", blade {:.2g} N", step.cut->blade.force.norm());
   return text;
@@ -129,9 +139,13 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
   } catch (const std::exception& error) {
     try {
       output.write_summary(session, RunStatus::failed, error.what());
-    } catch (const InputError&) { // the first error says why nothing can be written
+    } catch (const OutputError&) { // the first error says why nothing can be written
       say("summary.json could not be written either");
     }
+    if (dynamic_cast<const OutputError*>(&error) != nullptr)
+      throw OutputError(fmt::format("{}\nthe run has ended there; kept in {}: {}. Make room, or write less "
+                                    "(output.vtp_every, output.figures), and run again into another folder",
+                                    error.what(), out.string(), output.kept()));
     throw;
   }
   say((end == RunEnd::interrupted ? "interrupted; " : "") + findings_text(session, output, out));
@@ -146,7 +160,8 @@ void check_scenario(const std::filesystem::path& file, std::FILE* screen) {
   if (session.touches() || session.cuts())
     say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
-  say(fmt::format("{}: good, {} steps", file.string(), session.steps().size()));
+  say(fmt::format("{}: good, {} step{}", file.string(), session.steps().size(),
+                  session.steps().size() == 1 ? "" : "s"));
 }
 
 } // namespace spherecut::app

@@ -4,6 +4,7 @@
 #include "src/tear_output.hpp"
 #include "topology/errors.hpp"
 #include "topology/piece_audit.hpp"
+#include "topology/tool_outline.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,15 +16,19 @@ namespace {
 constexpr std::string_view force_columns =
     "time_s,tool_x_m,tool_y_m,tool_z_m,axis_x,axis_y,axis_z,force_x_N,force_y_N,force_z_N,force_N,contact_x_m,"
     "contact_y_m,contact_z_m,depth_m,contact_radius_m,active_nodes,candidate_nodes,nodes,iterations,converged,residual,"
-    "penetration_m,rotation_deg,resprinkled,force_jump,seconds\n";
+    "penetration_m,rotation_deg,resprinkled,force_jump,seconds,normal_x_N,normal_y_N,normal_z_N,normal_N,"
+    "tangential_x_N,tangential_y_N,tangential_z_N,tangential_N\n";
 
 std::string force_row(const StepResult& s) {
   const auto vector = [](const Vector3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z()); };
-  return fmt::format("{:.9g},{},{},{},{:.9g},{},{:.9g},{:.9g},{},{},{},{},{},{:.3e},{:.3e},{:.4g},{},{:.4g},{:.4g}\n",
+  const Vector3 normal = s.force - s.tangential;
+  return fmt::format("{:.9g},{},{},{},{:.9g},{},{:.9g},{:.9g},{},{},{},{},{},{:.3e},{:.3e},{:.4g},{},{:.4g},{:.4g},"
+                     "{},{:.9g},{},{:.9g}\n",
                      s.time, vector(s.pose.point), vector(s.pose.axis), vector(s.force), s.force.norm(),
                      vector(s.contact.point), s.contact.depth, s.contact_radius, s.active_nodes, s.candidates, s.nodes,
                      s.iterations, s.converged ? 1 : 0, s.residual, s.largest_penetration, s.rotation_degrees,
-                     s.resprinkled ? 1 : 0, s.force_jump, s.seconds);
+                     s.resprinkled ? 1 : 0, s.force_jump, s.seconds, vector(normal), normal.norm(),
+                     vector(s.tangential), s.tangential.norm());
 }
 
 struct SampledField {
@@ -59,18 +64,6 @@ void write_organ(const std::filesystem::path& file, const Session& session) {
             {vector_data("displacement [m]", skin.displacement), scalar_data("von Mises stress [Pa]", skin.von_mises)});
 }
 
-// Height of the underside of the tool above the tangent plane at `origin`, mm, along one vertical; NaN beside the tool.
-double underside(const Session& session, const topology::ToolPose& pose, const Vector3& foot, const Vector3& up,
-                 double reach) {
-  constexpr int samples = 400;
-  for (int i = 0; i <= samples; ++i) {
-    const double height = reach * (2.0 * i / samples - 1);
-    if (topology::tool_distance(session.scenario().tool->shape, pose, foot + height * up) <= 0)
-      return 1e3 * height;
-  }
-  return std::nan("");
-}
-
 Figure force_figure(const Session& session, const std::vector<StepResult>& history) {
   Figure force;
   force.title = session.scenario().title.empty() ? "Force on the tool" : session.scenario().title;
@@ -96,6 +89,7 @@ RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : fol
     file.emplace(folder_ / name);
     file->write(columns);
     files_.push_back(name);
+    rows_[name] = 0;
   };
   if (session.scenario().tool)
     open(forces_, "forces.csv", force_columns);
@@ -105,11 +99,16 @@ RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : fol
     open(tears_, "tears.csv", tear_columns());
 }
 
+void RunOutput::add_row(OutputFile& file, const std::string& name, const std::string& row) {
+  file.write(row);
+  ++rows_[name];
+}
+
 void RunOutput::add(const Session& session, const StepResult& step) {
   if (forces_)
-    forces_->write(force_row(step));
+    add_row(*forces_, "forces.csv", force_row(step));
   if (step.cut) {
-    cuts_->write(cut_row(step.time, *step.cut));
+    add_row(*cuts_, "cuts.csv", cut_row(step.time, *step.cut));
     const int before = findings_.steps == 0 ? 1 : findings_.cut.pieces;
     if (step.cut->pieces != before)
       check_pieces(session, step.time);
@@ -119,7 +118,7 @@ void RunOutput::add(const Session& session, const StepResult& step) {
     findings_.refused_cuts += step.cut->refused ? 1 : 0;
   }
   if (step.tear) {
-    tears_->write(tear_rows(*step.tear));
+    add_row(*tears_, "tears.csv", tear_rows(*step.tear));
     findings_.tear = *step.tear;
     findings_.tear_increments += static_cast<int>(step.tear->increments.size()) - 1;
     findings_.torn_unstably = findings_.torn_unstably || step.tear->unstable;
@@ -143,42 +142,55 @@ void RunOutput::add(const Session& session, const StepResult& step) {
   history_.push_back(step);
 }
 
+// A frame that cannot be written in full leaves nothing: the series has whole frames alone, and the disk its room back.
 void RunOutput::add_frame(const Session& session, const StepResult& step) {
-  if (series_.empty()) {
-    std::filesystem::create_directory(folder_ / "frames");
-    files_.insert(files_.end(), {"series.pvd", "frames"});
+  if (series_.empty())
+    make_folder(folder_ / "frames");
+  const std::size_t known = series_.size();
+  try {
+    write_frame(session, step);
+    write_pvd(folder_ / "series.pvd", series_);
+  } catch (const OutputError&) {
+    std::error_code ignored;
+    for (std::size_t i = known; i < series_.size(); ++i)
+      std::filesystem::remove(folder_ / series_[i].file, ignored);
+    series_.resize(known);
+    if (known == 0)
+      std::filesystem::remove(folder_ / "frames", ignored);
+    throw;
   }
-  const auto name = [&](std::string_view what) { return fmt::format("frames/{}_{:05}.vtp", what, findings_.steps); };
+  if (frames_++ == 0)
+    files_.insert(files_.end(), {"series.pvd", "frames"});
+}
 
+void RunOutput::write_frame(const Session& session, const StepResult& step) {
+  const auto next = [&](int part, std::string_view what) {
+    series_.push_back({step.time, part, fmt::format("frames/{}_{:05}.vtp", what, findings_.steps)});
+    return folder_ / series_.back().file;
+  };
   if (session.cuts())
-    write_wound(folder_ / name("surface"), session);
+    write_wound(next(0, "surface"), session);
   else
-    write_organ(folder_ / name("surface"), session);
-  series_.push_back({step.time, 0, name("surface")});
+    write_organ(next(0, "surface"), session);
 
   const solvers::NodeCloud& nodes = session.sprinkling().nodes;
   if (nodes.size() > 0) {
     std::vector<solvers::PointState> node_states = session.node_states();
     node_states.resize(nodes.positions.size()); // at rest before the first contact
     const SampledField inside = sample(node_states);
-    write_vtp(folder_ / name("nodes"), moved(nodes.positions, inside.displacement), {},
+    write_vtp(next(1, "nodes"), moved(nodes.positions, inside.displacement), {},
               {vector_data("displacement [m]", inside.displacement),
                scalar_data("von Mises stress [Pa]", inside.von_mises), scalar_data("spacing [m]", nodes.spacings),
                vector_data("normal", nodes.normals)});
-    series_.push_back({step.time, 1, name("nodes")});
   }
 
   if (session.scenario().tool) {
     const topology::ToolShape& tool = session.scenario().tool->shape;
     const topology::SurfaceMesh mesh = topology::tool_mesh(tool, step.pose, topology::tip_radius(tool) / 6);
-    write_vtp(folder_ / name("tool"), mesh.vertices, mesh.triangles, {});
-    series_.push_back({step.time, 2, name("tool")});
+    write_vtp(next(2, "tool"), mesh.vertices, mesh.triangles, {});
   }
-  if (session.incision() != nullptr) {
-    write_incision(folder_ / name("incision"), *session.incision());
-    series_.push_back({step.time, 3, name("incision")});
-  }
-  write_pvd(folder_ / "series.pvd", series_);
+  if (session.incision() != nullptr)
+    write_incision(next(3, "incision"), *session.incision());
 }
 
 // The surface at rest, deformed, and the tool in the plane through the contact that holds its normal and the axis
@@ -203,8 +215,11 @@ void RunOutput::keep_profile(const Session& session, const StepResult& step) {
     rest.y.push_back(1e3 * up.dot(x - origin));
     deformed.x.push_back(1e3 * along.dot(y - origin));
     deformed.y.push_back(1e3 * up.dot(y - origin));
-    tool.x.push_back(1e3 * s);
-    tool.y.push_back(underside(session, step.pose, origin + s * along, up, reach));
+  }
+  for (const auto& [x, y] :
+       topology::tool_outline(session.scenario().tool->shape, step.pose, origin, along, up, reach)) {
+    tool.x.push_back(1e3 * x);
+    tool.y.push_back(1e3 * y);
   }
   profile_ = Figure{};
   profile_.title = fmt::format("Profile through the contact at t = {:.4g} s", step.time);
@@ -277,7 +292,27 @@ void RunOutput::draw(const Figure& figure, const std::string& name) {
 
 void RunOutput::write_summary(const Session& session, RunStatus status, const std::string& message) {
   files_.emplace_back("summary.json");
-  replace_file(folder_ / "summary.json", summary_json(session, *this, status, message));
+  try {
+    replace_file(folder_ / "summary.json", summary_json(session, *this, status, message));
+  } catch (const OutputError&) {
+    files_.pop_back();
+    throw;
+  }
+}
+
+std::string RunOutput::kept() const {
+  std::string text;
+  for (const std::string& file : files_) {
+    if (file == "frames")
+      continue;
+    text += text.empty() ? "" : ", ";
+    text += file;
+    if (file.ends_with(".csv"))
+      text += fmt::format(" with {} step{}", rows_.at(file), rows_.at(file) == 1 ? "" : "s");
+    else if (file == "series.pvd")
+      text += fmt::format(" with {} frame{}", frames_, frames_ == 1 ? "" : "s");
+  }
+  return text;
 }
 
 } // namespace spherecut::app

@@ -8,6 +8,8 @@
 #include "src/vtp.hpp"
 #include "topology/level_set.hpp"
 
+#include <map>
+
 namespace spherecut::app {
 
 enum class RunStatus { complete, interrupted, failed };
@@ -42,7 +44,7 @@ struct RunFindings {
 class RunOutput {
  public:
   /// Opens forces.csv, cuts.csv when the scenario cuts, and tears.csv when it tears, in a folder of
-  /// claim_results_folder(). Throws InputError when a file cannot be written; so do the others.
+  /// claim_results_folder(). Throws OutputError when a file cannot be written; so do the others.
   RunOutput(std::filesystem::path folder, const Session& session);
 
   /// Adds the row, and the frame when one is due, of the step that the session has just done.
@@ -57,13 +59,18 @@ class RunOutput {
 
   void write_summary(const Session& session, RunStatus status, const std::string& message);
 
+  /// What is on the disk by now, in words: files, and how many steps and frames they hold.
+  [[nodiscard]] std::string kept() const;
+
   [[nodiscard]] const RunFindings& findings() const { return findings_; }
   [[nodiscard]] const std::vector<std::string>& files() const { return files_; }
   [[nodiscard]] const std::vector<std::string>& remarks() const { return remarks_; }
 
  private:
   [[nodiscard]] bool pieces_checked(double time) const;
+  void add_row(OutputFile& file, const std::string& name, const std::string& row);
   void add_frame(const Session& session, const StepResult& step);
+  void write_frame(const Session& session, const StepResult& step);
   void draw(const Figure& figure, const std::string& name);
   void keep_profile(const Session& session, const StepResult& step);
 
@@ -72,6 +79,8 @@ class RunOutput {
   RunFindings findings_;
   std::unique_ptr<topology::LevelSet> level_set_; // of the organ, from the first check of pieces on
   std::vector<SeriesEntry> series_;
+  std::size_t frames_ = 0;                  // in the series
+  std::map<std::string, std::size_t> rows_; // steps in each table
   std::vector<StepResult> history_;
   Figure profile_;
   std::vector<std::string> files_;

@@ -96,7 +96,8 @@ topology::ToolShape tool_shape(const Section& section, Offences& offences) {
 std::vector<PathPoint> tool_path(const Section& tool, Offences& offences) {
   std::vector<PathPoint> path;
   for (const Section& section : tool.tables("path")) {
-    const PathPoint point{section.number("time"), section.vector("position")};
+    const PathPoint point{section.number("time"), section.vector("position"),
+                          static_cast<int>(section.line("position"))};
     if (!path.empty() && point.time <= path.back().time)
       offences.add(section.line("time"), fmt::format("tool.path[{}].time = {:g} s: not after the pose before it; "
                                                      "allowed: above {:g} s",
@@ -115,6 +116,7 @@ Approach approach(const Section& section, const ToolSettings& tool, Offences& of
   approach.depth = section.number("depth");
   approach.clearance = section.number("clearance");
   approach.duration = section.number("duration");
+  approach.line = static_cast<int>(section.line());
   Vector3 axis = tool.axis;
   if (const auto* laparoscope = std::get_if<topology::Laparoscope>(&tool.shape))
     axis = laparoscope->port - approach.target;

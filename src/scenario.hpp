@@ -71,12 +71,14 @@ struct Approach {
   Vector3 target, direction;       // m; unit vector
   double depth = 0, clearance = 0; // m after and before the first touch
   double duration = 0;             // s
+  int line = 0;                    // of the scenario file
 };
 
 /// Where the tool's reference point is at a time.
 struct PathPoint {
   double time = 0; // s
   Vector3 position = Vector3::Zero();
+  int line = 0; // of the scenario file, of its position
 };
 
 /// A tool that takes hold of the surface within its radius; it touches nothing before and after.

@@ -79,6 +79,18 @@ topology::ToolPose tool_pose(const ToolSettings& tool, const std::vector<ToolSam
   return topology::pose_at(tool.shape, before.pose.point + t * (after->pose.point - before.pose.point), tool.axis);
 }
 
+/// Places along the edge, in the blade's frame, no farther than `apart` from one another.
+std::vector<Vector3> edge_places(const BladeSettings& blade, double apart) {
+  std::vector<Vector3> places{blade.edge.front()};
+  for (std::size_t i = 1; i < blade.edge.size(); ++i) {
+    const Vector3 along = blade.edge[i] - blade.edge[i - 1];
+    const int parts = std::max(1, static_cast<int>(std::ceil(along.norm() / apart)));
+    for (int k = 1; k <= parts; ++k)
+      places.emplace_back(blade.edge[i - 1] + (static_cast<double>(k) / parts) * along);
+  }
+  return places;
+}
+
 } // namespace
 
 std::optional<topology::BladePose> blade_pose(const BladeSettings& blade, double time) {
@@ -130,15 +142,40 @@ std::vector<StepSample> schedule(const Scenario& scenario, const std::vector<Too
   return steps;
 }
 
+BladeWay blade_way(const BladeSettings& blade, const topology::Domain& domain, double apart) {
+  const std::vector<Vector3> columns = edge_places(blade, apart);
+  struct Place {
+    Vector3 point;
+    double distance; // m, signed
+  };
+  const auto nearest_at = [&](double time) {
+    const topology::BladePose pose = *blade_pose(blade, time);
+    Place nearest{Vector3::Zero(), std::numeric_limits<double>::infinity()};
+    for (const Vector3& column : columns) {
+      const Vector3 x = placed(pose, column);
+      if (const double distance = domain.signed_distance(x); distance < nearest.distance)
+        nearest = {x, distance};
+    }
+    return nearest;
+  };
+  Place place = nearest_at(blade.path.front().time);
+  BladeWay way{std::max(0.0, -place.distance), place.point, std::max(0.0, place.distance)};
+  for (std::size_t i = 1; i < blade.path.size(); ++i) {
+    const BladePoint& a = blade.path[i - 1];
+    const BladePoint& b = blade.path[i];
+    const double length = std::max(apart, largest_way(blade, a, b));
+    for (double gone = 0; gone < length && way.nearest > 0;) {
+      gone = std::min(length, gone + std::max(apart, 0.25 * place.distance)); // far from the body it goes on faster
+      place = nearest_at(a.time + (b.time - a.time) * gone / length);
+      way.nearest = std::min(way.nearest, std::max(0.0, place.distance));
+    }
+  }
+  return way;
+}
+
 std::vector<std::array<Vector3, 2>> blade_tracks(const BladeSettings& blade, const topology::Domain& domain,
                                                  double apart) {
-  std::vector<Vector3> columns{blade.edge.front()};
-  for (std::size_t i = 1; i < blade.edge.size(); ++i) {
-    const Vector3 along = blade.edge[i] - blade.edge[i - 1];
-    const int parts = std::max(1, static_cast<int>(std::ceil(along.norm() / apart)));
-    for (int k = 1; k <= parts; ++k)
-      columns.emplace_back(blade.edge[i - 1] + (static_cast<double>(k) / parts) * along);
-  }
+  const std::vector<Vector3> columns = edge_places(blade, apart);
   std::vector<std::array<Vector3, 2>> tracks;
   for (std::size_t i = 1; i < blade.path.size(); ++i) {
     const BladePoint& a = blade.path[i - 1];

@@ -32,4 +32,13 @@ std::vector<StepSample> schedule(const Scenario& scenario, const std::vector<Too
 std::vector<std::array<Vector3, 2>> blade_tracks(const BladeSettings& blade, const topology::Domain& domain,
                                                  double apart);
 
+/// How the edge of a blade meets the body at rest, looked at every `apart` m along edge and way, less often far from
+/// it.
+struct BladeWay {
+  double start_depth = 0;                // m, of the deepest place of the edge at the start; 0: it starts outside
+  Vector3 start_place = Vector3::Zero(); // m, where that is
+  double nearest = 0;                    // m, least distance on the way; 0: it meets the body
+};
+BladeWay blade_way(const BladeSettings& blade, const topology::Domain& domain, double apart);
+
 } // namespace spherecut::app

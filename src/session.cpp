@@ -1,5 +1,6 @@
 #include "src/session.hpp"
 
+#include "solvers/tangential_force.hpp"
 #include "src/process_settings.hpp"
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
@@ -29,6 +30,19 @@ Organ timed_organ(const OrganSettings& settings, double& seconds) {
   return make_organ(settings);
 }
 
+// With the place in the file where the motion begins.
+std::vector<ToolSample> tool_motion_of(const Scenario& scenario, const topology::ContactQuery& query,
+                                       const topology::Domain& domain) {
+  try {
+    return tool_motion(*scenario.tool, query, domain);
+  } catch (const InputError& error) {
+    const auto* approach = std::get_if<Approach>(&scenario.tool->motion);
+    const int line =
+        approach != nullptr ? approach->line : std::get<std::vector<PathPoint>>(scenario.tool->motion).front().line;
+    throw InputError(fmt::format("{}:{}: {}", scenario.file.string(), line, error.what()));
+  }
+}
+
 } // namespace
 
 Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
@@ -40,7 +54,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
   zone_ = fine_zone(scenario_, *organ_.domain);
   std::vector<ToolSample> motion;
   if (scenario_.tool) {
-    motion = tool_motion(*scenario_.tool, query_, *organ_.domain);
+    motion = tool_motion_of(scenario_, query_, *organ_.domain);
     touch_ = scenario_.tool->grasp ? find_grasp(motion) : first_touch(*scenario_.tool, motion, query_);
   }
   steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
@@ -55,6 +69,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     incisions_->update_fields();
     check_pieces(steps_.front().time);
   }
+  watch_blade_way();
   make_blade_force();
   toughness_ = toughness_field(scenario_.toughness, scenario_.layers);
   if (!touch_ && !cuts())
@@ -62,7 +77,15 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
   if (touch_)
     zone_contact_ = first_zone_ = centre_of(touch_->contact, touch_->pose);
   lay_out_zone();
-  sprinkle(nullptr, model_);
+  try {
+    sprinkle(nullptr, model_);
+  } catch (const InputError& error) { // what was odd about the organ may be why
+    std::string all =
+        fmt::format("{}: [nodes] fine_spacing and coarse_spacing: {}", scenario_.file.string(), error.what());
+    for (const std::string& remark : organ_.remarks)
+      all += "\n" + remark;
+    throw InputError(all);
+  }
   static_cast<void>(fixed_nodes(scenario_, *organ_.domain, model_.sprinkling.nodes));
 }
 
@@ -360,6 +383,8 @@ void Session::evaluate(StepResult& result) {
   const StageTimer timer(profile_.evaluate);
   const solvers::ContactState& tool = model_.state->tool;
   result.force = tool.tool_force;
+  result.tangential = solvers::tangential_force(
+      model_.patch, tool, grasps() ? solvers::ContactCondition::bonded : scenario_.contact.condition);
   result.contact_radius = tool.contact_radius;
   result.active_nodes = tool.active_nodes;
   result.candidates = static_cast<int>(model_.patch.nodes.size());

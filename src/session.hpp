@@ -22,9 +22,10 @@ namespace spherecut::app {
 struct StepResult {
   double time = 0; // s
   topology::ToolPose pose;
-  Vector3 force = Vector3::Zero();  // N, of the organ on the tool
-  topology::SurfaceContact contact; // deepest point on the surface at rest
-  double contact_radius = 0;        // m
+  Vector3 force = Vector3::Zero();      // N, of the organ on the tool
+  Vector3 tangential = Vector3::Zero(); // N, the part of it along the surface (solvers::tangential_force)
+  topology::SurfaceContact contact;     // deepest point on the surface at rest
+  double contact_radius = 0;            // m
   int active_nodes = 0, candidates = 0, nodes = 0;
   int iterations = 0;
   bool converged = true;
@@ -139,6 +140,7 @@ class Session {
 
  private:
   void lay_out_zone();
+  void watch_blade_way();
   [[nodiscard]] std::vector<std::array<Vector3, 2>> fine_segments(const topology::Incision& incision) const;
   void make_precuts();
   [[nodiscard]] topology::SurfaceContact find_contact(const topology::ToolPose& pose) const;

@@ -23,6 +23,25 @@ void Session::make_blade_force() {
                      2 * blade_force_->half_width()));
 }
 
+// A blade that cuts nothing, or less than it looks, is told beforehand.
+void Session::watch_blade_way() {
+  if (!scenario_.blade)
+    return;
+  const std::string place = fmt::format("{}:{}: ", scenario_.file.string(), scenario_.blade->line);
+  const BladeWay way = blade_way(*scenario_.blade, *organ_.domain, zone_.spacing.fine);
+  if (way.nearest > 0)
+    warn("blade", place + fmt::format("the blade never meets the organ at rest: its edge comes no nearer than {:.3g} "
+                                      "mm; blade.path and blade.edge say where it goes",
+                                      1e3 * way.nearest));
+  const bool in_precut = model_.incision != nullptr && model_.incision->near(way.start_place, zone_.spacing.fine);
+  if (way.start_depth > 1e-6 && !in_precut)
+    warn("blade",
+         place + fmt::format("the blade starts inside the organ, {:.3g} mm deep at [{:.4g}, {:.4g}, {:.4g}] m: "
+                             "it cuts what it sweeps from there on, the way in is left uncut; start "
+                             "blade.path outside to cut that too",
+                             1e3 * way.start_depth, way.start_place.x(), way.start_place.y(), way.start_place.z()));
+}
+
 bool Session::blade_enters(const StepSample& sample) const {
   return blade_force_ != nullptr && sample.blade && blade_force_->inside(*sample.blade, model_);
 }

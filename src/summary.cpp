@@ -59,6 +59,8 @@ Json nodes(const Session& session) {
 Json peak(const StepResult& step) {
   return {{"newtons", step.force.norm()},
           {"vector_N", json(step.force)},
+          {"normal_N", json(step.force - step.tangential)},
+          {"tangential_N", json(step.tangential)},
           {"time_s", step.time},
           {"contact_m", json(step.contact.point)},
           {"depth_m", step.contact.depth},

@@ -83,10 +83,13 @@ std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::Co
   const topology::ToolPose& pose = motion.front().pose;
   const auto contact = organ.first_touch(tool.shape, pose);
   if (contact.depth > touch_tolerance || domain.signed_distance(pose.point) < -touch_tolerance)
-    throw InputError(fmt::format("the tool starts inside the organ: at t = {:g} s its tip is at {}, {:.3g} mm deep; "
-                                 "allowed: a start outside",
-                                 motion.front().time, text_of(pose.point),
-                                 1e3 * std::max(contact.depth, -domain.signed_distance(pose.point))));
+    throw InputError(fmt::format("{}: the tool starts inside the organ, {:.3g} mm deep at t = {:g} s; allowed: a start "
+                                 "outside",
+                                 std::holds_alternative<Approach>(tool.motion)
+                                     ? fmt::format("tool.approach: its start at {}", text_of(pose.point))
+                                     : fmt::format("tool.path[1].position = {}", text_of(pose.point)),
+                                 1e3 * std::max(contact.depth, -domain.signed_distance(pose.point)),
+                                 motion.front().time));
   return motion;
 }
 

@@ -13,7 +13,7 @@ struct ToolSample {
 
 /// Poses from the start to the end of the motion, every ToolSettings::step seconds (0: 20 steps) and at the end. An
 /// approach is placed by its first touch of the surface at rest; when its line misses the organ it runs past the target
-/// instead. Throws InputError when the tool touches or is inside the organ at the start.
+/// instead. Throws InputError, with the key, when the tool touches or is inside the organ at the start.
 std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::ContactQuery& organ,
                                     const topology::Domain& domain);
 

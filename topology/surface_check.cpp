@@ -331,7 +331,12 @@ class Checker {
         refuse(fmt::format("a small hole at {} cannot be filled without leaving the surface's own edges crossed",
                            vertex(loops.front().front())));
     });
-    result_.mended.push_back(fmt::format("filled {} small holes", loops.size()));
+    std::vector<std::string> places;
+    places.reserve(loops.size());
+    for (const std::vector<int>& loop : loops)
+      places.push_back(fmt::format("of {} edges at {}", loop.size(), vertex(loop[0])));
+    result_.mended.push_back(
+        fmt::format("filled {} small hole{}: {}", loops.size(), loops.size() == 1 ? "" : "s", listed(places)));
   }
 
   void mend_slivers() {

@@ -188,7 +188,7 @@ void check_text_stl(const std::string& text, const std::string& name) {
       open = false;
     else if (words.front() != "facet" && words.front() != "outer" && words.front() != "endloop" &&
              words.front() != "endfacet")
-      lines.fail("'{}' is no STL keyword", shown(words.front()));
+      lines.fail("'{}' is no STL keyword; is the file cut short?", shown(words.front()));
   }
   if (open)
     lines.fail("the file is cut short: 'endsolid' is missing");

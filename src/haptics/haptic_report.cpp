@@ -223,6 +223,8 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
   write_deadlines(folder / "haptic_deadlines.csv", records.ticks);
   const HapticFindings& f = findings;
   nlohmann::json json{
+      {"ticks", records.ticks.size()},
+      {"interrupted", f.loop.stopped},
       {"ticks_per_second", f.rate},
       {"overruns", f.loop.overruns},
       {"unrecorded", f.loop.lost},

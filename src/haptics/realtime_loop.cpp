@@ -204,6 +204,10 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
   ViewerFeed own(settings.viewer_rate);
   ViewerFeed& feed = options.feed != nullptr ? *options.feed : own;
   report.prepare_seconds = 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - before);
+  if (options.stop()) {
+    report.stopped = true;
+    return records;
+  }
 
   const long long start = clock_now(CLOCK_MONOTONIC);
   const auto ticks = count < 1e18 ? static_cast<std::uint64_t>(count) : ~std::uint64_t{0};

@@ -110,6 +110,11 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
     records = run_realtime(settings, simulation, *device, command.duration, options, report);
   }
   recorder.finish(report.lost);
+  if (records.ticks.empty() && report.stopped) {
+    write_haptics(command.out, records, findings_of(settings, records, report), {});
+    say(fmt::format("interrupted while preparing: nothing was run. {} has files without rows", command.out.string()));
+    return RunEnd::interrupted;
+  }
   HapticFindings findings = findings_of(settings, records, report);
   if (bridge != nullptr)
     findings.bridge = bridge->counters();

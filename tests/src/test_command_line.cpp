@@ -7,6 +7,8 @@
 #include "topology/surface_io.hpp"
 
 #include <catch2/catch.hpp>
+#include <fmt/format.h>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -110,9 +112,14 @@ TEST_CASE("A run leaves rows, frames, series, figures and a summary that agree")
     CHECK(std::count(row.begin(), row.end(), ',') == columns);
     std::istringstream cells(row);
     std::string cell;
-    for (int k = 0; k <= 10; ++k)
-      std::getline(cells, cell, ',');
-    peak = std::max(peak, std::stod(cell));
+    std::vector<double> values;
+    while (std::getline(cells, cell, ','))
+      values.push_back(std::stod(cell));
+    peak = std::max(peak, values.at(10));
+    const auto vector = [&](std::size_t at) { return Vector3(values.at(at), values.at(at + 1), values.at(at + 2)); };
+    CHECK((vector(27) + vector(31) - vector(7)).norm() <= 1e-8 * values[10]); // normal, tangential, force
+    CHECK(values.at(30) == Approx(vector(27).norm()).epsilon(1e-8));
+    CHECK(values.at(34) == 0); // without friction
   }
   CHECK(count == 5);
 
@@ -122,6 +129,8 @@ TEST_CASE("A run leaves rows, frames, series, figures and a summary that agree")
   CHECK(summary["touched"] == true);
   CHECK(summary["steps"]["done"] == 5);
   CHECK(summary["peak_force"]["newtons"].get<double>() == Approx(peak).epsilon(1e-6));
+  CHECK(summary["peak_force"]["normal_N"] == summary["peak_force"]["vector_N"]);
+  CHECK(summary["peak_force"]["tangential_N"] == nlohmann::json({0.0, 0.0, 0.0}));
   CHECK(summary["solver"]["condition_estimate"].get<double>() > 1);
   CHECK(summary["inputs"]["scenario_text"].get<std::string>() == read_file(scenario));
 
@@ -280,7 +289,8 @@ TEST_CASE("Bad scenarios and surface files exit with 2, a clear line, and leave 
   const ProgramResult sized =
       says(replaced(with_file("millimetres.obj"), "lower = [-1, -1, -0.001]\nupper = [1, 1, 0.001]",
                     "lower = [-100, -100, -1]\nupper = [100, 100, 1]"));
-  CHECK_THAT(sized.out, Contains("warning") && Contains("in millimetres?"));
+  CHECK_THAT(sized.out,
+             Contains("warning") && Contains("60 m across") && Contains("in millimetres? use scale = 0.001"));
   const ProgramResult scaled = says(replaced(with_file("millimetres.obj"), "file = \"millimetres.obj\"\n",
                                              "file = \"millimetres.obj\"\nscale = 0.001\n"));
   INFO(scaled.err);
@@ -313,8 +323,8 @@ TEST_CASE("Scenarios that cannot be run exit with 2, a line that says why, and l
       {"too few nodes",
        replaced(replaced(small_scenario, "fine_spacing = 0.004", "fine_spacing = 0.5"), "coarse_spacing = 0.012",
                 "coarse_spacing = 0.5"),
-       "nodes"},
-      {"inside the organ", inside, "starts inside"},
+       "case.toml: [nodes] fine_spacing and coarse_spacing: sprinkle: of at least 4 nodes only 1 would fit"},
+      {"inside the organ", inside, "case.toml:24: tool.path[1].position = [0, 0, 0.02] m: the tool starts inside"},
       {"incompressible", replaced(small_scenario, "poisson_ratio = 0.3", "poisson_ratio = 0.5"), "poisson_ratio"},
       {"without stiffness", replaced(small_scenario, "young_modulus = 1e4", "young_modulus = -1"), "young_modulus"},
       {"not a scenario", "[organ\n", "case.toml"},
@@ -375,7 +385,13 @@ TEST_CASE("A run that may write no more exits with 2 and keeps the rows it had")
   CHECK(result.status == 2);
   CHECK_THAT(result.err, Contains("cannot be written"));
   CHECK(lines_in(read_file(out / "forces.csv")) >= 2);
+  CHECK_THAT(result.err, Contains("kept in " + out.string() + ": forces.csv with "));
   CHECK_FALSE(std::filesystem::exists(out / "series.pvd"));
+  CHECK_FALSE(std::filesystem::exists(out / "frames"));
+  const auto summary = nlohmann::json::parse(read_file(out / "summary.json")); // small enough, and says what happened
+  CHECK(summary["status"] == "failed");
+  CHECK_THAT(summary["message"].get<std::string>(), Contains("cannot be written"));
+  CHECK(summary["files"] == nlohmann::json({"forces.csv", "summary.json"}));
 }
 
 TEST_CASE("A full disk exits with 2 and keeps the rows it had") {
@@ -383,15 +399,32 @@ TEST_CASE("A full disk exits with 2 and keeps the rows it had") {
   const auto scenario = write_file(folder.path() / "case.toml", small_scenario);
   const auto disk = folder.path() / "disk";
   std::filesystem::create_directory(disk);
-  if (run_shell("mount -t tmpfs -o size=128k tmpfs '" + disk.string() + "'").status != 0)
+  if (run_shell("mount -t tmpfs -o size=320k tmpfs '" + disk.string() + "'").status != 0)
     return; // only root may mount; the limit on file sizes above covers the same path
   const ProgramResult result = run_spherecut({"run", scenario, "--out", disk / "out"});
-  const std::string rows = read_file(disk / "out" / "forces.csv");
+  const std::string rows = read_file(disk / "out/forces.csv"), series = read_file(disk / "out/series.pvd");
+  std::map<std::string, std::string> frames;
+  for (const auto& entry : std::filesystem::directory_iterator(disk / "out/frames"))
+    frames[entry.path().filename().string()] = read_file(entry.path());
   run_shell("umount '" + disk.string() + "'");
   INFO(result.err);
   CHECK(result.status == 2);
-  CHECK_THAT(result.err, Contains("No space left"));
+  CHECK_THAT(result.err, StartsWith("spherecut: error: " + (disk / "out/frames/").string()) &&
+                             Contains("cannot be written: No space left on device") &&
+                             Contains("kept in " + (disk / "out").string() + ": forces.csv with ") &&
+                             Contains("Make room"));
   CHECK(lines_in(rows) >= 2);
+  CHECK(rows.back() == '\n');
+  CHECK(std::count(rows.begin(), rows.end(), ',') % static_cast<long>(lines_in(rows)) == 0); // whole rows
+  CHECK_THAT(result.err, Contains(fmt::format("series.pvd with {} frame", frames.size() / 3)));
+  CHECK(frames.size() % 3 == 0);
+  std::size_t named = 0;
+  for (const auto& [name, text] : frames) {
+    CHECK_THAT(series, Contains("file=\"frames/" + name + "\""));
+    CHECK_THAT(text, Catch::EndsWith("</VTKFile>\n"));
+    ++named;
+  }
+  CHECK(static_cast<std::size_t>(std::count(series.begin(), series.end(), '\n')) == named + 5);
 }
 
 TEST_CASE("An interrupted run keeps its rows, says so in the summary and exits with 130") {
@@ -414,6 +447,52 @@ TEST_CASE("An interrupted run keeps its rows, says so in the summary and exits w
     CHECK(lines_in(read_file(out / "forces.csv")) == summary["steps"]["done"].get<std::size_t>() + 1);
     CHECK(summary["steps"]["done"].get<int>() < summary["steps"]["planned"].get<int>());
   }
+}
+
+TEST_CASE("A haptic session interrupted while it prepares says that nothing was run") {
+  const TemporaryFolder folder;
+  const auto text = write_file(folder.path() / "text", small_scenario);
+  const auto out = folder.path() / "out";
+  const std::string pipe = (folder.path() / "case.toml").string();
+  // The program waits at the pipe for its scenario when the signal comes.
+  const ProgramResult result = run_shell(
+      "mkfifo '" + pipe + "'; " + spherecut_command({"haptics", pipe, "--duration", "100", "--out", out}) +
+      " & run=$!; exec 3>'" + pipe + "'; kill -INT $run; cat '" + text.string() + "' >&3; exec 3>&-; wait $run");
+  INFO(result.out << result.err);
+  CHECK(result.status == 130);
+  CHECK_THAT(result.out, Contains("interrupted while preparing: nothing was run") && !Contains("ticks/s, 0 overruns"));
+  const auto findings = nlohmann::json::parse(read_file(out / "haptic.json"));
+  CHECK(findings["interrupted"] == true);
+  CHECK(findings["ticks"] == 0);
+}
+
+TEST_CASE("A cut that is not open is said to be closed, without digits below the accuracy") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  const auto scenario = write_file(folder.path() / "case.toml", cut_block + disc_precut);
+  const ProgramResult result = run_spherecut({"run", scenario, "--out", out});
+  INFO(result.err);
+  CHECK(result.status == 0);
+  CHECK_THAT(result.out, Contains(", closed") && Contains("it stays closed") && !Contains("e-"));
+}
+
+TEST_CASE("A mesh in millimetres taken as metres is warned about in the summary too") {
+  const TemporaryFolder folder;
+  topology::SurfaceMesh millimetres = small_block(); // of 6 mm, so that as metres it has a node for every metre
+  for (Vector3& x : millimetres.vertices)
+    x *= 100;
+  write_file(folder.path() / "millimetres.obj", obj_text(millimetres));
+  std::string text = replaced(with_file("millimetres.obj"), "lower = [-1, -1, -0.001]\nupper = [1, 1, 0.001]",
+                              "lower = [-100, -100, -1]\nupper = [100, 100, 1]");
+  text = replaced(text, "target = [0, 0, 0.03]", "target = [0, 0, 3]");
+  text = replaced(text, "fine_spacing = 0.004\ncoarse_spacing = 0.012\nfine_radius = 0.006",
+                  "fine_spacing = 0.6\ncoarse_spacing = 1\nfine_radius = 0.6");
+  const auto out = folder.path() / "out";
+  const ProgramResult result = run_spherecut({"run", write_file(folder.path() / "case.toml", text), "--out", out});
+  INFO(result.out << result.err);
+  CHECK(result.status == 0);
+  const std::string summary = read_file(out / "summary.json");
+  CHECK_THAT(summary, Contains("in millimetres? use scale = 0.001"));
 }
 
 TEST_CASE("The shipped scenarios pass the check") {

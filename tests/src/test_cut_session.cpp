@@ -215,6 +215,22 @@ position = [0, 0, 0.028]
   CHECK(cut.back().force.z() == Approx(refused.back().force.z()).epsilon(0.05)); // a shallow cut two radii away
 }
 
+TEST_CASE("A blade that misses the organ, or starts inside it, is told") {
+  const auto told = [](const std::string& positions_from, const std::string& positions_to) {
+    const Session session = session_of(cut_block + blade({positions_from, positions_to}, 0.01, "0.5"));
+    std::string all;
+    for (const std::string& warning : session.warnings())
+      all += warning + "\n";
+    return all;
+  };
+  CHECK(told("[0, 0, 0.035]", "[0, 0, 0.02]").empty());
+  CHECK(told("[0.2, 0, 0.016]", "[-0.2, 0.001, 0.015]").empty()); // in one step through the whole organ
+  CHECK_THAT(told("[-0.05, 0, 0.034]", "[0.05, 0, 0.034]"),
+             Contains("case.toml:15: the blade never meets the organ") && Contains("no nearer than 4 mm"));
+  CHECK_THAT(told("[0, 0, 0.027]", "[0, 0, 0.02]"),
+             Contains("case.toml:15: the blade starts inside the organ, 3 mm deep at ") && Contains("left uncut"));
+}
+
 TEST_CASE("A blade starts from the tissue as it is deformed: the cut at rest is where the material was") {
   // Stretched along x and free at its sides, the block has drawn in; a cut at a place in space meets material that was
   // farther out at rest.

@@ -82,7 +82,9 @@ TEST_CASE("A tool that lifts off again ends without force") {
 }
 
 TEST_CASE("A tool that starts inside the organ is refused") {
-  CHECK_THROWS_WITH(session_of(path({{0, "[0, 0, 0.02]"}, {1, "[0, 0, 0.01]"}})), Contains("starts inside"));
+  CHECK_THROWS_WITH(
+      session_of(path({{0, "[0, 0, 0.02]"}, {1, "[0, 0, 0.01]"}})),
+      Contains("case.toml:24: tool.path[1].position = [0, 0, 0.02] m: the tool starts inside the organ, "));
   // Swallowed whole: the surface is nowhere near the ball.
   CHECK_THROWS_WITH(
       session_of(replaced(path({{0, "[0, 0, 0.012]"}, {1, "[0, 0, 0.01]"}}), "radius = 0.01\n", "radius = 0.001\n")),
@@ -111,14 +113,29 @@ TEST_CASE("The fine zone follows a sliding tool and the force hardly jumps, with
   int followed = 0;
   for (const StepResult& step : run(session)) {
     followed += step.resprinkled ? 1 : 0;
+    if (condition == "frictionless")
+      CHECK(step.tangential.isZero(0));
     CHECK(step.force_jump < 0.1); // coarse nodes: half a spacing of the contact's edge is 10 % of the force
     if (condition == "frictional" &&
         step.time > 1) { // it slips: friction is 0.3 of the pressure, and goes on at a re-sprinkle
       INFO("t = " << step.time << " s, resprinkled " << step.resprinkled);
       CHECK(-step.force.x() / step.force.z() == Approx(0.3).margin(0.06)); // and the slope of the dent
+      const Vector3 normal = step.force - step.tangential;
+      CHECK(step.tangential.norm() / normal.norm() == Approx(0.3).margin(0.02)); // the directions differ by node
+      CHECK(std::abs(normal.x()) < 0.2 * std::abs(step.tangential.x()));
     }
   }
   CHECK(followed >= 2);
+}
+
+TEST_CASE("The force of a bonded ball is parted by the surface at rest") {
+  Session session = session_of(path({{0, "[0, 0, 0.031]"}, {0.5, "[0, 0, 0.0285]"}, {1, "[0.001, 0, 0.0285]"}}) +
+                               "[contact]\ncondition = \"bonded\"\n");
+  const std::vector<StepResult> steps = run(session);
+  const StepResult& last = steps.back();
+  CHECK(last.force.x() < -0.001); // the tissue holds the ball back
+  CHECK(last.tangential.x() == Approx(last.force.x()));
+  CHECK(std::abs(last.tangential.z()) < 1e-9 * last.force.norm());
 }
 
 TEST_CASE("A deep tip between nodes too coarse for it is told") {

@@ -151,9 +151,21 @@ TEST_CASE("Small holes are filled and said", "[surface_check]") {
                 [vertex](const Triangle& t) { return std::find(t.begin(), t.end(), vertex) != t.end(); });
   const CheckedSurface result = checked(mesh);
   require_closed_sphere(result.mesh);
-  CHECK(says(result.mended, "filled 2 small holes"));
+  CHECK(says(result.mended, "filled 2 small holes: of "));
   CHECK(volume(result.mesh) == Approx(volume(make_liver(5000))).epsilon(1e-3));
   CHECK(self_intersections(result.mesh).empty());
+}
+
+TEST_CASE("A filled hole is said with its place", "[surface_check]") {
+  SurfaceMesh mesh = make_liver(5000);
+  const Triangle gone = mesh.triangles.back();
+  mesh.triangles.pop_back();
+  const CheckedSurface result = checked(mesh);
+  require_closed_sphere(result.mesh);
+  REQUIRE(says(result.mended, "filled 1 small hole: of 3 edges at vertex "));
+  const int vertex = *std::min_element(gone.begin(), gone.end()); // a loop begins at its first vertex
+  const Vector3& x = mesh.vertices[vertex];
+  CHECK(says(result.mended, fmt::format("vertex {} ({:.6g}, {:.6g}, {:.6g})", vertex, x.x(), x.y(), x.z())));
 }
 
 TEST_CASE("Needles and caps are removed and said", "[surface_check]") {

@@ -1,7 +1,7 @@
 // Rigid tools: signed distance, normal, pose, mesh.
 #include "tests/support/mesh_checks.hpp"
 #include "topology/errors.hpp"
-#include "topology/tool.hpp"
+#include "topology/tool_outline.hpp"
 
 #include <catch2/catch.hpp>
 #include <limits>
@@ -39,6 +39,52 @@ Vector3 random_point(std::mt19937& random, const Vector3& centre, double reach) 
 }
 
 } // namespace
+
+TEST_CASE("The outline of a tool in a plane lies on the tool, all around it") {
+  for (const Case& c : cases()) {
+    INFO(c.name);
+    const Vector3 e1 = c.pose.axis.unitOrthogonal(), e2 = c.pose.axis;
+    const Vector3 origin = c.pose.point + 0.001 * e1 - 0.002 * e2; // as a contact: on the end, or a little before it
+    const double reach = 0.012;
+    const auto outline = tool_outline(c.shape, c.pose, origin, e1, e2, reach);
+    double lowest = 1, highest = -1, widest = 0, longest = 0;
+    bool leaves = false;
+    Vector3 before = Vector3::Zero();
+    bool follows = false;
+    for (const auto& [u, v] : outline) {
+      if (std::isnan(u)) {
+        leaves = true;
+        follows = false;
+        continue;
+      }
+      const Vector3 x = origin + u * e1 + v * e2;
+      CHECK(std::abs(tool_distance(c.shape, c.pose, x)) < 1e-9);
+      CHECK(std::hypot(u, v) <= reach);
+      lowest = std::min(lowest, v);
+      highest = std::max(highest, v);
+      widest = std::max(widest, std::abs((x - c.pose.point).dot(e1)));
+      if (follows)
+        longest = std::max(longest, (x - before).norm());
+      before = x;
+      follows = true;
+    }
+    CHECK(lowest == Approx(0.002).margin(1e-9)); // the plane holds the axis, so also the tip's deepest point
+    CHECK(widest == Approx(tip_radius(c.shape)).epsilon(1e-3));
+    CHECK(longest < 0.004 * reach); // no stairs
+    CHECK(leaves);
+    CHECK(highest > 0.8 * reach);
+  }
+  // A ball as a whole is a circle; a plane beside it meets nothing.
+  const SphereTip ball{0.007};
+  const ToolPose pose = pose_at(ball, Vector3::Zero());
+  const auto circle = tool_outline(ball, pose, {0, 0.003, 0}, Vector3::UnitX(), Vector3::UnitZ(), 0.1);
+  CHECK(circle.size() > 1000);
+  CHECK(circle.front() == circle.back());
+  for (const auto& [u, v] : circle)
+    CHECK(std::hypot(u, v - 0.007) == Approx(std::sqrt(0.007 * 0.007 - 0.003 * 0.003)).epsilon(1e-9));
+  CHECK(tool_outline(ball, pose, {0, 0.008, 0}, Vector3::UnitX(), Vector3::UnitZ(), 0.1).empty());
+  CHECK_THROWS_AS(tool_outline(ball, pose, {0, 0, 0}, Vector3::UnitX(), Vector3::UnitZ(), 0), InputError);
+}
 
 TEST_CASE("Tool distance of each shape is the distance to a dense sampling of its surface") {
   std::mt19937 random(1);
