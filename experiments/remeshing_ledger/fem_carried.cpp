@@ -3,8 +3,7 @@
 // The topology of the mesh, and with it the order of elimination, stays until the elements have become too flat. Then
 // the organ is meshed and condensed anew.
 #include "experiments/remeshing_ledger/fem_model.hpp"
-#include "experiments/remeshing_ledger/mesh_request.hpp"
-#include "experiments/remeshing_ledger/own_process.hpp"
+#include "experiments/remeshing_ledger/meshed_back_end.hpp"
 #include "experiments/remeshing_ledger/sub_structure.hpp"
 #include "topology/errors.hpp"
 
@@ -20,10 +19,10 @@ constexpr double rigid_reach = 0.5;  // sizes at the front: so far the mesh move
 constexpr double moving_reach = 2.5; // so far it moves at all
 constexpr double worn = 0.3;         // of the smallest quality at the start: below, the mesh is made anew
 
-class FemCarried final : public BackEnd {
+class FemCarried final : public MeshedBackEnd {
  public:
   FemCarried(const Scenario& scenario, const Resolution& resolution, Element element, double limit)
-      : scenario_(scenario), resolution_(resolution), element_(element), limit_(limit), number_(resolution.first) {}
+      : MeshedBackEnd(scenario, resolution, element, limit) {}
 
   std::string name() const override { return fmt::format("fem_carried_{}", to_string(element_)); }
   bool may_skip() const override { return false; }
@@ -72,7 +71,7 @@ class FemCarried final : public BackEnd {
         continue;
       Vector3 x = first_[i] + share_[i] * carried(first_[i]);
       if (curved_skin_[i] != 0) { // back to the surface, in the plane of the cut where it lay in it
-        const bool in_plane = std::abs(scenario_.height(first_[i])) < 1e-3 * resolution_.fine;
+        const bool in_plane = std::abs(scenario_.height(first_[i])) < tolerance();
         for (int step = 0; step < 3; ++step) {
           const Vector3 n = domain.normal(x), way = in_plane ? scenario_.frame.tangent : n;
           x -= domain.signed_distance(x) / n.dot(way) * way;
@@ -141,29 +140,18 @@ class FemCarried final : public BackEnd {
   }
 
   Increment anew(Increment increment, double share) {
-    increment.anew = true;
-    increment.number = number_;
     base_ = number_;
     base_edge_ = leading_edge(scenario_, base_);
+    front_closed_ = front_of(scenario_, base_).closed;
     meshed_ = false;
-    MeshRequest request;
-    {
-      const StageClock clock(increment.times, Stage::topology);
-      const Front front = front_of(scenario_, number_);
-      front_closed_ = front.closed;
-      request = mesh_request(scenario_, number_,
-                             {share * resolution_.fine, resolution_.slope,
-                              share * resolution_.coarse_over_fine * resolution_.fine, front.points});
-    }
-    const TetMesh meshed = mesh_for(
-        increment, [&] { return mesh_volume(request); }, limit_);
+    const TetMesh meshed = mesh_organ(increment, share);
     if (!increment.failure.empty())
       return increment;
     try {
       CutMesh mesh;
       {
         const StageClock clock(increment.times, Stage::meshing);
-        mesh = part(meshed, scenario_, number_, 1e-3 * resolution_.fine);
+        mesh = part(meshed, scenario_, number_, tolerance());
         share_motion(mesh);
       }
       {
@@ -194,11 +182,7 @@ class FemCarried final : public BackEnd {
     return increment;
   }
 
-  Scenario scenario_;
-  Resolution resolution_;
-  Element element_;
-  double limit_;
-  int number_, base_ = 0;
+  int base_ = 0; // number of the cut that the mesh was made for
   bool front_closed_ = false, meshed_ = false;
   FemNodes nodes_;
   std::vector<Vector3> first_; // corners when the mesh was made

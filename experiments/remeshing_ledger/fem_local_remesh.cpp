@@ -3,7 +3,7 @@
 // increment factors the near part with that dense block, until a cavity leaves the near part. Then another near part,
 // about the way ahead, is chosen.
 #include "experiments/remeshing_ledger/cavity.hpp"
-#include "experiments/remeshing_ledger/mesh_request.hpp"
+#include "experiments/remeshing_ledger/meshed_back_end.hpp"
 #include "experiments/remeshing_ledger/own_process.hpp"
 #include "experiments/remeshing_ledger/sub_structure.hpp"
 #include "topology/errors.hpp"
@@ -21,10 +21,10 @@ constexpr double edge_share = 0.7;                    // of the sizes that Mesh_
 constexpr double way_ahead = 0.8;                     // sizes at the front: so far ahead the near part serves
 constexpr double grown = 1.6;                         // times the tetrahedra of the first mesh: then it is made anew
 
-class FemLocalRemesh final : public BackEnd {
+class FemLocalRemesh final : public MeshedBackEnd {
  public:
   FemLocalRemesh(const Scenario& scenario, const Resolution& resolution, Element element, double limit)
-      : scenario_(scenario), resolution_(resolution), element_(element), limit_(limit), number_(resolution.first) {}
+      : MeshedBackEnd(scenario, resolution, element, limit) {}
 
   std::string name() const override { return fmt::format("fem_local_remesh_{}", to_string(element_)); }
   bool may_skip() const override { return false; }
@@ -57,23 +57,9 @@ class FemLocalRemesh final : public BackEnd {
   double condition() const override { return body_.condition(); }
 
  private:
-  [[nodiscard]] Grading grading(double share = 1) const {
-    return {share * resolution_.fine, resolution_.slope, share * resolution_.coarse_over_fine * resolution_.fine,
-            front_of(scenario_, number_).points};
-  }
-  [[nodiscard]] double tolerance() const { return 1e-3 * resolution_.fine; }
-
   Increment anew(Increment increment) {
-    increment.anew = true;
-    increment.number = number_;
     meshed_ = false;
-    MeshRequest request;
-    {
-      const StageClock clock(increment.times, Stage::topology);
-      request = mesh_request(scenario_, number_, grading());
-    }
-    mesh_ = mesh_for(
-        increment, [&] { return mesh_volume(request); }, limit_);
+    mesh_ = mesh_organ(increment);
     if (!increment.failure.empty())
       return increment;
     first_tets_ = static_cast<double>(mesh_.tets.size());
@@ -204,11 +190,6 @@ class FemLocalRemesh final : public BackEnd {
     return increment;
   }
 
-  Scenario scenario_;
-  Resolution resolution_;
-  Element element_;
-  double limit_;
-  int number_;
   bool meshed_ = false;
   double first_tets_ = 0;
   TetMesh mesh_;

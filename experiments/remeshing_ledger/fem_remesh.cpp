@@ -1,7 +1,6 @@
 // Finite elements that mesh the whole cut organ anew at every increment.
 #include "experiments/remeshing_ledger/fem_model.hpp"
-#include "experiments/remeshing_ledger/mesh_request.hpp"
-#include "experiments/remeshing_ledger/own_process.hpp"
+#include "experiments/remeshing_ledger/meshed_back_end.hpp"
 
 #include <fmt/format.h>
 
@@ -9,10 +8,10 @@ namespace spherecut::experiments::ledger {
 
 namespace {
 
-class FemRemesh final : public BackEnd {
+class FemRemesh final : public MeshedBackEnd {
  public:
   FemRemesh(const Scenario& scenario, const Resolution& resolution, Element element, double limit)
-      : scenario_(scenario), resolution_(resolution), element_(element), limit_(limit), number_(resolution.first) {}
+      : MeshedBackEnd(scenario, resolution, element, limit) {}
 
   std::string name() const override { return fmt::format("fem_remesh_{}", to_string(element_)); }
   Increment start() override { return solve(); }
@@ -29,27 +28,12 @@ class FemRemesh final : public BackEnd {
  private:
   Increment solve() {
     Increment increment;
-    increment.number = number_;
-    increment.anew = true;
-    MeshRequest request;
-    {
-      const StageClock clock(increment.times, Stage::topology);
-      Grading grading{resolution_.fine, resolution_.slope, resolution_.coarse_over_fine * resolution_.fine,
-                      front_of(scenario_, number_).points};
-      request = mesh_request(scenario_, number_, grading);
-    }
-    const TetMesh meshed = mesh_for(
-        increment, [&] { return mesh_volume(request); }, limit_);
+    const TetMesh meshed = mesh_organ(increment);
     if (increment.failure.empty())
-      part_and_solve(meshed, scenario_, element_, 1e-3 * resolution_.fine, increment, solution_);
+      part_and_solve(meshed, scenario_, element_, tolerance(), increment, solution_);
     return increment;
   }
 
-  Scenario scenario_;
-  Resolution resolution_;
-  Element element_;
-  double limit_;
-  int number_;
   FemSolution solution_;
 };
 

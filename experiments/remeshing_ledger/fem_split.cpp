@@ -3,6 +3,7 @@
 // edges crossed. The system is assembled and factored anew.
 #include "experiments/remeshing_ledger/fem_model.hpp"
 #include "experiments/remeshing_ledger/mesh_request.hpp"
+#include "experiments/remeshing_ledger/meshed_back_end.hpp"
 #include "experiments/remeshing_ledger/own_process.hpp"
 
 #include <algorithm>
@@ -15,10 +16,10 @@ namespace {
 
 constexpr double in_plane = 1e-6; // of the size at the front: nearer to the plane a vertex lies in it
 
-class FemSplit final : public BackEnd {
+class FemSplit final : public MeshedBackEnd {
  public:
   FemSplit(const Scenario& scenario, const Resolution& resolution, double limit)
-      : scenario_(scenario), resolution_(resolution), limit_(limit), number_(resolution.first) {}
+      : MeshedBackEnd(scenario, resolution, Element::linear, limit) {}
 
   std::string name() const override { return "fem_split"; }
   bool may_skip() const override { return false; }
@@ -28,18 +29,13 @@ class FemSplit final : public BackEnd {
     Increment increment;
     increment.number = number_;
     increment.anew = true;
-    Grading grading{resolution_.fine, resolution_.slope, resolution_.coarse_over_fine * resolution_.fine,
-                    front_of(scenario_, number_).points};
-    const std::vector<Vector3> last = front_of(scenario_, scenario_.increments).points;
-    const auto both = [grading, last](const Vector3& x) {
-      Grading at_last = grading;
-      at_last.front = last;
-      return std::min(grading(x), at_last(x));
-    };
-    MeshRequest request = mesh_request(scenario_, number_, grading);
+    const Grading at_first = grading();
+    Grading at_last = at_first;
+    at_last.front = front_of(scenario_, scenario_.increments).points;
+    MeshRequest request = mesh_request(scenario_, number_, at_first);
     request.label = [this](const Vector3& x) { return scenario_.contains(x) ? 1 : 0; };
     request.features = scenario_.sharp_edges;
-    request.size = both;
+    request.size = [at_first, at_last](const Vector3& x) { return std::min(at_first(x), at_last(x)); };
     mesh_ = mesh_for(
         increment, [&] { return mesh_volume(request); }, limit_);
     if (!increment.failure.empty())
@@ -109,14 +105,10 @@ class FemSplit final : public BackEnd {
       const StageClock clock(increment.times, Stage::meshing);
       split_edges();
     }
-    part_and_solve(mesh_, scenario_, Element::linear, in_plane * resolution_.fine, increment, solution_);
+    part_and_solve(mesh_, scenario_, element_, in_plane * resolution_.fine, increment, solution_);
     return increment;
   }
 
-  Scenario scenario_;
-  Resolution resolution_;
-  double limit_;
-  int number_;
   TetMesh mesh_;
   std::vector<std::vector<int>> tets_of_; // by vertex
   FemSolution solution_;
