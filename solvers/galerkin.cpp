@@ -11,6 +11,7 @@
 #include "solvers/background_cells.hpp"
 #include "solvers/cell_shapes.hpp"
 #include "solvers/cut_sight.hpp"
+#include "solvers/dense_products.hpp"
 #include "solvers/elastic_body.hpp"
 #include "solvers/parallel.hpp"
 #include "solvers/surface_patches.hpp"
@@ -89,12 +90,7 @@ class Galerkin final : public ElasticBody {
   MatrixX contact_compliance(const std::vector<int>& candidates) const override {
     MatrixX right = unit_forces(candidates);
     clear_dropped(right);
-    const MatrixX half = factorisation_->forward(ordered(right));
-    MatrixX compliance(half.cols(), half.cols());
-    compliance.setZero();
-    compliance.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose());
-    compliance.triangularView<Eigen::StrictlyUpper>() = compliance.transpose();
-    return compliance;
+    return gram(factorisation_->forward(ordered(right)));
   }
 
   std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override {

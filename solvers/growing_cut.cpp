@@ -263,6 +263,30 @@ VectorX GrowingCut::State::elastic_forces(const VectorX& coefficients) const {
   return forces;
 }
 
+std::vector<char> GrowingCut::State::slots_within(const std::vector<Vector3>& places, double reach) const {
+  const Nearness to_places(places);
+  std::vector<char> slots(window->slots(), 0);
+  for (Eigen::Index block = 0; block < std::ssize(window_node); ++block)
+    if (const int node = window_node[block]; node >= 0 && to_places(problem.nodes.positions[node]) <= reach)
+      std::fill_n(slots.begin() + 3 * block, 3, 1);
+  return slots;
+}
+
+bool GrowingCut::State::factor_window(const std::vector<Vector3>& places) {
+  const Nearness to_places(places);
+  double reach = 0;
+  for (Eigen::Index block = 0; block < std::ssize(window_node); ++block)
+    if (const int node = window_node[block]; node >= 0 && window->changed(3 * static_cast<int>(block)))
+      reach = std::max(reach, to_places(problem.nodes.positions[node]));
+  if (std::isfinite(reach))
+    change_reach = reach;
+  if (window->is_prepared() || !std::isfinite(reach))
+    return window->factor();
+  const double finest = *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
+  window->prepare(slots_within(places, reach + advance_before_new * finest));
+  return false;
+}
+
 void GrowingCut::State::condense_contact() {
   const auto count = static_cast<Eigen::Index>(contact.size());
   MatrixX functionals = MatrixX::Zero(window->slots(), 3 * count);
@@ -560,7 +584,9 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
 
   try {
     const Stopwatch factor_watch;
-    report.prepared = s.window->factor();
+    std::vector<Vector3> places = changes.faces;
+    places.insert(places.end(), changes.front.begin(), changes.front.end());
+    report.prepared = s.factor_window(places);
     report.factored = s.window->factored();
     report.factor_seconds = factor_watch.seconds();
     const Stopwatch condense_watch;
@@ -599,24 +625,27 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
 double GrowingCut::prepare(const topology::SurfaceMesh& next) {
   const Stopwatch watch;
   State& s = *state_;
-  std::vector<char> kept(s.window->slots(), 0);
-  const auto keep = [&](int node) {
-    if (const int block = s.slot[node]; block >= 0)
-      std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
-  };
-  const auto in_reach = s.reach_of(next, false);
-  for (const State::Box& box : s.boxes)
-    if (!box.cells.empty() && in_reach(box.box.centre, box.box.half.norm()))
-      for (const CellShapes& cell : box.cells)
-        for (int node : cell.nodes)
+  std::vector<char> kept;
+  if (s.change_reach > 0) {
+    const double finest = *std::min_element(s.problem.nodes.spacings.begin(), s.problem.nodes.spacings.end());
+    kept = s.slots_within(sample_points(next, 0, 0.5 * finest), s.change_reach + change_slack * finest);
+  } else {
+    kept.assign(s.window->slots(), 0);
+    const auto keep = [&](int node) {
+      if (const int block = s.slot[node]; block >= 0)
+        std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
+    };
+    const auto in_reach = s.reach_of(next, false);
+    for (const State::Box& box : s.boxes)
+      if (!box.cells.empty() && in_reach(box.box.centre, box.box.half.norm()))
+        for (const CellShapes& cell : box.cells)
+          for (int node : cell.nodes)
+            keep(node);
+    for (const DisplacementMean& mean : s.held)
+      if (in_reach(mean.centroid, 0.5 * s.radius_at(mean.centroid)))
+        for (int node : mean.nodes)
           keep(node);
-  for (const DisplacementMean& mean : s.held)
-    if (in_reach(mean.centroid, 0.5 * s.radius_at(mean.centroid)))
-      for (int node : mean.nodes)
-        keep(node);
-  for (const DisplacementMean& mean : s.contact)
-    for (int node : mean.nodes)
-      keep(node);
+  }
   s.window->prepare(kept);
   return watch.seconds();
 }

@@ -1,5 +1,6 @@
 #include "solvers/schur_window.hpp"
 
+#include "solvers/dense_products.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -14,8 +15,6 @@ void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, con
 void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha,
             const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c,
             const int* ldc);
-void dtrmm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
-            const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 }
 
 namespace spherecut::solvers {
@@ -25,15 +24,6 @@ namespace {
 /// Of its diagonal entry: a smaller pivot is rounding. A severed piece leaves 1e-16, bodies that are held 1e-9 and
 /// more.
 constexpr double singular_pivot = 1e-13;
-
-/// B = L^-1 B or L^-T B for the leading dimension `lda` of L.
-void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& right) {
-  const int rows = static_cast<int>(right.rows()), columns = static_cast<int>(right.cols());
-  if (rows == 0 || columns == 0)
-    return;
-  const double one = 1;
-  dtrsm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower, &lda, right.data(), &rows);
-}
 
 /// Dense Cholesky factor in place.
 void cholesky(const std::vector<int>& slots, std::vector<double>& square) {
@@ -51,15 +41,6 @@ void cholesky(const std::vector<int>& slots, std::vector<double>& square) {
         !(pivot * pivot > singular_pivot * diagonal[j]))
       throw NumericalError(fmt::format(
           "the window of {} unknowns is singular to rounding (slot {}): a piece that nothing holds", n, slots[j]));
-}
-
-/// B = L B or L^T B.
-void triangular_product(bool transposed, const MatrixX& lower, MatrixX& right) {
-  const int rows = static_cast<int>(right.rows()), columns = static_cast<int>(right.cols());
-  if (rows == 0 || columns == 0)
-    return;
-  const double one = 1;
-  dtrmm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower.data(), &rows, right.data(), &rows);
 }
 
 /// Lower triangle of L L^T, by blocks of columns that leave out the zeros of L.
@@ -137,11 +118,12 @@ void SchurWindow::gather(const std::vector<int>& slots, std::vector<double>& squ
 
 void SchurWindow::prepare(const std::vector<char>& kept) {
   ahead_.clear();
+  seen_ahead_ = {};
   kept_.clear();
   kept_place_.assign(slots(), -1);
   for (int slot = 0; slot < slots(); ++slot) {
     const bool free_room = active_[slot] == 0 && slot >= changing_;
-    if (kept[slot] != 0 || slot >= contact_begin() || free_room) {
+    if (kept[slot] != 0 || free_room) {
       kept_place_[slot] = static_cast<int>(kept_.size());
       kept_.push_back(slot);
     } else if (active_[slot] != 0) {
@@ -170,11 +152,15 @@ void SchurWindow::prepare(const std::vector<char>& kept) {
   factor();
 }
 
+bool SchurWindow::is_prepared() const {
+  return !ahead_.empty() && std::all_of(ahead_.begin(), ahead_.end(), [&](int slot) { return changed_[slot] == 0; });
+}
+
 bool SchurWindow::factor() {
-  const bool held = std::all_of(ahead_.begin(), ahead_.end(), [&](int slot) { return changed_[slot] == 0; });
-  if (!held)
+  const bool usable = is_prepared();
+  if (!usable)
     ahead_.clear();
-  const bool usable = held && !ahead_.empty();
+  std::fill(changed_.begin(), changed_.end(), 0);
   order_.clear();
   for (int slot = 0; slot < slots(); ++slot)
     if (active_[slot] != 0 && (!usable || kept_place_[slot] >= 0))
@@ -211,7 +197,8 @@ void SchurWindow::forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) c
     rest.row(i) = right.row(order_[i]);
   if (!ahead_.empty()) {
     triangular_solve(false, ahead_factor_.data(), static_cast<int>(ahead_.size()), ahead);
-    const MatrixX taken = coupling_ * ahead;
+    MatrixX taken = MatrixX::Zero(coupling_.rows(), right.cols());
+    add_product(1, coupling_, false, ahead, taken);
     for (Eigen::Index i = 0; i < rest.rows(); ++i)
       rest.row(i) -= taken.row(kept_place_[order_[i]]);
   }
@@ -230,36 +217,52 @@ MatrixX SchurWindow::solve(const MatrixX& right) const {
   MatrixX below = MatrixX::Zero(std::ssize(kept_), right.cols());
   for (Eigen::Index i = 0; i < rest.rows(); ++i)
     below.row(kept_place_[order_[i]]) = rest.row(i);
-  ahead.noalias() -= coupling_.transpose() * below;
+  add_product(-1, coupling_, true, below, ahead);
   triangular_solve(true, ahead_factor_.data(), static_cast<int>(ahead_.size()), ahead);
   for (Eigen::Index i = 0; i < ahead.rows(); ++i)
     by_slot.row(ahead_[i]) = ahead.row(i);
   return by_slot;
 }
 
-SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const VectorX& right) const {
+void SchurWindow::see_ahead(const MatrixX& functionals) {
+  MatrixX there(std::ssize(ahead_), functionals.cols());
+  for (Eigen::Index i = 0; i < there.rows(); ++i)
+    there.row(i) = functionals.row(ahead_[i]);
+  if (seen_ahead_.functionals.rows() == there.rows() && seen_ahead_.functionals.cols() == there.cols() &&
+      seen_ahead_.functionals == there)
+    return;
+  seen_ahead_.halfway = there;
+  triangular_solve(false, ahead_factor_.data(), static_cast<int>(ahead_.size()), seen_ahead_.halfway);
+  seen_ahead_.taken = MatrixX::Zero(coupling_.rows(), there.cols());
+  add_product(1, coupling_, false, seen_ahead_.halfway, seen_ahead_.taken);
+  seen_ahead_.compliance = gram(seen_ahead_.halfway);
+  seen_ahead_.functionals = std::move(there);
+}
+
+SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const VectorX& right) {
   // With Y = L^-1 F: F^T S^-1 F = Y^T Y and F^T S^-1 b = Y^T (L^-1 b). Above its first entry F leaves Y zero.
-  const auto is_zero = [&](int slot) { return functionals.row(slot).isZero(0); };
   MatrixX load_ahead, load;
   forward(right, load_ahead, load);
-  Condensed condensed;
-  if (!std::all_of(ahead_.begin(), ahead_.end(), is_zero)) {
-    MatrixX ahead, rest;
-    forward(functionals, ahead, rest);
-    condensed.compliance = ahead.transpose() * ahead + rest.transpose() * rest;
-    condensed.response = ahead.transpose() * load_ahead + rest.transpose() * load;
-    return condensed;
+  MatrixX seen(std::ssize(order_), functionals.cols());
+  for (Eigen::Index i = 0; i < seen.rows(); ++i)
+    seen.row(i) = functionals.row(order_[i]);
+  Condensed condensed{MatrixX::Zero(functionals.cols(), functionals.cols()), VectorX::Zero(functionals.cols())};
+  if (!ahead_.empty()) {
+    see_ahead(functionals);
+    for (Eigen::Index i = 0; i < seen.rows(); ++i)
+      seen.row(i) -= seen_ahead_.taken.row(kept_place_[order_[i]]);
+    condensed.compliance = seen_ahead_.compliance;
+    condensed.response = seen_ahead_.halfway.transpose() * load_ahead;
   }
+  Eigen::Index first = 0;
+  while (first < seen.rows() && seen.row(first).isZero(0))
+    ++first;
+  MatrixX rest = seen.bottomRows(seen.rows() - first);
   const int n = static_cast<int>(order_.size());
-  const int first = static_cast<int>(std::find_if_not(order_.begin(), order_.end(), is_zero) - order_.begin()),
-            rows = n - first;
-  MatrixX rest(rows, functionals.cols());
-  for (int i = 0; i < rows; ++i)
-    rest.row(i) = functionals.row(order_[first + i]);
-  if (rows > 0)
-    triangular_solve(false, factor_.data() + static_cast<std::ptrdiff_t>(first) * n + first, n, rest);
-  condensed.compliance = rest.transpose() * rest;
-  condensed.response = rest.transpose() * load.bottomRows(rows);
+  if (rest.rows() > 0)
+    triangular_solve(false, factor_.data() + first * n + first, n, rest);
+  condensed.compliance += gram(rest);
+  condensed.response += rest.transpose() * load.bottomRows(rest.rows());
   return condensed;
 }
 

@@ -44,15 +44,20 @@ class SchurWindow {
     return schur_.data() + static_cast<std::ptrdiff_t>(slot) * schur_.rows();
   }
   [[nodiscard]] bool active(int slot) const { return active_[slot] != 0; }
+  /// Whether the slot has changed since the last factor().
+  [[nodiscard]] bool changed(int slot) const { return changed_[slot] != 0; }
   /// A new unknown: its row and column start at zero.
   void activate(int slot);
   /// Takes an unknown out of the system; its row and column are forgotten.
   void deactivate(int slot);
 
   /// Work done ahead of a change: eliminates what is active and not marked in `kept` (by slot), so that the next
-  /// factor() has only the marked unknowns left to do, as long as nothing else has changed by then. Contact slots and
-  /// free room are kept whatever the marks say. Factors the rest as well. Throws as factor().
+  /// factor() has only the marked unknowns left to do, as long as nothing else has changed by then. Free room is kept
+  /// whatever the marks say. Factors the rest as well: together that is the work of one factor().
+  /// What is done ahead stays until a change concerns it. Throws as factor().
   void prepare(const std::vector<char>& kept);
+  /// Whether something is done ahead and nothing has changed of it.
+  [[nodiscard]] bool is_prepared() const;
 
   /// Factors the active part of S. Whether what was prepared could be used. Throws NumericalError naming the slot where
   /// S is not positive definite, or singular to rounding.
@@ -67,12 +72,13 @@ class SchurWindow {
   [[nodiscard]] MatrixX solve(const MatrixX& right) const;
 
   /// F^T S^-1 F and F^T S^-1 right for functionals F (slots x count): what they see of unit loads on themselves and of
-  /// a load. Cheap when F reaches late slots alone, such as those of the contact.
+  /// a load. Cheap when F reaches late slots alone, such as those of the contact; what F sees of the part done ahead is
+  /// kept for the next call.
   struct Condensed {
     MatrixX compliance; // count x count, symmetric
     VectorX response;   // count
   };
-  [[nodiscard]] Condensed condense(const MatrixX& functionals, const VectorX& right) const;
+  [[nodiscard]] Condensed condense(const MatrixX& functionals, const VectorX& right);
 
   /// Solution in elimination order of K from that of the window (slots) and the right-hand sides given to reduce().
   [[nodiscard]] MatrixX recover(const MatrixX& window, const MatrixX& right) const;
@@ -81,6 +87,7 @@ class SchurWindow {
 
  private:
   void gather(const std::vector<int>& slots, std::vector<double>& square) const;
+  void see_ahead(const MatrixX& functionals);
   /// L^-1 right, the part done ahead and the rest.
   void forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) const;
   [[nodiscard]] MatrixX recover_from(MatrixX halfway, const MatrixX& window) const;
@@ -91,12 +98,17 @@ class SchurWindow {
   MatrixX trailing_;          // L_WW at construction
   MatrixX schur_;             // lower triangle, by slots
   std::vector<char> active_;  // by slot
-  std::vector<char> changed_; // by slot, since prepare()
+  std::vector<char> changed_; // by slot, since factor()
   // Done ahead: S of the slots `ahead_` is ahead_factor_ squared; coupling_ (kept x ahead) are the rows of the kept
   // slots below it, and their own part of S is to be less by coupling_ coupling_^T, `eliminated_`.
   std::vector<int> ahead_, kept_, kept_place_; // slots; place of a slot in kept_, -1 outside
   std::vector<double> ahead_factor_;           // column-major, ahead squared
   MatrixX coupling_, eliminated_;
+  struct SeenAhead {
+    MatrixX functionals;    // ahead x count
+    MatrixX halfway, taken; // L^-1 of them, and what that takes from the kept slots
+    MatrixX compliance;     // count x count
+  } seen_ahead_;
   std::vector<int> order_;     // slots at the last factor(), but those done ahead
   std::vector<double> factor_; // their dense Cholesky factor, column-major, order_.size() squared
 };

@@ -62,6 +62,7 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   std::vector<char> kept(window.slots(), 0);
   for (int unknown : {1, 3, 4, 8, 9, 10, 11, 12, 17})
     kept[window.slot_of(far + unknown)] = 1;
+  kept[window.slot_of(n - 1)] = 1; // of the contact; the others see what is done ahead
   if (ahead == 2)
     kept[window.slot_of(far + 9)] = 0;
   if (ahead > 0)
@@ -128,6 +129,11 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
     const MatrixX compliance = by_unknown.transpose() * inverse * by_unknown;
     CHECK((condensed.compliance - compliance).norm() < 1e-11 * compliance.norm());
     CHECK((condensed.response - by_unknown.transpose() * exact).norm() < 1e-11 * (by_unknown.norm() * exact.norm()));
+    // What the functionals see of the part done ahead is kept; another right-hand side and half of them ask anew.
+    CHECK(window.condense(functionals, seen.col(0)).compliance == condensed.compliance);
+    const SchurWindow::Condensed halved = window.condense(0.5 * functionals, 2 * seen.col(0));
+    CHECK((halved.compliance - 0.25 * condensed.compliance).norm() < 1e-13 * condensed.compliance.norm());
+    CHECK((halved.response - condensed.response).norm() < 1e-12 * condensed.response.norm());
   }
 }
 

@@ -505,7 +505,7 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
   CHECK(second.sound);
 }
 
-TEST_CASE("--open shows the page in the user's browser") {
+TEST_CASE("Serving with --open shows the page in the user's browser") {
   const TemporaryFolder folder;
   const std::filesystem::path opener =
       write_file(folder.path() / "xdg-open", "#!/bin/sh\nprintf %s \"$1\" > \"$0.url\"\n");

@@ -1,0 +1,76 @@
+#include "solvers/dense_products.hpp"
+
+extern "C" {
+void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha,
+            const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c,
+            const int* ldc);
+void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a,
+            const int* lda, const double* beta, double* c, const int* ldc);
+void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
+            const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dtrmm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
+            const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dtrsv_(const char* uplo, const char* trans, const char* diag, const int* n, const double* a, const int* lda,
+            double* x, const int* incx);
+void dtrmv_(const char* uplo, const char* trans, const char* diag, const int* n, const double* a, const int* lda,
+            double* x, const int* incx);
+void dgemv_(const char* trans, const int* m, const int* n, const double* alpha, const double* a, const int* lda,
+            const double* x, const int* incx, const double* beta, double* y, const int* incy);
+}
+
+namespace spherecut::solvers {
+
+namespace {
+constexpr int unit = 1; // one column goes without the copies that pay for many
+} // namespace
+
+MatrixX gram(const MatrixX& a) {
+  const int n = static_cast<int>(a.cols()), k = static_cast<int>(a.rows());
+  MatrixX product = MatrixX::Zero(n, n);
+  if (n == 0 || k == 0)
+    return product;
+  const double one = 1, none = 0;
+  dsyrk_("L", "T", &n, &k, &one, a.data(), &k, &none, product.data(), &n);
+  product.triangularView<Eigen::StrictlyUpper>() = product.transpose();
+  return product;
+}
+
+void add_product(double factor, const MatrixX& a, bool transposed, const MatrixX& b, MatrixX& c) {
+  const int m = static_cast<int>(c.rows()), n = static_cast<int>(c.cols()), k = static_cast<int>(b.rows()),
+            lda = static_cast<int>(a.rows());
+  if (m == 0 || n == 0 || k == 0)
+    return;
+  const double one = 1;
+  if (n == 1) {
+    const int columns = static_cast<int>(a.cols());
+    dgemv_(transposed ? "T" : "N", &lda, &columns, &factor, a.data(), &lda, b.data(), &unit, &one, c.data(), &unit);
+    return;
+  }
+  dgemm_(transposed ? "T" : "N", "N", &m, &n, &k, &factor, a.data(), &lda, b.data(), &k, &one, c.data(), &m);
+}
+
+void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& b) {
+  const int rows = static_cast<int>(b.rows()), columns = static_cast<int>(b.cols());
+  if (rows == 0 || columns == 0)
+    return;
+  if (columns == 1) {
+    dtrsv_("L", transposed ? "T" : "N", "N", &rows, lower, &lda, b.data(), &unit);
+    return;
+  }
+  const double one = 1;
+  dtrsm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower, &lda, b.data(), &rows);
+}
+
+void triangular_product(bool transposed, const MatrixX& lower, MatrixX& b) {
+  const int rows = static_cast<int>(b.rows()), columns = static_cast<int>(b.cols());
+  if (rows == 0 || columns == 0)
+    return;
+  if (columns == 1) {
+    dtrmv_("L", transposed ? "T" : "N", "N", &rows, lower.data(), &rows, b.data(), &unit);
+    return;
+  }
+  const double one = 1;
+  dtrmm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower.data(), &rows, b.data(), &rows);
+}
+
+} // namespace spherecut::solvers

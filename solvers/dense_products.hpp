@@ -1,0 +1,17 @@
+// Products of large dense matrices by BLAS: Eigen's own run on the vectors that every x86-64 has.
+#pragma once
+
+#include "topology/types.hpp"
+
+namespace spherecut::solvers {
+
+/// A^T A; all of it is set.
+[[nodiscard]] MatrixX gram(const MatrixX& a);
+/// C += factor A B, or factor A^T B. The shapes must fit.
+void add_product(double factor, const MatrixX& a, bool transposed, const MatrixX& b, MatrixX& c);
+/// Columns of B become L^-1 B, or L^-T B, of a lower triangle with leading dimension `lda`.
+void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& b);
+/// B = L B, or L^T B.
+void triangular_product(bool transposed, const MatrixX& lower, MatrixX& b);
+
+} // namespace spherecut::solvers
