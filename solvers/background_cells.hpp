@@ -71,8 +71,8 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
                                              const BoundingBox* region = nullptr);
 
 /// The same over both faces of an incision, as far as they lie inside the body: positions lip_offset spacings off the
-/// sheet, normals out of the material. Triangles smaller than an equilateral one of edge `centroid_below` spacings carry
-/// their centroid alone.
+/// sheet, normals out of the material. Triangles smaller than an equilateral one of edge `centroid_below` spacings
+/// carry their centroid alone.
 std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge = 0.5,
                                          double centroid_below = 0.36, const BoundingBox* region = nullptr);
 

@@ -131,6 +131,11 @@ void Hub::greet(int client, Client& from) {
   send(client, holder_text(holder_));
   if (tear_.state != TearState::none)
     send(client, tear_text(tear_));
+  if (session_->replays())
+    send(client, replay_text(true, replaying_));
+  if (recording_)
+    send(client,
+         recording_text(true, {session_->recorded_to().filename().string(), 0}, session_->tick().record.device.time));
   if (building_ != nullptr)
     send(client, building_text(building_->what));
 }

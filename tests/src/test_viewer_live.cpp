@@ -480,6 +480,8 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     std::filesystem::create_symlink(outside, served.folder().path() / "recordings" / "session-1.recording");
     first.say({{"type", "record"}, {"on", true}});
     REQUIRE(first.until([&] { return first.recording["on"] == true; }));
+    Viewer later(served.port());
+    CHECK(later.until([&] { return !later.recording.is_null() && later.recording["on"] == true; }));
     first.pose({0, 0, 0.035});
     first.pose({0, 0, 0.028});
     REQUIRE(first.until([&] { return force_of(first) > 0.01; }));
@@ -498,6 +500,8 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     first.say({{"type", "replay"}, {"name", name}});
     REQUIRE(first.until([&] { return first.replay["on"] == true; }));
     REQUIRE(first.until([&] { return force_of(first) > 0.01 && (first.value<std::uint32_t>(44) & 4U) != 0; }));
+    Viewer last(served.port()); // who comes meanwhile is told
+    CHECK(last.until([&] { return !last.replay.is_null() && last.replay["name"] == name; }));
     first.say({{"type", "release"}});
     REQUIRE(second.until([&] { return second.holder["id"].is_null(); }));
   }
