@@ -69,6 +69,9 @@ VectorX GrowingCut::State::tractions() const {
 const DisplacementMean& GrowingCut::State::mean(int node) const {
   if (removed[node] != 0)
     throw InputError(fmt::format("node {} has been removed by the cut", node));
+  const auto candidate = std::find(options.contact.begin(), options.contact.end(), node);
+  if (candidate != options.contact.end())
+    return contact[static_cast<std::size_t>(candidate - options.contact.begin())];
   if (shares == nullptr)
     shares = std::make_unique<Shares>(problem, removed);
   auto known = means.find(node);
