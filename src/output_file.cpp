@@ -26,7 +26,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::write(std::string_view bytes) {
-  const auto whole = static_cast<off_t>(bytes.size());
+  const auto whole = static_cast<std::int64_t>(bytes.size());
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
     if (written < 0 && errno == EINTR)

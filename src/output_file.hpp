@@ -3,9 +3,9 @@
 
 #include "topology/errors.hpp"
 
+#include <cstdint>
 #include <filesystem>
 #include <string_view>
-#include <sys/types.h>
 
 namespace spherecut::app {
 
@@ -33,7 +33,7 @@ class OutputFile {
   [[noreturn]] void fail(const char* what) const;
   std::filesystem::path file_;
   int descriptor_ = -1;
-  off_t size_ = 0; // bytes that were written whole
+  std::int64_t size_ = 0; // bytes that were written whole
 };
 
 /// Writes the whole file beside its place and moves it there: a reader sees the old or the new, never a part. Throws
