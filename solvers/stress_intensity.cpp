@@ -1,6 +1,7 @@
 #include "solvers/stress_intensity.hpp"
 
 #include "solvers/elastic_body.hpp"
+#include "solvers/inset_integral.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Dense>
@@ -174,16 +175,15 @@ struct GaussRule {
   std::array<double, 2> place{-0.5773502691896257, 0.5773502691896257};
 };
 
-} // namespace
-
 // With xi = q e the virtual shift of the front (e ahead, q = 1 at the front and 0 on the outside of the tube),
 //   I Q = int [sigma_ij v_i,k + tau_ij u_i,k - sigma_mn v_m,n delta_kj] xi_k,j dV + int (tau_ij,j u_i,k - b_i v_i,k)
 //   xi_k dV
 //         - int_faces (t_i v_i,k + tau_ij n_j u_i,k) xi_k dS,          Q = int q ds along the front,
 // u, sigma the field, v, tau = C grad v the auxiliary one, b the body force, t the traction on the faces, n out of the
 // material. v keeps its components in axes that turn with the front: tau is not quite in equilibrium then.
-Intensities interaction_integral(const Discretisation& body, const Field& field, const FrontFrame& front,
-                                 const InteractionOptions& options) {
+// Within `inset_spacings` of the surface of the body xi fades to nothing (0: it does not, and the tube must not leave).
+Intensities integral_over(const Discretisation& body, const Field& field, const FrontFrame& front,
+                          const InteractionOptions& options, double inset_spacings) {
   const topology::Incision& incision = incision_of(body);
   const Problem& problem = body.problem();
   const Material& material = problem.material;
@@ -201,8 +201,30 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
     const double t = s / half_length;
     return std::pair((1 - t * t) * (1 - t * t), -4 * t * (1 - t * t) / half_length);
   };
+  const double inset = inset_spacings * h;
+  struct Cover {
+    double share = 1;
+    Vector3 gradient = Vector3::Zero(); // 1/m
+  };
+  const auto cover = [&](const Vector3& x) { // of the shift near the surface of the body, where it has to vanish
+    Cover result;
+    if (!(inset > 0))
+      return result;
+    const double t = -problem.domain->signed_distance(x) / inset;
+    if (t >= 1)
+      return result;
+    result.share = t > 0 ? t * t * (3 - 2 * t) : 0;
+    if (t > 0)
+      result.gradient = -6 * t * (1 - t) / inset * problem.domain->normal(x);
+    return result;
+  };
+  if (inset > 0 && -problem.domain->signed_distance(front.point) < 0.2 * inset)
+    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m is {:.3g} m from the "
+                                 "surface; allowed: {:.3g} m",
+                                 front.point.x(), front.point.y(), front.point.z(),
+                                 -problem.domain->signed_distance(front.point), 0.2 * inset));
   for (const double s : {-half_length, half_length})
-    for (int c = 0; c < 8; ++c)
+    for (int c = 0; c < 8 && inset == 0; ++c)
       if (tube.at(outer * std::cos(c * pi / 4), outer * std::sin(c * pi / 4), s).leaves(*problem.domain))
         throw InputError(
             fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
@@ -233,7 +255,7 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
     return (x - face->point).dot(face->normal) >= 0 ? 1.0 : -1.0;
   };
   each_section([&](double s, double ds, double r, double dr) {
-    const auto [q_r, dq_r] = fade(r);
+    const auto [fade_r, dq_r] = fade(r);
     const auto [q_s, dq_s] = bump(s);
     for (int c = 0; c < 2 * cells_around; ++c) {
       const int cell = c / 2;
@@ -244,13 +266,19 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
       if (ahead < 0 && std::abs(above) < -ahead)
         if (const double side = side_of(place.position, r, above); side * above < 0)
           above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
+      const Cover covered = cover(place.position);
+      if (covered.share == 0)
+        continue;
+      const double q_r = fade_r * covered.share;
       const PointState state = body.at(place.position, field);
       const Matrix3 stress = place.axes.transpose() * state.stress * place.axes;
       const Matrix3 gradient = place.axes.transpose() * state.gradient * place.axes;
       const double weight = r * (pi / cells_around) * ds * dr * place.stretch;
       // Gradient of xi = q e in the axes of the place; e turns along the front.
       Matrix3 shift = Matrix3::Zero();
-      shift.row(0) = Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta), q_r * dq_s / place.stretch);
+      shift.row(0) = covered.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta),
+                                             fade_r * dq_s / place.stretch) +
+                     fade_r * q_s * place.axes.transpose() * covered.gradient;
       shift(2, 2) = q_r * q_s * tube.curvature() / place.stretch;
       for (int m = 0; m < 3; ++m) {
         const TipField local = tip_field(material, modes[m], ahead, above);
@@ -276,6 +304,9 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
       Tube::Place place = tube.at(-r, side * off, s);
       if (const auto face = incision.closest(tube.at(-r, 0, s).position, 0.5 * r); face && !face->on_border)
         place.position = face->point + side * off * face->normal;
+      const double q_r = fade_r * cover(place.position).share;
+      if (q_r == 0)
+        continue;
       const Vector3 outward = -side * front.normal;
       Vector3 traction = Vector3::Zero();
       if (problem.loads.lip_traction)
@@ -292,11 +323,28 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
   });
   double total = 0; // of the bump, by the same rule
   for (int a = 0; a < cells_along; ++a)
-    for (const double ga : gauss.place)
-      total += half_length / cells_along * bump(half_length * ((2 * a + 1 + ga) / cells_along - 1)).first;
+    for (const double ga : gauss.place) {
+      const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1);
+      total += half_length / cells_along * bump(s).first * cover(tube.at(0, 0, s).position).share;
+    }
   integral /= total;
   const double plane = plane_strain_modulus(material);
   return {0.5 * plane * integral[0], 0.5 * plane * integral[1], material.shear_modulus() * integral[2]};
+}
+
+} // namespace
+
+Intensities interaction_integral(const Discretisation& body, const Field& field, const FrontFrame& front,
+                                 const InteractionOptions& options) {
+  return integral_over(body, field, front, options, 0);
+}
+
+Intensities inset_integral(const Discretisation& body, const Field& field, const FrontFrame& front, double inset,
+                           const InteractionOptions& options) {
+  if (!(inset > 0) || !std::isfinite(inset))
+    throw InputError(
+        fmt::format("stress intensity: a shift that fades over {} node spacings; it must be positive", inset));
+  return integral_over(body, field, front, options, inset);
 }
 
 } // namespace spherecut::solvers

@@ -1,5 +1,6 @@
 #include "solvers/tearing.hpp"
 
+#include "solvers/inset_integral.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -37,7 +38,12 @@ double spacing_near(const Problem& problem, const Vector3& x) {
   return spacing;
 }
 
-/// By the integral over the usual tube, or a smaller one; false when neither fits.
+constexpr double deepest_inset = 1; // of the tube's shift from the surface, in units of the spacing
+constexpr double least_inset = 0.3; // nearer to the surface nodes do not resolve the field
+constexpr int along_inset = 8;      // points along the front where the shift varies fast
+
+/// By the integral over the usual tube, or a smaller one, or what of the usual one lies in the body; false when the
+/// front is too near to the surface for any.
 bool intensities_at(const Discretisation& body, const Field& field, FrontState& state) {
   for (const InteractionOptions& tube :
        {InteractionOptions{}, InteractionOptions{.outer = 2, .half_length = 0.5},
@@ -47,6 +53,17 @@ bool intensities_at(const Discretisation& body, const Field& field, FrontState& 
       return true;
     } catch (const InputError&) { // the tube leaves the body, or the front turns within it
     }
+  }
+  const Problem& problem = body.problem();
+  const double depth = -problem.domain->signed_distance(state.frame.point) / spacing_near(problem, state.frame.point);
+  if (depth < least_inset)
+    return false;
+  try {
+    state.intensities =
+        inset_integral(body, field, state.frame, std::min(depth, deepest_inset),
+                       {.half_length = std::min(InteractionOptions{}.half_length, depth), .along = along_inset});
+    return true;
+  } catch (const InputError&) { // too near to the surface, or the front turns within the tube
   }
   return false;
 }

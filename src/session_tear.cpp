@@ -182,7 +182,9 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
       warn("grip", fmt::format("t = {:g} s: the piece in the grasper has come off", sample.time));
     }
     sprinkle(&model_.sprinkling.nodes, next);
-    build(next);
+    const std::vector<int> near = tool_in_reach() ? candidates(next) : std::vector<int>{};
+    assemble(next, {}, near);
+    condense(near, next, true); // the next increment has a body of its own
     solve(sample, next);
     model_ = std::move(next);
     lost_grip_ = lost_grip_ || (grasp && !grasp_);

@@ -1,3 +1,4 @@
+#include "solvers/inset_integral.hpp"
 #include "solvers/stress_intensity.hpp"
 
 #include "solvers/elastic_body.hpp"
@@ -75,6 +76,33 @@ TEST_CASE("Both extractions find the intensities of an exact field in mixed mode
   fine.radial = 40;
   fine.around = 64;
   CHECK((interaction_integral(body, {}, *front, fine) - k).norm() < 1e-3);
+}
+
+TEST_CASE("The integral holds where its tube leaves the body, if the shift fades towards the surface",
+          "[stress_intensity]") {
+  const Intensities k(1.3, -0.7, 0.5);
+  const CutBlock block = cut_block(14, false, 1);
+  const ExactBody body(block, k);
+  int near = 0;
+  for (const topology::FrontFrame& front : front_samples(*block.incision, 0.3 * block.nodes.spacings.front())) {
+    const double depth = -block.domain->signed_distance(front.point) / block.nodes.spacings.front();
+    if (depth < 0.3 || depth > 1)
+      continue;
+    ++near;
+    INFO("depth " << depth << " spacings");
+    CHECK_THROWS_WITH(interaction_integral(body, {}, front), Catch::Contains("leaves the body"));
+    InteractionOptions options;
+    options.half_length = depth;
+    CHECK((inset_integral(body, {}, front, depth, options) - k).norm() < 0.05);
+    options.along = 12;
+    CHECK((inset_integral(body, {}, front, depth, options) - k).norm() < 0.01);
+  }
+  CHECK(near >= 2);
+  const auto front = block.incision->front_frame(block.frame.origin, 0.1);
+  REQUIRE(front); // away from the surface the fading changes nothing
+  CHECK((inset_integral(body, {}, *front, 0.5) - interaction_integral(body, {}, *front)).norm() < 1e-12);
+  CHECK_THROWS_WITH(inset_integral(body, {}, *front, 0), Catch::Contains("must be positive"));
+  CHECK_THROWS_WITH(inset_integral(body, {}, *front, 100), Catch::Contains("from the surface"));
 }
 
 TEST_CASE("The energy release rate adds up the modes", "[stress_intensity]") {
