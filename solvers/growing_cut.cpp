@@ -281,8 +281,6 @@ bool GrowingCut::State::factor_window(const std::vector<Vector3>& places) {
   for (Eigen::Index block = 0; block < std::ssize(window_node); ++block)
     if (const int node = window_node[block]; node >= 0 && window->changed(3 * static_cast<int>(block)))
       reach = std::max(reach, to_places(problem.nodes.positions[node]));
-  if (std::isfinite(reach))
-    change_reach = reach;
   if (window->is_prepared() || !std::isfinite(reach))
     return window->factor();
   const double finest = *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
@@ -628,27 +626,21 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
 double GrowingCut::prepare(const topology::SurfaceMesh& next) {
   const Stopwatch watch;
   State& s = *state_;
-  std::vector<char> kept;
-  if (s.change_reach > 0) {
-    const double finest = *std::min_element(s.problem.nodes.spacings.begin(), s.problem.nodes.spacings.end());
-    kept = s.slots_within(sample_points(next, 0, 0.5 * finest), s.change_reach + change_slack * finest);
-  } else {
-    kept.assign(s.window->slots(), 0);
-    const auto keep = [&](int node) {
-      if (const int block = s.slot[node]; block >= 0)
-        std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
-    };
-    const auto in_reach = s.reach_of(next, false);
-    for (const State::Box& box : s.boxes)
-      if (!box.cells.empty() && in_reach(box.box.centre, box.box.half.norm()))
-        for (const CellShapes& cell : box.cells)
-          for (int node : cell.nodes)
-            keep(node);
-    for (const DisplacementMean& mean : s.held)
-      if (in_reach(mean.centroid, 0.5 * s.radius_at(mean.centroid)))
-        for (int node : mean.nodes)
+  std::vector<char> kept(s.window->slots(), 0);
+  const auto keep = [&](int node) {
+    if (const int block = s.slot[node]; block >= 0)
+      std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
+  };
+  const auto in_reach = s.reach_of(next, false);
+  for (const State::Box& box : s.boxes)
+    if (!box.cells.empty() && in_reach(box.box.centre, box.box.half.norm()))
+      for (const CellShapes& cell : box.cells)
+        for (int node : cell.nodes)
           keep(node);
-  }
+  for (const DisplacementMean& mean : s.held)
+    if (in_reach(mean.centroid, 0.5 * s.radius_at(mean.centroid)))
+      for (int node : mean.nodes)
+        keep(node);
   s.window->prepare(kept);
   return watch.seconds();
 }

@@ -30,8 +30,6 @@ inline constexpr double shares_reach = 4;
 /// A share itself changes when faces or surface nodes come this near to it, in spacings.
 inline constexpr double share_size = 2;
 
-/// Nodes change as far from the next increment as from the last one, give or take this much, in spacings.
-inline constexpr double change_slack = 0.25;
 /// How far a cut may go on, in spacings, until what was eliminated ahead has to be chosen anew.
 inline constexpr double advance_before_new = 0.5;
 
@@ -56,13 +54,12 @@ struct GrowingCut::State {
   std::vector<int> slot;        // block of three slots of every node in the window, -1 outside
   std::vector<int> window_node; // node of every block of slots, -1 for room
   int next_room = 0;
-  double change_reach = 0; // m, from what was new of the cut to the farthest node that changed; 0: none so far
-  VectorX cell_loads;      // 3N: body force and initial strain
-  VectorX first_loads;     // 3N at condensation, all loads
-  VectorX external;        // 3N as they stand, without those of prescribed displacements
-  VectorX loads;           // 3N as they stand
-  MatrixX reduced_first;   // by slots
-  mutable std::unique_ptr<Shares> shares;                  // null: not needed so far
+  VectorX cell_loads;                     // 3N: body force and initial strain
+  VectorX first_loads;                    // 3N at condensation, all loads
+  VectorX external;                       // 3N as they stand, without those of prescribed displacements
+  VectorX loads;                          // 3N as they stand
+  MatrixX reduced_first;                  // by slots
+  mutable std::unique_ptr<Shares> shares; // null: not needed so far
   mutable std::unordered_map<int, DisplacementMean> means; // by node, as they are asked for
   AssemblyReport report;                                   // of the condensation
   std::vector<Anchor> anchors;                             // by ids
