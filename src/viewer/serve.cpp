@@ -59,7 +59,8 @@ std::string url_of(const std::string& address, int port) {
 }
 
 /// Sessions come and go, each with threads of its own. With an arena for every thread, and thresholds that grow with
-/// what was freed, glibc keeps most of what the ones before had.
+/// what was freed, glibc keeps most of what the ones before had. So a server does not keep what it frees, as the other
+/// commands do (process_settings.hpp).
 void keep_memory_together() {
   mallopt(M_ARENA_MAX, 2);
   mallopt(M_MMAP_THRESHOLD, 1 << 20);  // bytes; also keeps it from growing
