@@ -160,7 +160,7 @@ VectorX GrowingBody::holding_forces(const VectorX& coefficients, const VectorX& 
 
 /// Coefficients of all nodes the system knows, with one correction against the rounding of the penalties.
 VectorX GrowingBody::solved(const VectorX& loads, const VectorX& prescribed) const {
-  const VectorX right = loads + holding_forces(VectorX::Zero(loads.size()), prescribed);
+  VectorX right = loads + holding_forces(VectorX::Zero(loads.size()), prescribed);
   if (right.isZero(0)) // held at rest and without loads: often
     return right;
   VectorX coefficients = cut_->respond(right);
