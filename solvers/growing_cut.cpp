@@ -279,7 +279,8 @@ bool GrowingCut::State::factor_window(const std::vector<Vector3>& places) {
   const Nearness to_places(places);
   double reach = 0;
   for (Eigen::Index block = 0; block < std::ssize(window_node); ++block)
-    if (const int node = window_node[block]; node >= 0 && window->changed(3 * static_cast<int>(block)))
+    if (const int node = window_node[block], first = 3 * static_cast<int>(block);
+        node >= 0 && (window->changed(first) || window->changed(first + 1) || window->changed(first + 2)))
       reach = std::max(reach, to_places(problem.nodes.positions[node]));
   if (window->is_prepared() || !std::isfinite(reach))
     return window->factor();

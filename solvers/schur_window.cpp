@@ -25,10 +25,9 @@ namespace {
 /// more.
 constexpr double singular_pivot = 1e-13;
 
-/// Dense Cholesky factor in place.
-void cholesky(const std::vector<int>& slots, std::vector<double>& square) {
+/// Dense Cholesky factor in place. Pivots are judged by the diagonal of the whole S, before anything was eliminated.
+void cholesky(const std::vector<int>& slots, const MatrixX& schur, std::vector<double>& square) {
   const int n = static_cast<int>(slots.size());
-  const VectorX diagonal = Eigen::Map<const MatrixX>(square.data(), n, n).diagonal();
   int info = 0;
   if (n > 0)
     dpotrf_("L", &n, square.data(), &n, &info);
@@ -38,7 +37,7 @@ void cholesky(const std::vector<int>& slots, std::vector<double>& square) {
                                      n, info > 0 ? slots[info - 1] : info));
   for (Eigen::Index j = 0; j < n; ++j)
     if (const double pivot = square[static_cast<std::size_t>(j * n + j)];
-        !(pivot * pivot > singular_pivot * diagonal[j]))
+        !(pivot * pivot > singular_pivot * schur(slots[j], slots[j])))
       throw NumericalError(fmt::format(
           "the window of {} unknowns is singular to rounding (slot {}): a piece that nothing holds", n, slots[j]));
 }
@@ -89,6 +88,9 @@ double SchurWindow::condition_estimate() const {
 void SchurWindow::activate(int slot) {
   deactivate(slot);
   active_[slot] = 1;
+  // What is done ahead knows the slots that were free then, not one that has changed hands since.
+  if (!ahead_.empty() && (kept_place_[slot] < 0 || active_ahead_[slot] != 0))
+    ahead_.clear();
 }
 
 void SchurWindow::deactivate(int slot) {
@@ -121,6 +123,7 @@ void SchurWindow::prepare(const std::vector<char>& kept) {
   seen_ahead_ = {};
   kept_.clear();
   kept_place_.assign(slots(), -1);
+  active_ahead_ = active_;
   for (int slot = 0; slot < slots(); ++slot) {
     const bool free_room = active_[slot] == 0 && slot >= changing_;
     if (kept[slot] != 0 || free_room) {
@@ -133,7 +136,7 @@ void SchurWindow::prepare(const std::vector<char>& kept) {
   std::fill(changed_.begin(), changed_.end(), 0);
   gather(ahead_, ahead_factor_);
   try {
-    cholesky(ahead_, ahead_factor_);
+    cholesky(ahead_, schur_, ahead_factor_);
   } catch (...) {
     ahead_.clear();
     throw;
@@ -175,7 +178,7 @@ bool SchurWindow::factor() {
         to[i] -= less[kept_place_[order_[i]]];
     }
   }
-  cholesky(order_, factor_);
+  cholesky(order_, schur_, factor_);
   return usable;
 }
 

@@ -95,10 +95,11 @@ class SchurWindow {
   int far_, changing_, room_, contact_;
   double norm_; // of K
   std::unique_ptr<OrderedCholesky> cholesky_;
-  MatrixX trailing_;          // L_WW at construction
-  MatrixX schur_;             // lower triangle, by slots
-  std::vector<char> active_;  // by slot
-  std::vector<char> changed_; // by slot, since factor()
+  MatrixX trailing_;               // L_WW at construction
+  MatrixX schur_;                  // lower triangle, by slots
+  std::vector<char> active_;       // by slot
+  std::vector<char> changed_;      // by slot, since factor()
+  std::vector<char> active_ahead_; // by slot, at prepare()
   // Done ahead: S of the slots `ahead_` is ahead_factor_ squared; coupling_ (kept x ahead) are the rows of the kept
   // slots below it, and their own part of S is to be less by coupling_ coupling_^T, `eliminated_`.
   std::vector<int> ahead_, kept_, kept_place_; // slots; place of a slot in kept_, -1 outside

@@ -110,7 +110,8 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
 namespace {
 
 /// Gathers centroids of small triangles of one sheet: those that lie together and face the same way make one point,
-/// with their whole area vector, on the sheet under their mean.
+/// with their whole area vector, on the sheet under their mean or, where another part of the cut is nearer to that, at
+/// the nearest of them.
 class SmallTriangles {
  public:
   explicit SmallTriangles(const topology::Incision& incision) : incision_(incision) {}
@@ -126,39 +127,46 @@ class SmallTriangles {
     for (;; ++key[5]) { // of the groups at this place the first that faces this way
       const auto [found, is_new] = group_at_.try_emplace(key, groups_.size());
       if (is_new)
-        groups_.push_back({point.normal, Vector3::Zero(), Vector3::Zero(), 0, spacing, edge, sheet, 0});
+        groups_.push_back({{}, Vector3::Zero(), Vector3::Zero(), 0, spacing, edge, sheet});
       Group& group = groups_[found->second];
-      if (group.normal.dot(point.normal) < same_way)
+      if (!group.members.empty() && group.members.front().normal.dot(point.normal) < same_way)
         continue;
       group.moment += point.weight * point.position;
       group.area += point.weight * point.normal;
       group.weight += point.weight;
-      ++group.count;
+      group.members.push_back(point);
       return;
     }
   }
 
-  /// Calls push(point on the sheet, spacing) for every group in the order in which they were begun.
+  /// Calls push(point on the sheet, normal of the sheet there, spacing) for every group in the order in which they were
+  /// begun. The normal of the point is that of the area.
   template <typename Push>
   void for_each(const Push& push) const {
     for (const Group& group : groups_) {
       SurfacePoint point{group.moment / group.weight, group.area.normalized(), group.area.norm()};
-      if (group.count > 1)
-        if (const auto face = incision_.closest(point.position, group.edge); face && face->sheet == group.sheet) {
-          point.position = face->point;
-          if (face->normal.dot(point.normal) > 0) // off the triangle that it lies on, then
-            point.normal = face->normal;
-        }
-      push(point, group.spacing);
+      const auto face = incision_.closest(point.position, group.edge);
+      if (face && face->sheet == group.sheet && face->normal.dot(point.normal) > same_way) {
+        point.position = face->point;
+        push(point, face->normal, group.spacing);
+        continue;
+      }
+      const SurfacePoint& nearest =
+          *std::min_element(group.members.begin(), group.members.end(), [&](const auto& a, const auto& b) {
+            return (a.position - point.position).squaredNorm() < (b.position - point.position).squaredNorm();
+          });
+      point.position = nearest.position;
+      push(point, nearest.normal, group.spacing);
     }
   }
 
  private:
   static constexpr double largest_group = 0.5, finest = 0.25, same_way = 0.95; // spacings, spacings; a cosine
   struct Group {
-    Vector3 normal, moment, area;
+    std::vector<SurfacePoint> members;
+    Vector3 moment, area;
     double weight, spacing, edge;
-    int sheet, count;
+    int sheet;
   };
   const topology::Incision& incision_;
   std::map<std::array<long, 6>, std::size_t> group_at_;
@@ -174,10 +182,9 @@ std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, con
   std::vector<SurfacePoint> points, face;
   std::vector<Corners> pending;
   SmallTriangles small_triangles(incision);
-  const auto push_both_sides = [&](const SurfacePoint& point, double spacing) {
+  const auto push_both_sides = [&](const SurfacePoint& point, const Vector3& off, double spacing) {
     for (const double side : {1.0, -1.0})
-      points.push_back(
-          {point.position + side * lip_offset * spacing * point.normal, -side * point.normal, point.weight});
+      points.push_back({point.position + side * lip_offset * spacing * off, -side * point.normal, point.weight});
   };
   for (int s = 0; s < std::ssize(incision.sheets()); ++s) {
     const topology::SurfaceMesh& sheet = incision.sheets()[s];
@@ -204,7 +211,7 @@ std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, con
           if (is_small)
             small_triangles.add(s, point, spacing);
           else
-            push_both_sides(point, spacing);
+            push_both_sides(point, point.normal, spacing);
       }
     }
   }
