@@ -328,8 +328,8 @@ Intensities integral_over(const Discretisation& body, const Field& field, const 
       total += half_length / cells_along * bump(s).first * cover(tube.at(0, 0, s).position).share;
     }
   if (!(total > 0))
-    throw NumericalError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
-                                     2 * half_length));
+    throw InputError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
+                                 2 * half_length));
   integral /= total;
   const double plane = plane_strain_modulus(material);
   return {0.5 * plane * integral[0], 0.5 * plane * integral[1], material.shear_modulus() * integral[2]};

@@ -39,7 +39,7 @@ double spacing_near(const Problem& problem, const Vector3& x) {
 }
 
 constexpr double deepest_inset = 1; // of the tube's shift from the surface, in units of the spacing
-constexpr double least_inset = 0.3; // nearer to the surface nodes do not resolve the field
+constexpr double least_inset = 0.5; // nearer to the surface nodes do not resolve the field
 constexpr int along_inset = 8;      // points along the front where the shift varies fast
 
 /// By the integral over the usual tube, or a smaller one, or what of the usual one lies in the body; false when the
