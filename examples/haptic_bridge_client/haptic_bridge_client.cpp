@@ -49,14 +49,15 @@ int main(int argc, char** argv) {
   double start[3] = {}, peak = 0;
   const double none[3] = {};
   long ticks = 0, heard = 0, silent = 0;
+  std::uint64_t session = 0; // the token of the last one
   const double seconds = argc > 2 ? std::atof(argv[2]) : 10;
   for (auto due = std::chrono::steady_clock::now(); ticks < 1000 * seconds; ++ticks) {
     std::this_thread::sleep_until(due += std::chrono::milliseconds(1));
     for (Force next; recv(link, &next, sizeof next, MSG_DONTWAIT) == sizeof next;)
       if (next.magic == pose.magic && next.version == 1 && next.kind == 4) {
-        if (next.token != pose.token) // a new session: the tool is moved on from where it waits
+        if (next.token != session) // a new session: the tool is moved on from where it waits
           std::memcpy(start, next.position, sizeof start);
-        pose.token = next.token;
+        pose.token = session = next.token;
         force = next;
         silent = 0;
         ++heard;
