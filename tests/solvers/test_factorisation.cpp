@@ -138,6 +138,39 @@ TEST_CASE("Singular and indefinite matrices are refused") {
   CHECK_THROWS_AS(solvers::factor_symmetric(lower(empty_row)), NumericalError);
 }
 
+TEST_CASE("A matrix of 3 x 3 blocks is factored as the same matrix without blocks") {
+  const int nodes = 70, size = 3 * nodes;
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  MatrixX blocks = MatrixX::Zero(size, size);
+  for (int node = 0; node < nodes; ++node)
+    for (const int other : {node, node - 1, node - 9})
+      if (other >= 0)
+        blocks.block<3, 3>(3 * node, 3 * other) = MatrixX::NullaryExpr(3, 3, [&] { return uniform(random); });
+  const MatrixX symmetric = blocks * blocks.transpose() + MatrixX::Identity(size, size);
+  const MatrixX right = random_right(size, 4), exact = symmetric.llt().solve(right);
+  const MatrixX factor = symmetric.llt().matrixL();
+  // One more unknown that is coupled to nothing is no block: the same factor from the ordinary analysis.
+  MatrixX longer = MatrixX::Identity(size + 1, size + 1);
+  longer.topLeftCorner(size, size) = symmetric;
+  const auto whole = solvers::factor_ordered(lower(longer));
+  SparseMatrix full_diagonals = lower(symmetric);
+  for (int node = 0; node < nodes; ++node)
+    for (int a = 0; a < 3; ++a)
+      for (int b = a + 1; b < 3; ++b)
+        full_diagonals.coeffRef(3 * node + a, 3 * node + b) = symmetric(3 * node + a, 3 * node + b);
+  full_diagonals.makeCompressed();
+  for (const SparseMatrix& matrix : {lower(symmetric), full_diagonals}) {
+    const auto cholesky = solvers::factor_ordered(matrix);
+    CHECK(cholesky->nonzeros() + 1 == whole->nonzeros());
+    CHECK((cholesky->solve(right) - exact).norm() < 1e-10 * exact.norm());
+    CHECK((cholesky->trailing(100) - factor.bottomRightCorner(100, 100)).norm() < 1e-10 * factor.norm());
+  }
+  MatrixX indefinite = symmetric;
+  indefinite(40, 40) = -1;
+  CHECK_THROWS_WITH(solvers::factor_ordered(lower(indefinite)), Catch::Contains("(column 40 of 210"));
+}
+
 TEST_CASE("A fill-reducing ordering is a permutation and saves fill on a grid") {
   const int side = 24, count = side * side;
   std::vector<int> start{0}, neighbours;
