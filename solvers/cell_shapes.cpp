@@ -8,8 +8,6 @@
 
 namespace spherecut::solvers {
 
-static_assert(most_cell_points <= stiffness_kernel_points);
-
 void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes& cell) {
   cell.points = static_cast<int>(points.size());
   cell.nodes.clear();
@@ -26,10 +24,6 @@ void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes
       }
   }
   std::sort(cell.nodes.begin(), cell.nodes.end());
-  if (std::ssize(cell.nodes) > stiffness_kernel_rows)
-    throw NumericalError(fmt::format("a background cell is covered by {} nodes; at most {} are handled: the node "
-                                     "spacing changes too abruptly",
-                                     cell.nodes.size(), stiffness_kernel_rows));
   for (int k = 0; k < std::ssize(cell.nodes); ++k)
     place_[cell.nodes[k]] = k;
   cell.reached.assign(cell.nodes.size(), 0);
@@ -50,72 +44,6 @@ void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes
   }
   for (int node : cell.nodes)
     place_[node] = -1;
-}
-
-bool CellCluster::has_room_for(const CellShapes& cell) const {
-  if (parts_.empty())
-    return true;
-  if (points_ + cell.points > stiffness_kernel_points)
-    return false;
-  const auto fresh = std::count_if(cell.nodes.begin(), cell.nodes.end(), [&](int node) { return place_[node] < 0; });
-  return std::ssize(nodes_) + fresh <= stiffness_kernel_rows;
-}
-
-void CellCluster::add(const CellShapes& cell, double sign, int id) {
-  cells_.push_back(id);
-  for (std::size_t k = 0; k < cell.nodes.size(); ++k) {
-    int& place = place_[cell.nodes[k]];
-    if (place < 0) {
-      place = static_cast<int>(nodes_.size());
-      nodes_.push_back(cell.nodes[k]);
-      reached_.push_back(0);
-    }
-    reached_[place] |= std::uint64_t{cell.reached[k]} << points_;
-  }
-  parts_.push_back({&cell, sign});
-  signs_.insert(signs_.end(), cell.points, sign);
-  points_ += cell.points;
-}
-
-void CellCluster::clear() {
-  for (int node : nodes_)
-    place_[node] = -1;
-  parts_.clear();
-  cells_.clear();
-  nodes_.clear();
-  reached_.clear();
-  signs_.clear();
-  points_ = 0;
-}
-
-void CellCluster::gather(const std::vector<int>& rank) {
-  order_.clear();
-  for (int node : nodes_)
-    order_.emplace_back(rank[node], node);
-  std::sort(order_.begin(), order_.end());
-  std::vector<std::uint64_t> reached(reached_.size());
-  for (std::size_t k = 0; k < order_.size(); ++k) {
-    const int node = order_[k].second;
-    reached[k] = reached_[place_[node]];
-    nodes_[k] = node;
-  }
-  reached_ = std::move(reached);
-  for (std::size_t k = 0; k < nodes_.size(); ++k)
-    place_[nodes_[k]] = static_cast<int>(k);
-  stride_ = (static_cast<int>(nodes_.size()) + 7) / 8 * 8;
-  gradients_.assign(static_cast<std::size_t>(3 * points_) * stride_, 0.0);
-  double* to = gradients_.data();
-  for (const Part& part : parts_) {
-    const CellShapes& cell = *part.cell;
-    const int rows = 3 * cell.points, count = static_cast<int>(cell.nodes.size());
-    for (int k = 0; k < count; ++k)
-      order_[k].first = place_[cell.nodes[k]];
-    for (int row = 0; row < rows; ++row, to += stride_) {
-      const double* from = cell.gradients.data() + static_cast<std::ptrdiff_t>(row) * cell.stride;
-      for (int k = 0; k < count; ++k)
-        to[order_[k].first] = from[k];
-    }
-  }
 }
 
 std::vector<int> cells_by_place(const BackgroundCells& cells) {

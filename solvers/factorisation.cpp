@@ -9,6 +9,7 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <umfpack.h>
@@ -402,14 +403,22 @@ class LuFactorisation final : public Factorisation {
 
 std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours) {
   const int n = static_cast<int>(start.size()) - 1;
+  // The lower triangle: rows are written in ascending order, so every column's are.
   SparseMatrix graph(n, n);
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(neighbours.size());
+  std::vector<int> entries(n, 0);
   for (int row = 0; row < n; ++row)
     for (int k = start[row]; k < start[row + 1]; ++k)
       if (neighbours[k] <= row)
-        entries.emplace_back(row, neighbours[k], 1.0);
-  graph.setFromTriplets(entries.begin(), entries.end());
+        ++entries[neighbours[k]];
+  graph.resizeNonZeros(std::accumulate(entries.begin(), entries.end(), 0));
+  int* const outer = graph.outerIndexPtr();
+  std::partial_sum(entries.begin(), entries.end(), outer + 1);
+  std::copy(outer, outer + n, entries.begin());
+  for (int row = 0; row < n; ++row)
+    for (int k = start[row]; k < start[row + 1]; ++k)
+      if (neighbours[k] <= row)
+        graph.innerIndexPtr()[entries[neighbours[k]]++] = row;
+  std::fill_n(graph.valuePtr(), graph.nonZeros(), 1.0);
   CholmodCommon workspace;
   cholmod_sparse matrix = view(graph, -1);
   cholmod_factor* factor = cholmod_analyze(&matrix, &workspace.common);

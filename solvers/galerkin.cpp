@@ -14,6 +14,7 @@
 #include "solvers/dense_products.hpp"
 #include "solvers/elastic_body.hpp"
 #include "solvers/parallel.hpp"
+#include "solvers/stiffness_tiles.hpp"
 #include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
 
@@ -40,8 +41,7 @@ class Galerkin final : public ElasticBody {
     cells_ = background_cells(*problem_.domain, problem_.nodes, background, problem_.incision.get());
     hold_surface();
     evaluate_cells();
-    order_and_build_pattern(options.unheld);
-    assemble();
+    assemble(options.unheld);
     assemble_loads();
     report_.unknowns = 3 * problem_.nodes.size();
     report_.matrix_nonzeros = stiffness_.nonZeros();
@@ -125,15 +125,12 @@ class Galerkin final : public ElasticBody {
  private:
   void evaluate_cells();
   void hold_surface();
-  void order_and_build_pattern(UnheldPieces unheld);
   void treat_unheld(UnheldPieces unheld);
-  void add_to_columns(const CellCluster& cluster, int own, const StiffnessColumn& column);
-  void add_clusters();
-  void add_clusters_in_parallel();
-  /// Calls visit(cluster) for clusters of neighbouring cells, all cells in turn.
-  template <typename Visit>
-  void for_clusters(Visit&& visit) const;
-  void assemble();
+  void assemble(UnheldPieces unheld);
+  [[nodiscard]] StiffnessTiles tiles_of_cells() const;
+  void order_nodes(const std::vector<StiffnessTiles::Pair>& pairs, UnheldPieces unheld);
+  void build_matrix(std::vector<StiffnessTiles::Pair> pairs);
+  [[nodiscard]] bool is_dropped(int node) const { return !dropped_.empty() && dropped_[node] != 0; }
   void assemble_loads();
   /// The matrix is kept in elimination order; vectors outside are in node order.
   [[nodiscard]] MatrixX ordered(const MatrixX& by_node) const {
@@ -237,14 +234,13 @@ class Galerkin final : public ElasticBody {
   std::unique_ptr<SurfacePatches> patches_;
   mutable std::unordered_map<int, DisplacementMean> contact_means_; // by node, as they are asked for
   std::vector<DisplacementMean> held_;                              // one per prescribed entry
-  std::vector<char> dropped_;                   // nodes whose unknowns are taken out; empty when there are none
-  std::vector<Anchor> anchors_;                 // hold pieces that nothing else holds
-  std::vector<int> order_;                      // node of every elimination rank
-  std::vector<int> rank_;                       // elimination rank of every node
-  std::vector<CellShapes> shapes_;              // of every cell
-  std::vector<int> column_start_, column_rows_; // lower block pattern in ranks, rows >= column, ascending
-  SparseMatrix stiffness_;                      // lower triangle (diagonal blocks full), in ranks
-  std::vector<double> elastic_;                 // entries of stiffness_ without the penalties of the prescribed means
+  std::vector<char> dropped_;      // nodes whose unknowns are taken out; empty when there are none
+  std::vector<Anchor> anchors_;    // hold pieces that nothing else holds
+  std::vector<int> order_;         // node of every elimination rank
+  std::vector<int> rank_;          // elimination rank of every node
+  std::vector<CellShapes> shapes_; // of every cell
+  SparseMatrix stiffness_;         // lower triangle (diagonal blocks full), in ranks
+  std::vector<double> elastic_;    // entries of stiffness_ without the penalties of the prescribed means
   VectorX loads_;
   std::unique_ptr<OrderedCholesky> factorisation_;
 };
@@ -274,70 +270,6 @@ void Galerkin::hold_surface() {
     held_.push_back(value_at(spheres_, problem_.nodes.positions[node]));
 }
 
-template <typename Visit>
-void Galerkin::for_clusters(Visit&& visit) const {
-  CellCluster cluster(problem_.nodes.size());
-  for (int cell : cells_by_place(cells_)) {
-    if (!cluster.has_room_for(shapes_[cell])) {
-      visit(cluster);
-      cluster.clear();
-    }
-    cluster.add(shapes_[cell], 1, cell);
-  }
-  if (!cluster.empty())
-    visit(cluster);
-}
-
-void Galerkin::order_and_build_pattern(UnheldPieces unheld) {
-  // Nodes couple that have a point of some cell in common, or a mean of the held surface. Ordering nodes instead of
-  // unknowns is a ninth of the graph, and a matrix assembled in elimination order needs no permutation in the
-  // factorisation.
-  const int count = problem_.nodes.size();
-  rank_.resize(count);
-  struct Together {
-    std::vector<int> nodes;
-    std::vector<std::uint64_t> reached;
-  };
-  std::vector<Together> clusters;
-  for_clusters([&](const CellCluster& cluster) { clusters.push_back({cluster.nodes(), cluster.reached()}); });
-  for (const DisplacementMean& mean : held_)
-    clusters.push_back({mean.nodes, std::vector<std::uint64_t>(mean.nodes.size(), 1)});
-  std::vector<std::vector<std::pair<int, std::uint64_t>>> clusters_of(count); // of a node: cluster, points it supports
-  for (int c = 0; c < std::ssize(clusters); ++c)
-    for (std::size_t k = 0; k < clusters[c].nodes.size(); ++k)
-      clusters_of[clusters[c].nodes[k]].emplace_back(c, clusters[c].reached[k]);
-  std::vector<int> start(1, 0), neighbours, seen(count, -1);
-  for (int j = 0; j < count; ++j) {
-    seen[j] = j;
-    neighbours.push_back(j);
-    for (const auto& [c, own] : clusters_of[j]) {
-      const Together& cluster = clusters[c];
-      for (std::size_t k = 0; k < cluster.nodes.size(); ++k)
-        if (const int i = cluster.nodes[k]; (own & cluster.reached[k]) != 0 && seen[i] != j) {
-          seen[i] = j;
-          neighbours.push_back(i);
-        }
-    }
-    start.push_back(static_cast<int>(neighbours.size()));
-  }
-  report_.pieces = find_pieces(problem_, start, neighbours);
-  treat_unheld(unheld);
-
-  order_ = fill_reducing_ordering(start, neighbours);
-  for (int k = 0; k < count; ++k)
-    rank_[order_[k]] = k;
-  column_start_.assign(1, 0);
-  column_rows_.clear();
-  for (int j = 0; j < count; ++j) {
-    const int node = order_[j];
-    for (int slot = start[node]; slot < start[node + 1]; ++slot)
-      if (const int i = rank_[neighbours[slot]]; i == j || (i > j && (dropped_.empty() || dropped_[node] == 0)))
-        column_rows_.push_back(i);
-    std::sort(column_rows_.begin() + column_start_.back(), column_rows_.end());
-    column_start_.push_back(static_cast<int>(column_rows_.size()));
-  }
-}
-
 void Galerkin::treat_unheld(UnheldPieces unheld) {
   if (unheld == UnheldPieces::refuse)
     require_held(report_.pieces);
@@ -355,125 +287,149 @@ void Galerkin::treat_unheld(UnheldPieces unheld) {
   }
 }
 
-void Galerkin::add_to_columns(const CellCluster& cluster, int own, const StiffnessColumn& column) {
-  const std::vector<int>& nodes = cluster.nodes();
-  const int size = static_cast<int>(nodes.size());
-  const int j = rank_[nodes[own]], begin = column_start_[j], rows = column_start_[j + 1] - begin;
-  double* target[3];
-  for (int b = 0; b < 3; ++b)
-    target[b] = stiffness_.valuePtr() + 9L * begin + 3L * rows * b;
-  // Both lists of rows ascend; nodes that share no point with the column's are not in the pattern.
-  for (int k = own, row = 0; k < size; ++k) {
-    if ((cluster.reached()[own] & cluster.reached()[k]) == 0)
-      continue;
-    const int i = rank_[nodes[k]];
-    while (column_rows_[begin + row] < i)
-      ++row;
-    for (int b = 0; b < 3; ++b)
-      for (int a = 0; a < 3; ++a)
-        target[b][3 * row + a] += column.plane[3 * a + b][k];
-  }
-}
-
-void Galerkin::add_clusters() {
-  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
-  StiffnessColumn column;
-  for_clusters([&](CellCluster& cluster) {
-    cluster.gather(rank_);
-    for (int own = 0; own < std::ssize(cluster.nodes()); ++own)
-      if (dropped_.empty() || dropped_[cluster.nodes()[own]] == 0) {
-        cluster.column(own, lambda, mu, column);
-        add_to_columns(cluster, own, column);
+/// The same bits with any number of threads: every column of tiles gets its clusters in their order.
+StiffnessTiles Galerkin::tiles_of_cells() const {
+  StiffnessTiles tiles(problem_.nodes.positions);
+  const std::vector<int> order = cells_by_place(cells_);
+  const int threads = thread_count(), batch = threads == 1 ? 1 : 32;
+  std::vector<CellCluster> clusters(batch, CellCluster(tiles.groups()));
+  std::vector<std::vector<int>> cells(batch);
+  for (std::size_t next = 0; next < order.size();) {
+    int in_batch = 0;
+    for (; in_batch < batch && next < order.size(); ++in_batch) {
+      cells[in_batch].clear();
+      for (int points = 0; next < order.size() && points + shapes_[order[next]].points <= tile_points; ++next) {
+        points += shapes_[order[next]].points;
+        cells[in_batch].push_back(order[next]);
       }
-  });
-}
-
-/// The same bits: every column of the matrix gets its clusters in their order.
-void Galerkin::add_clusters_in_parallel() {
-  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
-  std::vector<std::vector<int>> clusters;
-  for_clusters([&](const CellCluster& cluster) { clusters.push_back(cluster.cells()); });
-  constexpr int batch = 32;
-  std::vector<std::unique_ptr<CellCluster>> evaluated(batch);
-  for (auto& cluster : evaluated)
-    cluster = std::make_unique<CellCluster>(problem_.nodes.size());
-  const int count = static_cast<int>(clusters.size()), threads = thread_count();
-  for (int first = 0; first < count; first += batch) {
-    const int in_batch = std::min(batch, count - first);
+    }
     parallel_ranges(in_batch, 1, [&](int k, int) {
-      evaluated[k]->clear();
-      for (const int cell : clusters[first + k])
-        evaluated[k]->add(shapes_[cell], 1, cell);
-      evaluated[k]->gather(rank_);
+      clusters[k].clear();
+      for (const int cell : cells[k])
+        clusters[k].add(shapes_[cell]);
     });
-    parallel_ranges(4 * threads, 1, [&](int share, int) {
-      StiffnessColumn column;
+    const int shares = threads == 1 ? 1 : 4 * threads;
+    parallel_ranges(shares, 1, [&](int share, int) {
       for (int k = 0; k < in_batch; ++k)
-        for (int own = 0; own < std::ssize(evaluated[k]->nodes()); ++own)
-          if (const int node = evaluated[k]->nodes()[own];
-              rank_[node] % (4 * threads) == share && (dropped_.empty() || dropped_[node] == 0)) {
-            evaluated[k]->column(own, lambda, mu, column);
-            add_to_columns(*evaluated[k], own, column);
-          }
+        tiles.add(clusters[k], 1, share, shares);
     });
   }
+  for (std::size_t p = 0; p < held_.size(); ++p)
+    tiles.add_held(held_[p], problem_.prescribed[p].components,
+                   constraint_stiffness(problem_, problem_.prescribed[p].node));
+  return tiles;
 }
 
-void Galerkin::assemble() {
+void Galerkin::assemble(UnheldPieces unheld) {
+  const StiffnessTiles tiles = tiles_of_cells();
+  std::vector<StiffnessTiles::Pair> pairs = tiles.pairs();
+  order_nodes(pairs, unheld);
+  build_matrix(std::move(pairs));
+}
+
+/// Nodes couple that have a point of some cell in common, or a mean of the held surface. Ordering nodes instead of
+/// unknowns is a ninth of the graph, and a matrix assembled in elimination order needs no permutation in the
+/// factorisation.
+void Galerkin::order_nodes(const std::vector<StiffnessTiles::Pair>& pairs, UnheldPieces unheld) {
   const int count = problem_.nodes.size();
-  const long blocks = static_cast<long>(column_rows_.size());
+  std::vector<int> start(count + 1, 0);
+  for (const StiffnessTiles::Pair& pair : pairs)
+    if (pair.row != pair.column) {
+      ++start[pair.row + 1];
+      ++start[pair.column + 1];
+    }
+  for (int i = 0; i < count; ++i)
+    start[i + 1] += start[i] + 1; // itself, too
+  std::vector<int> neighbours(start[count]), next(start.begin(), start.end() - 1);
+  for (int i = 0; i < count; ++i)
+    neighbours[next[i]++] = i;
+  for (const StiffnessTiles::Pair& pair : pairs)
+    if (pair.row != pair.column) {
+      neighbours[next[pair.row]++] = pair.column;
+      neighbours[next[pair.column]++] = pair.row;
+    }
+  report_.pieces = find_pieces(problem_, start, neighbours);
+  treat_unheld(unheld);
+  order_ = fill_reducing_ordering(start, neighbours);
+  rank_.resize(count);
+  for (int k = 0; k < count; ++k)
+    rank_[order_[k]] = k;
+}
+
+void Galerkin::build_matrix(std::vector<StiffnessTiles::Pair> pairs) {
+  const int count = problem_.nodes.size();
+  std::erase_if(pairs, [&](const auto& pair) { return is_dropped(pair.column); });
+  std::vector<char> has_diagonal(count, 0);
+  for (const StiffnessTiles::Pair& pair : pairs)
+    if (pair.row == pair.column)
+      has_diagonal[pair.row] = 1;
+  for (int i = 0; i < count; ++i)
+    if (has_diagonal[i] == 0)
+      pairs.push_back({i, i, nullptr, nullptr});
+  const long blocks = std::ssize(pairs);
   if (9 * blocks > std::numeric_limits<int>::max())
     throw InputError(
         fmt::format("{} nodes give {} matrix entries, more than the factorisation can index", count, 9 * blocks));
+
+  // Into ascending columns and, within each, ascending rows: by the row first, then by the column.
+  const auto sorted_by = [&](const std::vector<int>& before, const auto& key, std::vector<int>& start) {
+    start.assign(count + 1, 0);
+    for (const int p : before)
+      ++start[key(pairs[p]) + 1];
+    std::partial_sum(start.begin(), start.end(), start.begin());
+    std::vector<int> next(start.begin(), start.end() - 1), after(before.size());
+    for (const int p : before)
+      after[next[key(pairs[p])]++] = p;
+    return after;
+  };
+  std::vector<int> all(pairs.size()), start;
+  std::iota(all.begin(), all.end(), 0);
+  const auto lower_of = [&](const StiffnessTiles::Pair& pair) { return std::max(rank_[pair.row], rank_[pair.column]); };
+  const auto upper_of = [&](const StiffnessTiles::Pair& pair) { return std::min(rank_[pair.row], rank_[pair.column]); };
+  const std::vector<int> sorted = sorted_by(sorted_by(all, lower_of, start), upper_of, start);
+
   stiffness_.resize(3 * count, 3 * count);
   stiffness_.resizeNonZeros(9 * blocks);
   int* outer = stiffness_.outerIndexPtr();
   int* inner = stiffness_.innerIndexPtr();
   double* values = stiffness_.valuePtr();
-  std::fill(values, values + 9 * blocks, 0.0);
   outer[0] = 0;
-  for (int j = 0; j < count; ++j) {
-    const int begin = column_start_[j], rows = column_start_[j + 1] - begin;
-    for (int b = 0; b < 3; ++b) {
-      outer[3 * j + b + 1] = 9 * begin + 3 * rows * (b + 1);
-      for (int k = 0; k < rows; ++k)
-        for (int a = 0; a < 3; ++a)
-          inner[9 * begin + 3 * rows * b + 3 * k + a] = 3 * column_rows_[begin + k] + a;
-    }
-    if (!dropped_.empty() && dropped_[order_[j]] != 0) // the unknowns stay, alone and without load
-      for (int c = 0; c < 3; ++c)
-        values[9L * begin + 3L * rows * c + c] = problem_.material.young_modulus * problem_.nodes.spacings[order_[j]];
-  }
-  if (thread_count() == 1)
-    add_clusters();
-  else
-    add_clusters_in_parallel();
+  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
+  const auto for_blocks = [&](const auto& visit) { // visit(pair, its entry (0, 0), entries from one column to the next)
+    for (int j = 0; j < count; ++j)
+      for (int k = start[j]; k < start[j + 1]; ++k)
+        visit(pairs[sorted[k]], 9 * start[j] + 3 * (k - start[j]), 3 * (start[j + 1] - start[j]));
+  };
+  for (int j = 0; j < count; ++j)
+    for (int b = 0; b < 3; ++b)
+      outer[3 * j + b + 1] = 9 * start[j] + 3 * (start[j + 1] - start[j]) * (b + 1);
+  for_blocks([&](const StiffnessTiles::Pair& pair, int at, int stride) {
+    Matrix3 block = Matrix3::Zero();
+    if (pair.products != nullptr)
+      block = pair.stiffness(lambda, mu);
+    else if (is_dropped(pair.row)) // the unknowns stay, alone and without load
+      block.diagonal().setConstant(problem_.material.young_modulus * problem_.nodes.spacings[pair.row]);
+    if (rank_[pair.row] < rank_[pair.column])
+      block.transposeInPlace();
+    const int row = 3 * lower_of(pair);
+    for (int b = 0; b < 3; ++b)
+      for (int a = 0; a < 3; ++a) {
+        values[at + b * stride + a] = block(a, b);
+        inner[at + b * stride + a] = row + a;
+      }
+  });
   for (const Anchor& anchor : anchors_) {
-    const int j = rank_[anchor.node], first = 3 * column_start_[j], rows = column_start_[j + 1] - column_start_[j];
+    const int j = rank_[anchor.node], first = 9 * start[j], stride = 3 * (start[j + 1] - start[j]);
     const double spring = problem_.material.young_modulus * problem_.nodes.spacings[anchor.node];
     for (int b = 0; b < 3; ++b)
       for (int a = 0; a < 3; ++a) // the diagonal block heads its column
-        values[3 * first + 3 * rows * b + a] += spring * anchor.direction[a] * anchor.direction[b];
+        values[first + stride * b + a] += spring * anchor.direction[a] * anchor.direction[b];
   }
   elastic_.assign(values, values + 9 * blocks);
-  for (std::size_t p = 0; p < held_.size(); ++p) {
-    const Prescribed& entry = problem_.prescribed[p];
-    const DisplacementMean& mean = held_[p];
-    for (std::size_t own = 0; own < mean.nodes.size(); ++own) {
-      const int j = rank_[mean.nodes[own]], begin = column_start_[j], rows = column_start_[j + 1] - begin;
-      const auto first = column_rows_.begin() + begin;
-      const double factor = constraint_stiffness(problem_, entry.node) * mean.weights[own];
-      for (std::size_t k = 0; k < mean.nodes.size(); ++k) {
-        const int i = rank_[mean.nodes[k]];
-        if (i < j)
-          continue;
-        const auto row = std::lower_bound(first, first + rows, i) - first;
-        for (int c = 0; c < 3; ++c)
-          if (entry.components[c])
-            values[9L * begin + 3L * rows * c + 3 * row + c] += factor * mean.weights[k];
-      }
-    }
-  }
+  for_blocks([&](const StiffnessTiles::Pair& pair, int at, int stride) {
+    for (int c = 0; c < 3 && pair.held != nullptr; ++c)
+      values[at + c * stride + c] += pair.held[c * tile_nodes];
+  });
 }
 
 void Galerkin::assemble_loads() {

@@ -423,14 +423,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   }
   s.next_room += change.added.size();
   s.slot = std::move(new_slot);
-  CellCluster cluster(s.problem.nodes.size() + change.added.size());
-  const auto add = [&](const CellShapes& cell, double sign) {
-    if (!cluster.has_room_for(cell)) {
-      s.scatter(cluster);
-      cluster.clear();
-    }
-    cluster.add(cell, sign);
-  };
+  std::vector<const CellShapes*> gone, come;
   for (const auto& [b, box] : exchanged) {
     // A cell that came out as it was cancels itself.
     const std::vector<CellShapes>& old_cells = s.boxes[b].cells;
@@ -440,13 +433,15 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     };
     for (std::size_t c = 0; c < old_cells.size(); ++c)
       if (!is_same(c))
-        add(old_cells[c], -1);
+        gone.push_back(&old_cells[c]);
     for (std::size_t c = 0; c < box.cells.size(); ++c)
       if (!is_same(c))
-        add(box.cells[c], 1);
+        come.push_back(&box.cells[c]);
   }
-  if (!cluster.empty())
-    s.scatter(cluster);
+  StiffnessTiles tiles(next.nodes.positions);
+  tiles.add_all(gone, -1);
+  tiles.add_all(come, 1);
+  s.scatter(tiles);
   for (auto& exchange : exchanged) {
     const int b = exchange.first;
     State::Box& box = exchange.second;

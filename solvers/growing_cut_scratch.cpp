@@ -12,21 +12,23 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
   const double mu = problem.material.shear_modulus(), lambda = problem.material.lame_lambda();
   CellEvaluator evaluator(*spheres);
   BackgroundCells filled;
-  CellShapes cell;
-  StiffnessColumn column;
+  std::vector<CellShapes> cells;
   for (const State::Box& box : s.boxes) {
     refill_box(*problem.domain, box.box, s.background(), problem.incision.get(), filled);
-    for (int c = 0; c + 1 < std::ssize(filled.start); ++c) {
-      evaluator.evaluate(filled.of(c), cell);
-      const int count = static_cast<int>(cell.nodes.size());
-      for (int own = 0; own < count; ++own) {
-        stiffness_column(cell.gradients.data(), nullptr, cell.points, cell.stride, own, count, own, lambda, mu, column);
-        for (int i = own; i < count; ++i)
-          for (int a = 0; a < 3; ++a)
-            for (int b = 0; b < 3; ++b)
-              k(3 * cell.nodes[i] + a, 3 * cell.nodes[own] + b) += column.plane[3 * a + b][i];
-      }
-    }
+    for (int c = 0; c + 1 < std::ssize(filled.start); ++c)
+      evaluator.evaluate(filled.of(c), cells.emplace_back());
+  }
+  StiffnessTiles tiles(problem.nodes.positions);
+  std::vector<const CellShapes*> all;
+  for (const CellShapes& cell : cells)
+    all.push_back(&cell);
+  tiles.add_all(all);
+  for (const StiffnessTiles::Pair& pair : tiles.pairs()) {
+    const Matrix3 block = pair.stiffness(lambda, mu);
+    k.block<3, 3>(3 * static_cast<Eigen::Index>(pair.row), 3 * static_cast<Eigen::Index>(pair.column)) += block;
+    if (pair.row != pair.column)
+      k.block<3, 3>(3 * static_cast<Eigen::Index>(pair.column), 3 * static_cast<Eigen::Index>(pair.row)) +=
+          block.transpose();
   }
   const Shares shares(problem, s.removed);
   const std::vector<DisplacementMean> held = held_means(problem, *spheres, shares);

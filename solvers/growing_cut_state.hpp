@@ -7,7 +7,7 @@
 #include "solvers/growing_cut.hpp"
 #include "solvers/held_changes.hpp"
 #include "solvers/schur_window.hpp"
-#include "solvers/stiffness_kernel.hpp"
+#include "solvers/stiffness_tiles.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Cholesky>
@@ -101,22 +101,19 @@ struct GrowingCut::State {
     }
   }
 
-  /// Adds the stiffness of a cluster, whose nodes are all in the window, to S.
-  void scatter(CellCluster& cluster) {
-    cluster.gather(slot);
+  /// Adds the stiffness of cells, whose nodes are all in the window, to S.
+  void scatter(const StiffnessTiles& tiles) {
     const double mu = problem.material.shear_modulus(), lambda = problem.material.lame_lambda();
-    const std::vector<int>& nodes = cluster.nodes();
-    const int size = static_cast<int>(nodes.size());
-    StiffnessColumn column;
-    for (int own = 0; own < size; ++own) {
-      cluster.column(own, lambda, mu, column);
-      const int first = 3 * slot[nodes[own]];
-      for (int b = 0; b < 3; ++b) {
-        double* target = window->column(first + b);
-        for (int k = own; k < size; ++k)
-          for (int a = 0; a < 3; ++a)
-            target[3 * slot[nodes[k]] + a] += column.plane[3 * a + b][k];
+    for (const StiffnessTiles::Pair& pair : tiles.pairs()) {
+      Matrix3 block = pair.stiffness(lambda, mu);
+      int row = 3 * slot[pair.row], column = 3 * slot[pair.column];
+      if (row < column) {
+        std::swap(row, column);
+        block.transposeInPlace();
       }
+      for (int b = 0; b < 3; ++b)
+        for (int a = 0; a < 3; ++a)
+          window->column(column + b)[row + a] += block(a, b);
     }
   }
 

@@ -1,25 +1,24 @@
-// Inner loop of the weak form: one block column of a cell's stiffness, vectorised over the rows.
+// Inner loop of the weak form: products of shape function derivatives summed over points, four by four nodes at a time.
 #pragma once
+
+#include <cstdint>
 
 namespace spherecut::solvers {
 
-/// Longest column the kernel takes (a multiple of 8); supports of one background cell stay well below.
-inline constexpr int stiffness_kernel_rows = 512;
-/// Most points of one call: those of a cluster of cells.
-inline constexpr int stiffness_kernel_points = 64;
+inline constexpr int tile_nodes = 4;   // in a group, along either side of a tile
+inline constexpr int tile_points = 64; // most points that are added up in one call
+/// Gradients of a group of nodes at one point: x, y, z derivative, each of the four nodes.
+inline constexpr int gradients_at_point = 3 * tile_nodes;
 
-/// Nine planes of `rows` values: plane 3 a + b holds entry (a, b) of the block of each row node.
-struct StiffnessColumn {
-  alignas(64) double plane[9][stiffness_kernel_rows];
+/// Of four column nodes J and four row nodes I: plane[J][3 a + b][I] = sum_q w_q dI,a dJ,b.
+struct StiffnessTile {
+  alignas(32) double plane[tile_nodes][9][tile_nodes];
 };
 
-/// For row nodes I = first .. count-1 and column node J of a cell or a cluster of cells,
-///   block(I, J) = sum_q s_q w_q [lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1].
-/// `signs`: s_q of every point, null for 1.
-/// `gradients` holds for each point q three arrays of `stride` values (x, y, z derivative of every node's shape
-/// function), already multiplied by sqrt(w_q); entries up to the next multiple of 8 after `count` must exist and be
-/// finite.
-void stiffness_column(const double* gradients, const double* signs, int points, int stride, int first, int count,
-                      int column, double lambda, double mu, StiffnessColumn& out);
+/// tile += sign * sum over points. `rows` and `columns` hold `gradients_at_point` values a point, multiplied by
+/// sqrt(w_q). Bit q of `row_points`: some row node reaches point q; of column_points[J]: column node J does. Points
+/// that either does not reach are not looked at; where the one reaches and the other does not, its zeros are.
+void add_to_tile(const double* rows, std::uint64_t row_points, const double* columns,
+                 const std::uint64_t* column_points, double sign, StiffnessTile& tile);
 
 } // namespace spherecut::solvers
