@@ -1,8 +1,11 @@
 #include "solvers/cut_reach.hpp"
 
+#include "topology/errors.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fmt/format.h>
 
 namespace spherecut::solvers {
 
@@ -60,6 +63,23 @@ NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed
     if (removed[i] == 0)
       present.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
   return present;
+}
+
+std::vector<int> places_after(const SprinkleIncrement& change, int count, int grown) {
+  std::vector<int> place(count, 0);
+  for (const int node : change.removed) {
+    if (node < 0 || node >= count)
+      throw InputError(fmt::format("node {} cannot be removed: there are {}", node, count));
+    place[node] = -1;
+  }
+  int kept = 0;
+  for (int& p : place)
+    if (p == 0)
+      p = kept++;
+  if (grown != kept + change.added.size())
+    throw InputError(
+        fmt::format("the grown body has {} nodes; {} stay and {} are added", grown, kept, change.added.size()));
+  return place;
 }
 
 Changes changes_between(const topology::Incision* before, const SpacingAt& spacing_before,
@@ -139,6 +159,28 @@ bool Reach::sees(const Vector3& x, double half) const {
   return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front) ||
          (!by_branch_.empty() && to_all_(x) - half - slack_ < enriched_ * radius_beside(to_all_, x) &&
           std::any_of(by_branch_.begin(), by_branch_.end(), holds));
+}
+
+ReachAlong::ReachAlong(const topology::SurfaceMesh& way, const topology::Incision* before, const NodeCloud& nodes,
+                       const std::vector<char>& removed, const std::vector<double>& radii, double enriched,
+                       double front_growth, bool nodes_may_coarsen)
+    : margin_(front_growth + node_margin), front_(std::max(1.0, enriched)) {
+  const double slack = 0.5 * *std::min_element(nodes.spacings.begin(), nodes.spacings.end());
+  const std::vector<Vector3> places = sample_points(way, 0, slack);
+  // The front of today near it: nodes that are exchanged there change the reach of its enrichment.
+  std::vector<Vector3> front = places;
+  if (before != nullptr && nodes_may_coarsen) {
+    const Nearness to_way(places);
+    const SpacingAt spacing_at(nodes, removed);
+    const auto may_change = [&](const Vector3& x) { return to_way(x) < exchange_reach * spacing_at(x); };
+    for (const topology::FrontSegment& segment : before->front())
+      if (may_change(segment.from) || may_change(segment.to))
+        for (const Vector3& x : {segment.from, Vector3(0.5 * (segment.from + segment.to)), segment.to})
+          front.push_back(x);
+  }
+  std::vector<Vector3> all_front = front;
+  add_front(before, slack, all_front);
+  reach_.emplace(places, front, all_front, enriched, nodes.positions, radii, slack);
 }
 
 } // namespace spherecut::solvers

@@ -18,6 +18,10 @@ bool continues(const topology::Incision* before, const topology::Incision& now);
 /// The nodes that are not marked as removed, in their order.
 NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed);
 
+/// Place of each of `count` nodes after `change`, -1 for those removed. Throws InputError where it names nodes that do
+/// not exist or does not come to `grown` nodes.
+std::vector<int> places_after(const SprinkleIncrement& change, int count, int grown);
+
 /// Spacing of the present node nearest to a place.
 class SpacingAt {
  public:
@@ -100,6 +104,32 @@ class Reach {
   std::vector<double> present_radii_;
   std::vector<Eye> by_faces_, by_front_, by_branch_;
   double slack_;
+};
+
+/// Rings of new nodes stand this far from the sheet or its front, and crowded nodes within it are removed; in units of
+/// the sphere radius. What their spheres covered or will cover changes too.
+inline constexpr double node_margin = 0.35;
+
+/// Nodes are exchanged so far from new faces, in spacings (extend_sprinkling), and are nearest to places a little
+/// farther away.
+inline constexpr double exchange_reach = 3;
+
+/// Whether an increment along `way` may change what lies within `half` m of x.
+class ReachAlong {
+ public:
+  /// `before`: the cut as it is, null: none. `radii`: of the spheres about `nodes`; new ones may be larger by
+  /// `front_growth`. `enriched` as Reach. With `nodes_may_coarsen` also where the nodes that the
+  /// increment exchanges are of another spacing.
+  ReachAlong(const topology::SurfaceMesh& way, const topology::Incision* before, const NodeCloud& nodes,
+             const std::vector<char>& removed, const std::vector<double>& radii, double enriched, double front_growth,
+             bool nodes_may_coarsen);
+  [[nodiscard]] bool operator()(const Vector3& x, double half) const {
+    return reach_->sees(x, half) || reach_->near_faces(x, half, margin_) || reach_->near_front(x, half, front_);
+  }
+
+ private:
+  double margin_, front_; // in sphere radii
+  std::optional<Reach> reach_;
 };
 
 } // namespace spherecut::solvers

@@ -1,5 +1,6 @@
 #include "solvers/growing_body.hpp"
 
+#include "solvers/cut_reach.hpp"
 #include "solvers/galerkin.hpp"
 #include "solvers/pieces.hpp"
 #include "topology/errors.hpp"
@@ -17,40 +18,6 @@ void add_force(const DisplacementMean& mean, const Vector3& force, Column&& righ
     right.template segment<3>(3 * static_cast<Eigen::Index>(mean.nodes[k])) += mean.weights[k] * force;
 }
 
-/// Pieces by sight, with what holds them.
-std::vector<Piece> pieces_of(const Problem& problem) {
-  if (problem.incision == nullptr)
-    return {};
-  const std::vector<int> piece_of = node_pieces(problem.nodes, *problem.incision);
-  std::vector<Piece> pieces(static_cast<std::size_t>(*std::max_element(piece_of.begin(), piece_of.end())) + 1);
-  for (int i = 0; i < std::ssize(piece_of); ++i) {
-    pieces[piece_of[i]].nodes.push_back(i);
-    pieces[piece_of[i]].centroid += problem.nodes.positions[i];
-  }
-  for (Piece& piece : pieces)
-    piece.centroid /= static_cast<double>(piece.nodes.size());
-  for (const Prescribed& entry : problem.prescribed)
-    if (entry.components[0] || entry.components[1] || entry.components[2])
-      pieces[piece_of[entry.node]].held = true;
-  return pieces;
-}
-
-auto unheld(const std::vector<Piece>& pieces) {
-  return std::count_if(pieces.begin(), pieces.end(), [](const Piece& piece) { return !piece.held; });
-}
-
-/// Places in an array of which some entries go, -1 for those.
-std::vector<int> places_without(int count, const std::vector<int>& removed) {
-  std::vector<int> place(count, 0);
-  for (const int i : removed)
-    place[i] = -1;
-  int next = 0;
-  for (int& p : place)
-    if (p == 0)
-      p = next++;
-  return place;
-}
-
 } // namespace
 
 GrowingBody::GrowingBody(Problem problem, GrowthOptions options)
@@ -58,7 +25,7 @@ GrowingBody::GrowingBody(Problem problem, GrowthOptions options)
   report_ = cut_->report();
   number_nodes();
   if (problem_.incision != nullptr)
-    report_.pieces = pieces_of(problem_);
+    report_.pieces = pieces_by_sight(problem_);
 }
 
 void GrowingBody::number_nodes() {
@@ -77,16 +44,10 @@ void GrowingBody::number_nodes() {
 BodyGrowth GrowingBody::grow(const SprinkleIncrement& change, Problem grown,
                              const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) {
   const int count = problem_.nodes.size();
-  for (const int node : change.removed)
-    if (node < 0 || node >= count)
-      throw InputError(fmt::format("node {} cannot be removed: there are {}", node, count));
-  const std::vector<int> place = places_without(count, change.removed);
-  const int kept = count - static_cast<int>(std::count(place.begin(), place.end(), -1));
-  if (grown.nodes.size() != kept + change.added.size())
-    throw InputError(fmt::format("the grown body has {} nodes; {} stay and {} are added", grown.nodes.size(), kept,
-                                 change.added.size()));
-  std::vector<Piece> pieces = pieces_of(grown);
-  if (unheld(pieces) > unheld(report_.pieces))
+  const std::vector<int> place = places_after(change, count, grown.nodes.size());
+  const int kept = grown.nodes.size() - change.added.size();
+  std::vector<Piece> pieces = pieces_by_sight(grown);
+  if (unheld_count(pieces) > unheld_count(report_.pieces))
     return {"a piece came free", {}};
   NodeChange by_id;
   by_id.added = change.added;

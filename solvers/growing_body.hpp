@@ -13,17 +13,31 @@ struct BodyGrowth {
   GrowthReport update;
 };
 
-class GrowingBody final : public Discretisation {
+/// A body that can follow its cut.
+class Growable {
+ public:
+  virtual ~Growable() = default;
+  /// The body follows the cut to `grown`: what problem() becomes when `change` (ids as they are now, added nodes at the
+  /// end) and the new incision are put in. A piece that comes free is not covered. Throws as GrowingCut::grow; the body
+  /// is then as it was. With `only_update` what the window does not cover is uncovered too, and not condensed anew.
+  virtual BodyGrowth grow(const SprinkleIncrement& change, Problem grown,
+                          const std::function<topology::SurfaceMesh()>& way_ahead = {}, bool only_update = false) = 0;
+};
+
+/// One of method galerkin or collocation with a window along options.way, which is Growable. Throws as discretise(),
+/// and InputError where the method is another, a candidate does not exist, the way is empty, or a severed piece leaves
+/// the computation (UnheldPieces::drop).
+std::unique_ptr<Discretisation> make_growable(Problem problem, GrowthOptions options);
+
+/// Of method galerkin.
+class GrowingBody final : public Discretisation, public Growable {
  public:
   /// As discretise() in method galerkin, with a window along options.way (growing_cut.hpp). Throws as GrowingCut, and
   /// InputError where a severed piece leaves the computation (UnheldPieces::drop).
   GrowingBody(Problem problem, GrowthOptions options);
 
-  /// The body follows the cut to `grown`: what problem() becomes when `change` (ids as they are now, added nodes at the
-  /// end) and the new incision are put in. A piece that comes free is not covered. Throws as GrowingCut::grow; the body
-  /// is then as it was. With `only_update` what the window does not cover is uncovered too, and not condensed anew.
   BodyGrowth grow(const SprinkleIncrement& change, Problem grown,
-                  const std::function<topology::SurfaceMesh()>& way_ahead = {}, bool only_update = false);
+                  const std::function<topology::SurfaceMesh()>& way_ahead = {}, bool only_update = false) override;
 
   [[nodiscard]] Method method() const override { return Method::galerkin; }
   [[nodiscard]] const Problem& problem() const override { return problem_; }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "solvers/cell_shapes.hpp"
+#include "solvers/cut_reach.hpp"
 #include "solvers/elastic_body.hpp"
 #include "solvers/galerkin.hpp"
 #include "solvers/growing_cut.hpp"
@@ -16,14 +17,6 @@
 #include <unordered_map>
 
 namespace spherecut::solvers {
-
-/// Rings of new nodes stand this far from the sheet or its front, and crowded nodes within it are removed; in units of
-/// the sphere radius. What their spheres covered or will cover changes too.
-inline constexpr double node_margin = 0.35;
-
-/// Nodes are exchanged so far from new faces, in spacings (extend_sprinkling), and are nearest to places a little
-/// farther away.
-inline constexpr double exchange_reach = 3;
 
 /// Shares of the surface about some nodes are found from the surface this far around them, in spacings.
 inline constexpr double shares_reach = 4;
@@ -190,27 +183,9 @@ struct GrowingCut::State {
 
   /// Whether an increment along `way` may change what lies within `half` of x, m; also where the nodes that it
   /// exchanges are of another spacing.
-  [[nodiscard]] auto reach_of(const topology::SurfaceMesh& way, bool nodes_may_coarsen) const {
-    const double slack = 0.5 * *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
-    const std::vector<Vector3> places = sample_points(way, 0, slack);
-    // The front of today near it: nodes that are exchanged there change the reach of its enrichment.
-    std::vector<Vector3> front = places;
-    if (problem.incision != nullptr && nodes_may_coarsen) {
-      const Nearness to_way(places);
-      const SpacingAt spacing_at(problem.nodes, removed);
-      const auto may_change = [&](const Vector3& x) { return to_way(x) < exchange_reach * spacing_at(x); };
-      for (const topology::FrontSegment& segment : problem.incision->front())
-        if (may_change(segment.from) || may_change(segment.to))
-          for (const Vector3& x : {segment.from, Vector3(0.5 * (segment.from + segment.to)), segment.to})
-            front.push_back(x);
-    }
-    std::vector<Vector3> all_front = front;
-    add_front(problem.incision.get(), slack, all_front);
-    return [reach = std::make_shared<Reach>(places, front, all_front, enrichment_reach(), problem.nodes.positions,
-                                            spheres->radii(), slack),
-            margin = 1 + node_margin, enriched = std::max(1.0, enrichment_reach())](const Vector3& x, double half) {
-      return reach->sees(x, half) || reach->near_faces(x, half, margin) || reach->near_front(x, half, enriched);
-    };
+  [[nodiscard]] ReachAlong reach_of(const topology::SurfaceMesh& way, bool nodes_may_coarsen) const {
+    return {way, problem.incision.get(), problem.nodes, removed, spheres->radii(), enrichment_reach(),
+            1,   nodes_may_coarsen};
   }
 
   /// Factors the window. What the next increments are not going to touch is eliminated on the way and stands until

@@ -3,6 +3,7 @@
 #include "topology/errors.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <fmt/format.h>
 
 namespace spherecut::solvers {
@@ -40,6 +41,27 @@ std::vector<Piece> find_pieces(const Problem& problem, const std::vector<int>& s
     if (entry.components[0] || entry.components[1] || entry.components[2])
       pieces[piece_of[entry.node]].held = true;
   return pieces;
+}
+
+std::vector<Piece> pieces_by_sight(const Problem& problem) {
+  if (problem.incision == nullptr)
+    return {};
+  const std::vector<int> piece_of = node_pieces(problem.nodes, *problem.incision);
+  std::vector<Piece> pieces(static_cast<std::size_t>(*std::max_element(piece_of.begin(), piece_of.end())) + 1);
+  for (int i = 0; i < std::ssize(piece_of); ++i) {
+    pieces[piece_of[i]].nodes.push_back(i);
+    pieces[piece_of[i]].centroid += problem.nodes.positions[i];
+  }
+  for (Piece& piece : pieces)
+    piece.centroid /= static_cast<double>(piece.nodes.size());
+  for (const Prescribed& entry : problem.prescribed)
+    if (entry.components[0] || entry.components[1] || entry.components[2])
+      pieces[piece_of[entry.node]].held = true;
+  return pieces;
+}
+
+int unheld_count(const std::vector<Piece>& pieces) {
+  return static_cast<int>(std::count_if(pieces.begin(), pieces.end(), [](const Piece& piece) { return !piece.held; }));
 }
 
 void require_held(const std::vector<Piece>& pieces) {

@@ -3,6 +3,7 @@
 // cut once and shared with opposite signs.
 #include "topology/voronoi_cells.hpp"
 
+#include "topology/cell_clipper.hpp"
 #include "topology/errors.hpp"
 #include "topology/lip_lift.hpp"
 #include "topology/point_tree.hpp"
@@ -23,36 +24,9 @@ constexpr double cap_height = 0.75; // how far outside the curved surface a cell
 constexpr double lip_reach = 0.01;  // a node this near to a sheet lies on one of its faces, in h
 constexpr double lip_lift = 0.1;    // by which it is lifted to look for its neighbours, in h
 constexpr double sliver = 1e-3;     // a smaller part of a face is not split off it
+constexpr double half_way = 1.01;   // the cells of two nodes end half way between them; with slack
 constexpr int first_plane_id = -100;
 constexpr int cap_id = -50;
-
-struct Polygon {
-  std::vector<Vector3> vertices; // relative to the node, units of h
-  std::vector<double> phi;       // curved distance at the vertices, units of h
-};
-
-struct Measure {
-  Vector3 area = Vector3::Zero();
-  Vector3 centroid = Vector3::Zero();
-};
-
-/// Area vector and centroid of a planar polygon.
-Measure measure(const std::vector<Vector3>& polygon) {
-  Measure result;
-  const Vector3& origin = polygon.front();
-  for (std::size_t k = 1; k + 1 < polygon.size(); ++k)
-    result.area += 0.5 * (polygon[k] - origin).cross(polygon[k + 1] - origin);
-  const double total = result.area.norm();
-  if (total <= 0)
-    return {};
-  const Vector3 normal = result.area / total;
-  // Signed weights: a polygon bent inwards by its arc vertices stays right.
-  for (std::size_t k = 1; k + 1 < polygon.size(); ++k) {
-    const double weight = 0.5 * (polygon[k] - origin).cross(polygon[k + 1] - origin).dot(normal);
-    result.centroid += weight / total * (origin + polygon[k] + polygon[k + 1]) / 3;
-  }
-  return result;
-}
 
 void append_corners(const std::vector<Vector3>& polygon, const Vector3& node, double spacing,
                     std::vector<Vector3>& corners, std::vector<int>& start) {
@@ -61,112 +35,6 @@ void append_corners(const std::vector<Vector3>& polygon, const Vector3& node, do
   start.push_back(static_cast<int>(corners.size()));
 }
 
-/// Clips polygons by phi < 0 and collects the points where they met the curved surface.
-class CurvedClipper {
- public:
-  CurvedClipper(const Domain& domain, const Vector3& node, double spacing)
-      : domain_(domain), node_(node), spacing_(spacing) {}
-
-  double phi(const Vector3& local) const { return domain_.curved_distance(node_ + spacing_ * local) / spacing_; }
-
-  /// Returns false when nothing of the polygon lies inside.
-  bool clip(Polygon& polygon) {
-    const std::size_t count = polygon.vertices.size();
-    const bool outside = std::all_of(polygon.phi.begin(), polygon.phi.end(), [](double v) { return v >= 0; });
-    if (outside)
-      return false;
-    if (std::all_of(polygon.phi.begin(), polygon.phi.end(), [](double v) { return v < 0; }))
-      return true;
-    std::vector<Vector3> kept;
-    Vector3 exit = Vector3::Zero();
-    bool have_exit = false;
-    std::size_t start = 0; // begin at an inside vertex so that every exit precedes its entry
-    while (polygon.phi[start] >= 0)
-      ++start;
-    const Vector3 normal = measure(polygon.vertices).area.normalized();
-    for (std::size_t step = 0; step < count; ++step) {
-      const std::size_t k = (start + step) % count, next = (k + 1) % count;
-      if (polygon.phi[k] < 0)
-        kept.push_back(polygon.vertices[k]);
-      if ((polygon.phi[k] < 0) == (polygon.phi[next] < 0))
-        continue;
-      const Vector3 crossing = root(polygon.vertices[k], polygon.phi[k], polygon.vertices[next], polygon.phi[next]);
-      if (polygon.phi[k] < 0) {
-        exit = crossing;
-        have_exit = true;
-        kept.push_back(crossing);
-      } else {
-        if (have_exit)
-          add_arc(exit, crossing, normal, kept);
-        kept.push_back(crossing);
-      }
-      surface_sum_ += crossing;
-      ++surface_count_;
-    }
-    polygon.vertices = std::move(kept);
-    return polygon.vertices.size() >= 3;
-  }
-
-  [[nodiscard]] bool met_surface() const { return surface_count_ > 0; }
-  [[nodiscard]] Vector3 surface_mean() const { return surface_sum_ / surface_count_; }
-
- private:
-  /// Crossing of the edge a b with phi = 0 by the Illinois form of false position: the value at an end that stays for a
-  /// second time is halved.
-  Vector3 root(Vector3 a, double phi_a, Vector3 b, double phi_b) const {
-    Vector3 x = a;
-    int stayed = 0; // +1: b stayed last time, -1: a did
-    for (int iteration = 0; iteration < 12; ++iteration) {
-      x = a + phi_a / (phi_a - phi_b) * (b - a);
-      const double value = phi(x);
-      if (std::abs(value) < 1e-10 || (b - a).squaredNorm() < 1e-20)
-        break;
-      if ((value < 0) == (phi_a < 0)) {
-        a = x;
-        phi_a = value;
-        if (stayed > 0)
-          phi_b *= 0.5;
-        stayed = 1;
-      } else {
-        b = x;
-        phi_b = value;
-        if (stayed < 0)
-          phi_a *= 0.5;
-        stayed = -1;
-      }
-    }
-    return x;
-  }
-
-  /// The surface bends between two crossings: one vertex on the arc, in the polygon's plane, makes the cut second
-  /// order.
-  void add_arc(const Vector3& from, const Vector3& to, const Vector3& normal, std::vector<Vector3>& kept) const {
-    const Vector3 chord = to - from;
-    if (chord.squaredNorm() < 1e-12)
-      return;
-    const Vector3 outward = chord.cross(normal).normalized();
-    const Vector3 middle = 0.5 * (from + to);
-    Vector3 x = middle;
-    for (int iteration = 0; iteration < 4; ++iteration) {
-      const double value = phi(x);
-      const double slope = domain_.curved_gradient(node_ + spacing_ * x).dot(outward);
-      if (std::abs(slope) < 0.2)
-        return;
-      x -= value / slope * outward;
-      if (std::abs(value) < 1e-8)
-        break;
-    }
-    if ((x - middle).norm() < 0.5 * chord.norm())
-      kept.push_back(x);
-  }
-
-  const Domain& domain_;
-  Vector3 node_;
-  double spacing_;
-  Vector3 surface_sum_ = Vector3::Zero();
-  int surface_count_ = 0;
-};
-
 /// One cell under construction.
 struct CellBuilder {
   const std::vector<Vector3>& nodes;
@@ -174,7 +42,8 @@ struct CellBuilder {
   const Domain& domain;
   const PointTree& tree;
   const Incision* incision;
-  const std::vector<Vector3>& lookouts; // of the nodes, when there is an incision
+  const std::vector<Vector3>& lookouts; // of the nodes whose cells are made, when there is an incision
+  const std::vector<char>& wanted;      // per node: its cell is made, and its faces with others that are
   bool curved;
   std::vector<PointTree::Found> near;
   std::vector<double> vertices;
@@ -269,7 +138,7 @@ void CellBuilder::add_lip(int i, int j, const std::vector<Vector3>& polygon, con
   const Vector3& x = nodes[i];
   const double h = spacings[i];
   const auto measured = [&](const std::vector<Vector3>& part) {
-    Measure face = part.size() < 3 ? Measure{} : measure(part);
+    PolygonMeasure face = part.size() < 3 ? PolygonMeasure{} : measure(part);
     if (face.area.dot(outward) < 0)
       face.area = -face.area;
     return face;
@@ -296,14 +165,14 @@ void CellBuilder::add_lip(int i, int j, const std::vector<Vector3>& polygon, con
   const double smallest = sliver * measure(polygon).area.norm();
   for (std::size_t c = 0; c < cuts.size(); ++c) {
     auto [ahead, rest] = split(behind, places[c], cuts[c]);
-    const Measure face = measured(ahead);
+    const PolygonMeasure face = measured(ahead);
     if (face.area.norm() < smallest)
       continue;
     const Vector3 centroid = x + h * face.centroid;
     if (incision->blocks(x, centroid) || incision->blocks(nodes[j], centroid))
       continue;
     const bool all = measured(rest).area.norm() < smallest;
-    const Measure& joined = all ? measured(behind) : face;
+    const PolygonMeasure& joined = all ? measured(behind) : face;
     cells.faces.push_back({i, j, joined.area * h * h, x + h * joined.centroid});
     append_corners(all ? behind : ahead, x, h, cells.face_corners, cells.face_start);
     closure[i] += joined.area * h * h;
@@ -312,7 +181,7 @@ void CellBuilder::add_lip(int i, int j, const std::vector<Vector3>& polygon, con
       return;
     behind = std::move(rest);
   }
-  const Measure lip = measured(behind);
+  const PolygonMeasure lip = measured(behind);
   const Vector3 area = lip.area * h * h, centroid = x + h * lip.centroid;
   cells.lips.push_back({i, j, area, centroid});
   cells.lips.push_back({j, i, -area, centroid});
@@ -346,7 +215,7 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
   }
 
   std::size_t position = 0;
-  Polygon polygon;
+  CellPolygon polygon;
   for (const int neighbour : neighbours) {
     const int size = face_vertices[position++];
     polygon.vertices.clear();
@@ -368,7 +237,7 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
     }
     if (near_surface && !clipper.clip(polygon))
       continue;
-    Measure face = measure(polygon.vertices);
+    PolygonMeasure face = measure(polygon.vertices);
     const double face_area = face.area.norm();
     if (face_area < 1e-12)
       continue;
@@ -382,9 +251,11 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
       cells.boundary.push_back({i, first_plane_id - neighbour, area, centroid});
       append_corners(polygon.vertices, x, h, cells.boundary_corners, cells.boundary_start);
       closure[i] += area;
-    } else if (neighbour > i && hidden(i, neighbour)) {
+    } else if (neighbour < i || wanted[neighbour] == 0) {
+      continue; // had from there
+    } else if (hidden(i, neighbour)) {
       add_lip(i, neighbour, polygon.vertices, outward, cells, closure);
-    } else if (neighbour > i) {
+    } else {
       cells.faces.push_back({i, neighbour, area, centroid});
       append_corners(polygon.vertices, x, h, cells.face_corners, cells.face_start);
       closure[i] += area;
@@ -439,54 +310,81 @@ std::vector<Vector3> mirrored_lips(const std::vector<Vector3>& nodes, const std:
   return sites;
 }
 
-} // namespace
+/// Of what stays, faces, parts of the surface and lips go over from `before`, with the nodes' new numbers.
+void take_over(const CellComplex& before, const std::vector<int>& now, const std::vector<char>& wanted,
+               CellComplex& cells, std::vector<Vector3>& closure) {
+  const auto stays = [&](int node) { return now[node] >= 0 && wanted[now[node]] == 0; };
+  const auto copy = [](const std::vector<Vector3>& from, const std::vector<int>& start, std::size_t k,
+                       std::vector<Vector3>& to, std::vector<int>& to_start) {
+    to.insert(to.end(), from.begin() + start[k], from.begin() + start[k + 1]);
+    to_start.push_back(static_cast<int>(to.size()));
+  };
+  for (std::size_t f = 0; f < before.faces.size(); ++f) {
+    CellFace face = before.faces[f];
+    if (!stays(face.first) && !stays(face.second))
+      continue;
+    face.first = now[face.first];
+    face.second = now[face.second];
+    closure[face.first] += face.area;
+    closure[face.second] -= face.area;
+    cells.faces.push_back(face);
+    copy(before.face_corners, before.face_start, f, cells.face_corners, cells.face_start);
+  }
+  for (std::size_t b = 0; b < before.boundary.size(); ++b) {
+    BoundaryFace face = before.boundary[b];
+    if (!stays(face.node))
+      continue;
+    face.node = now[face.node];
+    cells.boundary.push_back(face);
+    copy(before.boundary_corners, before.boundary_start, b, cells.boundary_corners, cells.boundary_start);
+  }
+  for (std::size_t l = 0; l < before.lips.size(); ++l) {
+    LipFace face = before.lips[l];
+    if (!stays(face.node) && !stays(face.beyond))
+      continue;
+    face.node = now[face.node];
+    face.beyond = now[face.beyond];
+    closure[face.node] += face.area;
+    cells.lips.push_back(face);
+    if (l % 2 == 1)
+      copy(before.lip_corners, before.lip_start, l / 2, cells.lip_corners, cells.lip_start);
+  }
+}
 
-CellComplex voronoi_cells(const std::vector<Vector3>& places, const std::vector<double>& spacings, const Domain& domain,
-                          const Incision* incision) {
-  const std::vector<Vector3> nodes = incision == nullptr ? places : mirrored_lips(places, spacings, *incision);
-  std::vector<Vector3> lookouts;
-  for (std::size_t i = 0; incision != nullptr && i < places.size(); ++i)
-    lookouts.push_back(lift_off(*incision, places[i], lip_reach * spacings[i], lip_lift * spacings[i]));
-  const int count = static_cast<int>(nodes.size());
-  CellComplex cells;
-  cells.faces.reserve(8 * nodes.size());
-  const PointTree tree(nodes);
-  std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
-  const bool curved = count > 0 && std::isfinite(domain.curved_distance(nodes.front()));
-  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, curved, {}, {}, {}, {}, {}};
-  for (int i = 0; i < count; ++i)
-    builder.build(i, cells, closure);
-  std::vector<char> on_curve(nodes.size(), 0);
-  for (BoundaryFace& face : cells.boundary)
-    if (face.plane < 0) {
-      face.area = -closure[face.node];
-      on_curve[face.node] = 1;
-    }
-  // The surface can leave a cell exactly through its edges, without a crossing: closure still tells.
-  for (int i = 0; curved && i < count; ++i)
-    if (!on_curve[i] && closure[i].norm() > 1e-9 * spacings[i] * spacings[i]) {
-      cells.boundary.push_back({i, -1, -closure[i], domain.closest_surface_point(nodes[i])});
-      cells.boundary_start.push_back(static_cast<int>(cells.boundary_corners.size()));
-    }
-
-  // Volume and centroid by cones from the node over the faces.
+/// Volumes, centroids and reaches by cones from the nodes over the faces.
+void measure_cells(CellComplex& cells) {
+  const std::vector<Vector3>& nodes = cells.sites;
   cells.volumes.assign(nodes.size(), 0.0);
   cells.centroids.assign(nodes.size(), Vector3::Zero());
+  cells.reaches.assign(nodes.size(), 0.0);
   const auto add_cone = [&](int i, const Vector3& area, const Vector3& centroid) {
     const Vector3 arm = centroid - nodes[i];
     const double cone = arm.dot(area) / 3;
     cells.volumes[i] += cone;
     cells.centroids[i] += cone * 0.75 * arm;
   };
-  for (const CellFace& face : cells.faces) {
+  const auto reach = [&](int i, const std::vector<Vector3>& corners, const std::vector<int>& start, std::size_t k) {
+    for (int c = start[k]; c < start[k + 1]; ++c)
+      cells.reaches[i] = std::max(cells.reaches[i], (corners[c] - nodes[i]).norm());
+  };
+  for (std::size_t f = 0; f < cells.faces.size(); ++f) {
+    const CellFace& face = cells.faces[f];
     add_cone(face.first, face.area, face.centroid);
     add_cone(face.second, -face.area, face.centroid);
+    reach(face.first, cells.face_corners, cells.face_start, f);
+    reach(face.second, cells.face_corners, cells.face_start, f);
   }
-  for (const LipFace& face : cells.lips)
+  for (std::size_t l = 0; l < cells.lips.size(); ++l) {
+    add_cone(cells.lips[l].node, cells.lips[l].area, cells.lips[l].centroid);
+    reach(cells.lips[l].node, cells.lip_corners, cells.lip_start, l / 2);
+  }
+  for (std::size_t b = 0; b < cells.boundary.size(); ++b) {
+    const BoundaryFace& face = cells.boundary[b];
     add_cone(face.node, face.area, face.centroid);
-  for (const BoundaryFace& face : cells.boundary)
-    add_cone(face.node, face.area, face.centroid);
-  for (int i = 0; i < count; ++i) {
+    reach(face.node, cells.boundary_corners, cells.boundary_start, b);
+    cells.reaches[face.node] = std::max(cells.reaches[face.node], (face.centroid - nodes[face.node]).norm());
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
     if (cells.volumes[i] > 0) {
       cells.centroids[i] = nodes[i] + cells.centroids[i] / cells.volumes[i];
     } else {
@@ -494,7 +392,89 @@ CellComplex voronoi_cells(const std::vector<Vector3>& places, const std::vector<
       ++cells.empty_cells;
     }
   }
+}
+
+/// The cells of the wanted nodes; what `cells` holds of others stays.
+void build_cells(const std::vector<Vector3>& places, const std::vector<double>& spacings, const Domain& domain,
+                 const Incision* incision, const std::vector<char>& wanted, CellComplex& cells,
+                 std::vector<Vector3>& closure) {
+  const std::vector<Vector3>& nodes = cells.sites;
+  const int count = static_cast<int>(nodes.size());
+  std::vector<Vector3> lookouts(incision == nullptr ? 0 : nodes.size());
+  for (std::size_t i = 0; i < lookouts.size(); ++i)
+    if (wanted[i] != 0)
+      lookouts[i] = lift_off(*incision, places[i], lip_reach * spacings[i], lip_lift * spacings[i]);
+  const PointTree tree(nodes);
+  const std::size_t known = cells.boundary.size();
+  const bool curved = count > 0 && std::isfinite(domain.curved_distance(nodes.front()));
+  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, wanted, curved, {}, {}, {}, {}, {}};
+  for (int i = 0; i < count; ++i)
+    if (wanted[i] != 0)
+      builder.build(i, cells, closure);
+  std::vector<char> on_curve(nodes.size(), 0);
+  for (std::size_t b = known; b < cells.boundary.size(); ++b)
+    if (BoundaryFace& face = cells.boundary[b]; face.plane < 0) {
+      face.area = -closure[face.node];
+      on_curve[face.node] = 1;
+    }
+  // The surface can leave a cell exactly through its edges, without a crossing: closure still tells.
+  for (int i = 0; curved && i < count; ++i)
+    if (wanted[i] != 0 && on_curve[i] == 0 && closure[i].norm() > 1e-9 * spacings[i] * spacings[i]) {
+      cells.boundary.push_back({i, -1, -closure[i], domain.closest_surface_point(nodes[i])});
+      cells.boundary_start.push_back(static_cast<int>(cells.boundary_corners.size()));
+    }
+  measure_cells(cells);
+}
+
+std::vector<Vector3> sites_of(const std::vector<Vector3>& nodes, const std::vector<double>& spacings,
+                              const Incision* incision) {
+  return incision == nullptr ? nodes : mirrored_lips(nodes, spacings, *incision);
+}
+
+} // namespace
+
+CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain,
+                          const Incision* incision) {
+  CellComplex cells;
+  cells.sites = sites_of(nodes, spacings, incision);
+  cells.faces.reserve(8 * nodes.size());
+  std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
+  build_cells(nodes, spacings, domain, incision, std::vector<char>(nodes.size(), 1), cells, closure);
   return cells;
+}
+
+CellUpdate update_cells(const CellComplex& before, const std::vector<int>& was, const std::vector<Vector3>& nodes,
+                        const std::vector<double>& spacings, const Domain& domain, const Incision* incision,
+                        const std::vector<char>& touched) {
+  CellUpdate update{{}, touched};
+  CellComplex& cells = update.cells;
+  cells.sites = sites_of(nodes, spacings, incision);
+  std::vector<int> now(before.sites.size(), -1);
+  std::vector<Vector3> moved; // places where a node was or is, and another is or was not
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (was[i] >= 0)
+      now[was[i]] = static_cast<int>(i);
+    if (was[i] < 0 || before.sites[was[i]] != cells.sites[i]) {
+      update.made[i] = 1;
+      moved.push_back(cells.sites[i]);
+    }
+  }
+  for (std::size_t i = 0; i < now.size(); ++i)
+    if (now[i] < 0 || before.sites[i] != cells.sites[now[i]])
+      moved.push_back(before.sites[i]);
+  // A node cuts no cell that ends before half way to it.
+  if (!moved.empty()) {
+    const PointTree tree(moved);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      if (update.made[i] == 0 &&
+          std::sqrt(tree.nearest(cells.sites[i]).squared_distance) < half_way * 2 * before.reaches[was[i]])
+        update.made[i] = 1;
+  }
+  cells.faces.reserve(8 * nodes.size());
+  std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
+  take_over(before, now, update.made, cells, closure);
+  build_cells(nodes, spacings, domain, incision, update.made, cells, closure);
+  return update;
 }
 
 } // namespace spherecut::topology

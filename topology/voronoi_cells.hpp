@@ -40,6 +40,8 @@ struct CellComplex {
   std::vector<Vector3> face_corners, boundary_corners, lip_corners;
   std::vector<double> volumes;    // m3, per node
   std::vector<Vector3> centroids; // m, of each cell
+  std::vector<double> reaches;    // m, from the node to the farthest corner or centroid of its cell's faces
+  std::vector<Vector3> sites;     // m, the nodes as the cells take them (partners mirrored about their sheet)
   int empty_cells = 0;            // nodes without volume (outside the body or doubled)
 };
 
@@ -54,5 +56,19 @@ struct CellComplex {
 /// cell reaches farther than six times its node's spacing inside the body.
 CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain,
                           const Incision* incision = nullptr);
+
+/// Cells of a body whose nodes or cut have changed.
+struct CellUpdate {
+  CellComplex cells;
+  std::vector<char> made; // per node: its cell was made anew, and may differ from before
+};
+
+/// What voronoi_cells gives (to rounding, faces in another order) where only some cells differ from `before`: those of
+/// nodes that are new, or marked in `touched` because the cut has changed within three reaches of them, and of nodes
+/// beside such as have come, gone or been moved by the cut. `was`: place of each node in `before`, -1 for new ones;
+/// those that were there keep their order. Throws as voronoi_cells.
+CellUpdate update_cells(const CellComplex& before, const std::vector<int>& was, const std::vector<Vector3>& nodes,
+                        const std::vector<double>& spacings, const Domain& domain, const Incision* incision,
+                        const std::vector<char>& touched);
 
 } // namespace spherecut::topology
