@@ -20,7 +20,8 @@ namespace {
 
 /// Part of the reach of a cell, in reaches, from which a change of the cut may give it other faces (update_cells).
 constexpr double cells_see = 3;
-constexpr double lifted = 0.15; // eyes are lifted off a sheet, in spacings
+constexpr double rounding = 1e-12; // of the right-hand side: a smaller residual is not corrected
+constexpr double lifted = 0.15;    // eyes are lifted off a sheet, in spacings
 
 class GrowingCollocation final : public Collocation, public Growable {
  public:
@@ -53,6 +54,7 @@ class GrowingCollocation final : public Collocation, public Growable {
     std::vector<BalanceRow> rows;
     std::vector<char> changed; // rows of the system that differ
     std::vector<std::array<bool, 3>> constrained;
+    std::vector<Vector3> places; // where the cut is new
   };
 
   [[nodiscard]] MatrixX solution(const MatrixX& right) const override;
@@ -66,6 +68,9 @@ class GrowingCollocation final : public Collocation, public Growable {
   [[nodiscard]] const char* hindrance(const Next& next, const std::vector<int>& slot) const;
   void put_in(Next next, Problem grown, const std::vector<int>& slot);
   void write_rows(const std::vector<char>& changed);
+  /// Factors the window. What the next increments are not going to touch is eliminated on the way and stands until one
+  /// does. Whether it stood.
+  bool factor_window(const std::vector<Vector3>& places);
   void take_over(GrowingCollocation& other);
 
   GrowthOptions options_;
@@ -190,7 +195,8 @@ MatrixX GrowingCollocation::solution(const MatrixX& right) const {
   MatrixX missing = right;
   for (int i = 0; i < problem_.nodes.size(); ++i)
     visit_rows(i, [&](int c, int column, double value) { missing.row(stride_ * i + c) -= value * found.row(column); });
-  found += window_solution(missing);
+  if (missing.norm() > rounding * right.norm())
+    found += window_solution(missing);
   return found;
 }
 
@@ -218,13 +224,12 @@ MatrixX GrowingCollocation::contact_compliance(const std::vector<int>& candidate
     for (int axis = 0; axis < 3; ++axis)
       if (!constrained_[candidates[c]][axis])
         right(stride_ * slot_[candidates[c]] + axis, 3 * c + axis) = 1;
-  const MatrixX solved = window_->solve(right);
-  MatrixX compliance = MatrixX::Zero(3 * count, 3 * count);
+  MatrixX functionals = MatrixX::Zero(window_->slots(), 3 * count);
   for (Eigen::Index c = 0; c < count; ++c)
     for (int k = supports_.start[candidates[c]]; k < supports_.start[candidates[c] + 1]; ++k)
-      compliance.middleRows<3>(3 * c) +=
-          supports_.value[k] * solved.middleRows<3>(stride_ * Eigen::Index{slot_[supports_.nodes[k]]});
-  return compliance;
+      for (int axis = 0; axis < 3; ++axis)
+        functionals(stride_ * slot_[supports_.nodes[k]] + axis, 3 * c + axis) += supports_.value[k];
+  return window_->condense(functionals, right);
 }
 
 /// Supports of the nodes marked are found again, the others get the new numbers.
@@ -305,9 +310,9 @@ GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& ch
   };
 
   const Stopwatch cell_watch;
-  std::vector<Vector3> places = changes.faces;
-  places.insert(places.end(), changes.front.begin(), changes.front.end());
-  const Nearness to_places(places);
+  next.places = changes.faces;
+  next.places.insert(next.places.end(), changes.front.begin(), changes.front.end());
+  const Nearness to_places(next.places);
   std::vector<char> touched(static_cast<std::size_t>(count), 1);
   for (int i = 0; i < count; ++i)
     if (next.was[i] >= 0)
@@ -425,6 +430,28 @@ void GrowingCollocation::write_rows(const std::vector<char>& changed) {
       window_->add(stride_ * slot_[i] + c, stride_ * slot_[column / stride_] + column % stride_, value);
     });
   }
+}
+
+bool GrowingCollocation::factor_window(const std::vector<Vector3>& places) {
+  if (window_->is_prepared()) {
+    window_->factor();
+    return true;
+  }
+  const Nearness to_places(places);
+  std::vector<double> distance(problem_.nodes.positions.size());
+  double reach = 0;
+  for (std::size_t i = 0; i < distance.size(); ++i) {
+    distance[i] = to_places(problem_.nodes.positions[i]);
+    if (slot_[i] >= 0 && window_->changed(stride_ * slot_[i]))
+      reach = std::max(reach, distance[i]);
+  }
+  const double finest = *std::min_element(problem_.nodes.spacings.begin(), problem_.nodes.spacings.end());
+  std::vector<char> kept(static_cast<std::size_t>(window_->slots()), 0);
+  for (std::size_t i = 0; i < distance.size(); ++i)
+    if (slot_[i] >= 0 && distance[i] <= reach + advance_before_new * finest)
+      std::fill_n(kept.begin() + static_cast<std::ptrdiff_t>(stride_) * slot_[i], stride_, 1);
+  window_->prepare(kept);
+  return false;
 }
 
 void GrowingCollocation::put_in(Next next, Problem grown, const std::vector<int>& slot) {
@@ -561,11 +588,12 @@ BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem gro
   Problem before = problem_;
   std::erase_if(options_.contact, [&](int& node) { return (node = place[node]) < 0; });
   next_room_ += change.added.size();
+  const std::vector<Vector3> places = std::move(next.places);
   put_in(std::move(next), std::move(grown), slot);
   report.cells_seconds += commit_watch.seconds();
   const Stopwatch factor_watch;
   try {
-    window_->factor();
+    report.prepared = factor_window(places);
   } catch (const NumericalError&) {
     // The ordinary way says what is wrong; then the body before is made again, for this one has been overwritten.
     try {
@@ -578,7 +606,7 @@ BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem gro
   }
   report.factor_seconds = factor_watch.seconds();
   report.factored = window_->factored();
-  report.window_nodes = window_->factored() / stride_;
+  report.window_nodes = (window_->factored() + window_->done_ahead()) / stride_;
   return finish();
 }
 

@@ -1,5 +1,6 @@
 #include "solvers/growing_cut.hpp"
 
+#include "solvers/collocation_body.hpp"
 #include "solvers/cut_sight.hpp"
 #include "solvers/growing_cut_state.hpp"
 #include "solvers/parallel.hpp"
@@ -17,7 +18,8 @@ namespace spherecut::solvers {
 
 double window_share(const Problem& problem, const DiscretisationOptions& method, const topology::SurfaceMesh& way) {
   const std::vector<double>& spacings = problem.nodes.spacings;
-  const double rho = galerkin_support_radius(problem, method);
+  const double rho = method.method == Method::collocation ? front_radius_factor * collocation_support_radius(method)
+                                                          : galerkin_support_radius(problem, method);
   const double finest = *std::min_element(spacings.begin(), spacings.end());
   const Nearness to_way(sample_points(way, 0, finest));
   // Cells that a change within a sphere of it can reach, and the nodes whose spheres reach those.

@@ -23,9 +23,6 @@ inline constexpr double shares_reach = 4;
 /// A share itself changes when faces or surface nodes come this near to it, in spacings.
 inline constexpr double share_size = 2;
 
-/// How far a cut may go on, in spacings, until what was eliminated ahead has to be chosen anew.
-inline constexpr double advance_before_new = 0.5;
-
 struct GrowingCut::State {
   struct Box {
     BackgroundBox box;

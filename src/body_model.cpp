@@ -196,7 +196,7 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
     model.body = solvers::discretise(std::move(problem), options);
     return;
   }
-  model.body = std::make_unique<solvers::GrowingBody>(
+  model.body = solvers::make_growable(
       std::move(problem),
       solvers::GrowthOptions{.method = options, .way = way_ahead, .contact = candidates, .room = growth_room});
   model.window_way = way_ahead;
@@ -216,7 +216,7 @@ std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyMod
 }
 
 std::string hindrance_to_growth(const Scenario& scenario, bool severed) {
-  if (scenario.method.method != solvers::Method::galerkin)
+  if (scenario.method.method == solvers::Method::published)
     return fmt::format("method {} is not updated", solvers::to_string(scenario.method.method));
   if (severed && scenario.cut.unheld == solvers::UnheldPieces::drop)
     return "a severed piece has left the computation";
@@ -257,7 +257,7 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
                                const solvers::SprinkleIncrement& change,
                                const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
                                BodyModel& after, bool only_update) {
-  auto* body = dynamic_cast<solvers::GrowingBody*>(before.body.get());
+  auto* body = dynamic_cast<solvers::Growable*>(before.body.get());
   if (body == nullptr)
     return {before.body == nullptr ? "the first cut" : before.not_following, {}};
   topology::SurfaceMesh way = before.window_way;
@@ -285,9 +285,10 @@ void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few
     model.patch = {};
     model.base = model.body->solve();
   } else {
-    model.patch = for_few_presses && model.body->method() == solvers::Method::galerkin
-                      ? solvers::condense_without_fields(*model.body, candidates)
-                      : solvers::condense(*model.body, candidates);
+    const bool knows_compliance = model.body->method() == solvers::Method::galerkin ||
+                                  dynamic_cast<solvers::Growable*>(model.body.get()) != nullptr;
+    model.patch = for_few_presses && knows_compliance ? solvers::condense_without_fields(*model.body, candidates)
+                                                      : solvers::condense(*model.body, candidates);
     model.base = model.patch.base;
   }
 }

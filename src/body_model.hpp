@@ -60,8 +60,7 @@ std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domai
 solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Domain& domain,
                                     const solvers::SprinkleOptions& options, const solvers::NodeCloud& previous);
 
-/// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead (method
-/// galerkin) the body is one that can follow it. Throws as solvers::discretise does.
+/// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead the body is one that can follow it. Throws as solvers::discretise does.
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
               const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
 
@@ -89,7 +88,7 @@ solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const 
 
 /// The body of `before` follows the cut to the nodes and incision of `after` and goes over to it; only what the cut
 /// touched is computed. Where it cannot (with `only_update`: not by an update alone), both models stay as they are and
-/// the growth says why. Throws as solvers::GrowingBody::grow does, and all stays as it was.
+/// the growth says why. Throws as solvers::Growable::grow does, and all stays as it was.
 solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                                const solvers::SprinkleIncrement& change,
                                const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,

@@ -58,7 +58,7 @@ struct Recondensing::State {
     };
     if (!stop)
       compute([&] {
-        made.body = std::make_unique<solvers::GrowingBody>(std::move(problem), std::move(options));
+        made.body = solvers::make_growable(std::move(problem), std::move(options));
         return true;
       });
     bool condensed = false;
@@ -68,7 +68,9 @@ struct Recondensing::State {
         waiting.pop_front();
         compute([&] {
           const solvers::BodyGrowth growth =
-              made.body->grow(next.change, std::move(next.grown), [&] { return std::move(next.way_ahead); });
+              dynamic_cast<solvers::Growable&>(*made.body)
+                  .grow(
+                      next.change, std::move(next.grown), [&] { return std::move(next.way_ahead); }, false);
           return growth.uncovered[0] == '\0';
         });
         candidates = std::move(next.candidates);

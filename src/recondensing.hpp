@@ -10,8 +10,8 @@ namespace spherecut::app {
 
 /// The new body, and it condensed onto the tool's candidates.
 struct Recondensed {
-  std::unique_ptr<solvers::GrowingBody> body; // null: it could not be made, or could not follow
-  solvers::ContactPatch patch;                // without candidates only its base is there
+  std::unique_ptr<solvers::Discretisation> body; // Growable; null: it could not be made, or could not follow
+  solvers::ContactPatch patch;                   // without candidates only its base is there
 };
 
 /// What the new body becomes does not depend on when: it is assembled from what it was begun with, and then follows the
@@ -27,7 +27,7 @@ class Recondensing {
   Recondensing(const Recondensing&) = delete;
   Recondensing& operator=(const Recondensing&) = delete;
 
-  /// The cut has grown since: as GrowingBody::grow, when the body is there. `candidates` are those from then on.
+  /// The cut has grown since: as Growable::grow, when the body is there. `candidates` are those from then on.
   void follow(solvers::SprinkleIncrement change, solvers::Problem grown, topology::SurfaceMesh way_ahead,
               std::vector<int> candidates);
   /// Nobody will take it: it stops as soon as it can.

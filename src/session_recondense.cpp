@@ -29,8 +29,7 @@ void Session::set_recondensing(bool on) {
 // By an update alone where a replacement is on its way; where that cannot be, the replacement takes over and follows.
 solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& next,
                                         CutReport& report) {
-  const auto* body = dynamic_cast<const solvers::GrowingBody*>(model_.body.get());
-  const bool follows = body != nullptr;
+  const bool follows = dynamic_cast<const solvers::Growable*>(model_.body.get()) != nullptr;
   const auto grow = [&](bool only_update) {
     return app::follow_cut(scenario_, organ_.domain, *followed_, way_ahead, model_, next, only_update);
   };
@@ -61,7 +60,7 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
     return incisions_->way_through(blade_ahead(sample, last, length), to_rest);
   };
   double entry = 0; // m, from the blade to the body
-  if (dynamic_cast<const solvers::GrowingBody*>(model_.body.get()) != nullptr) {
+  if (dynamic_cast<const solvers::Growable*>(model_.body.get()) != nullptr) {
     if (result.cut->update == SystemUpdate::none)
       return;
     result.residual = residual(model_);

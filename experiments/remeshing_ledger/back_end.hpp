@@ -85,9 +85,8 @@ struct Resolution {
 };
 
 enum class Upkeep {
-  update,   // nodes exchanged near the increment, the system updated in its window
-  exchange, // nodes exchanged near the increment, the system rebuilt
-  scratch,  // everything anew
+  update,  // nodes exchanged near the increment, the system updated in its window
+  scratch, // everything anew
 };
 std::unique_ptr<BackEnd> make_meshless(const Scenario& scenario, const Resolution& resolution, bool galerkin,
                                        Upkeep upkeep);

@@ -22,7 +22,7 @@ class Meshless final : public BackEnd {
   }
 
   std::string name() const override {
-    const char* upkeep = upkeep_ == Upkeep::update ? "_update" : upkeep_ == Upkeep::exchange ? "_exchange" : "_scratch";
+    const char* upkeep = upkeep_ == Upkeep::update ? "_update" : "_scratch";
     return "meshless_" + std::string(solvers::to_string(options_.method)) + upkeep;
   }
 
@@ -51,12 +51,9 @@ class Meshless final : public BackEnd {
     } catch (const NumericalError& error) {
       return make_anew(std::move(increment));
     }
-    if (upkeep_ == Upkeep::exchange) {
-      increment.anew = true;
-      return discretise(std::move(increment));
-    }
     const double processor = processor_seconds(), wall = wall_seconds();
-    const solvers::BodyGrowth growth = body_->grow(change, problem(), [this] { return way_ahead(); });
+    const solvers::BodyGrowth growth = dynamic_cast<solvers::Growable&>(*body_).grow(
+        change, problem(), [this] { return way_ahead(); }, false);
     if (growth.uncovered[0] != '\0')
       return discretise(std::move(increment));
     increment.anew = growth.update.condensed_anew;
@@ -101,9 +98,7 @@ class Meshless final : public BackEnd {
   }
 
  private:
-  [[nodiscard]] const solvers::Discretisation& body() const {
-    return body_ ? static_cast<const solvers::Discretisation&>(*body_) : *rebuilt_;
-  }
+  [[nodiscard]] const solvers::Discretisation& body() const { return body_ ? *body_ : *rebuilt_; }
 
   /// Made anew the nodes are fine where the front is; nodes that stay must be fine wherever it will come to be.
   solvers::SprinkleOptions sprinkle_options() {
@@ -203,7 +198,7 @@ class Meshless final : public BackEnd {
       solvers::GrowthOptions growth;
       growth.method = options_;
       growth.way = way_ahead();
-      body_ = std::make_unique<solvers::GrowingBody>(problem(), growth);
+      body_ = solvers::make_growable(problem(), growth);
     } else {
       rebuilt_ = solvers::discretise(problem(), options_);
     }
@@ -242,7 +237,7 @@ class Meshless final : public BackEnd {
   std::shared_ptr<const topology::Incision> incision_;
   solvers::SpacingField spacing_;
   solvers::NodeCloud nodes_;
-  std::unique_ptr<solvers::GrowingBody> body_;
+  std::unique_ptr<solvers::Discretisation> body_; // Growable, or null
   std::unique_ptr<solvers::Discretisation> rebuilt_;
   solvers::Field field_;
 };

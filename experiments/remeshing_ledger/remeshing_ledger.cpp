@@ -27,9 +27,7 @@ Contender spheres(bool galerkin, Upkeep upkeep, std::vector<double> sizes) {
   Contender c;
   c.ours = true;
   c.make = [=](const Scenario& s, const Resolution& r) { return make_meshless(s, r, galerkin, upkeep); };
-  c.name = std::string(galerkin ? "galerkin" : "collocation") + (upkeep == Upkeep::update     ? "_update"
-                                                                 : upkeep == Upkeep::exchange ? "_exchange"
-                                                                                              : "_scratch");
+  c.name = std::string(galerkin ? "galerkin" : "collocation") + (upkeep == Upkeep::update ? "_update" : "_scratch");
   c.sizes = std::move(sizes);
   return c;
 }
@@ -119,8 +117,7 @@ std::vector<Contender> penny_contenders(bool quick) {
     contenders.push_back(
         xfem(Element::quadratic, quick ? std::vector{1.2, 0.8} : std::vector{1.4, 1.2, 0.8, 0.6, 0.45}));
   }
-  if (!quick)
-    contenders.push_back(spheres(false, Upkeep::exchange, {0.6, 0.45, 0.33}));
+  contenders.push_back(spheres(false, Upkeep::update, quick ? std::vector{0.6} : std::vector{0.6, 0.45, 0.33}));
   return contenders;
 }
 
@@ -133,7 +130,8 @@ std::vector<Contender> edge_contenders(bool quick) {
       spheres(true, Upkeep::update, {0.007, 0.005, 0.0037}),  carried({0.014, 0.01, 0.007}),
       remesh(Element::quarter_point, {0.014, 0.01, 0.007}),   remesh(Element::quadratic, {0.0065, 0.0045, 0.003}),
       remesh(Element::linear, {0.0045, 0.003, 0.002}),        split({0.0045, 0.003, 0.002}),
-      spheres(true, Upkeep::scratch, {0.007, 0.005, 0.0037}), spheres(false, Upkeep::exchange, {0.007, 0.005}),
+      spheres(true, Upkeep::scratch, {0.007, 0.005, 0.0037}), spheres(false, Upkeep::update, {0.007, 0.005}),
+      spheres(false, Upkeep::scratch, {0.007, 0.005}),
   };
   if (has_cavity_mesher())
     contenders.push_back(local_remesh({0.014, 0.01, 0.007, 0.005}));
@@ -148,7 +146,8 @@ std::vector<Contender> liver_contenders() {
   std::vector<Contender> contenders{spheres(true, Upkeep::update, {0.008}),  carried({0.008}),
                                     remesh(Element::quarter_point, {0.008}), split({0.004}),
                                     remesh(Element::quadratic, {0.006}),     remesh(Element::linear, {0.004}),
-                                    spheres(true, Upkeep::scratch, {0.008})};
+                                    spheres(true, Upkeep::scratch, {0.008}), spheres(false, Upkeep::update, {0.008}),
+                                    spheres(false, Upkeep::scratch, {0.008})};
   if (has_cavity_mesher())
     contenders.push_back(local_remesh({0.008}));
   if (has_xfem())

@@ -79,9 +79,20 @@ TEST_CASE("Changed rows, new and removed unknowns give what the whole changed ma
   // 20 to 22 will change; their rows reach 13 to 29.
   std::vector<int> unknowns(20);
   std::iota(unknowns.begin(), unknowns.end(), 12);
+  // What will not change is eliminated ahead; or too much is, and the window has to start over.
+  const bool enough = GENERATE(true, false);
   LuWindow window(a.sparseView(), unknowns, 4, {});
   CHECK(window.leads_far(0)); // 12 with 5
   CHECK_FALSE(window.leads_far(9));
+  std::vector<char> kept(24, 0);
+  std::fill_n(kept.begin() + 8, enough ? 3 : 2, 1);
+  window.prepare(kept);
+  CHECK(window.done_ahead() == (enough ? 17 : 18));
+  const MatrixX before = random_right(n, 2, 8);
+  MatrixX with_room = MatrixX::Zero(n + 4, 2);
+  with_room.topRows(n) = before;
+  const MatrixX at_first = a.partialPivLu().solve(before);
+  CHECK((solved(window, unknowns, n, with_room).topRows(n) - at_first).norm() < 1e-12 * at_first.norm());
   MatrixX changed = MatrixX::Zero(n + 1, n + 1); // one unknown more
   changed.topLeftCorner(n, n) = a;
   for (const int row : {20, 21, 22}) {
@@ -100,12 +111,20 @@ TEST_CASE("Changed rows, new and removed unknowns give what the whole changed ma
   window.add(20, 20, 2);
   window.add(20, 9, 0.5);
   window.add(10, 20, -0.7);
+  CHECK(window.is_prepared() == enough);
   window.factor();
+  CHECK(window.factored() == (enough ? 4 : 21));
   const MatrixX right = random_right(n + 1, 3, 5);
   MatrixX room = MatrixX::Zero(n + 4, 3);
   room.topRows(n + 1) = right;
   const MatrixX exact = changed.partialPivLu().solve(right);
   CHECK((solved(window, unknowns, n, room).topRows(n + 1) - exact).norm() < 1e-12 * exact.norm());
+  MatrixX seen = MatrixX::Zero(24, 2), forces = MatrixX::Zero(24, 2); // of slots done ahead, kept and new
+  seen(2, 0) = seen(9, 0) = seen(20, 1) = seen(15, 1) = 1;
+  forces(3, 0) = forces(10, 0) = forces(20, 1) = forces(17, 1) = 2;
+  const MatrixX condensed = seen.transpose() * window.solve(forces);
+  for (int time = 0; time < 2; ++time)
+    CHECK((window.condense(seen, forces) - condensed).norm() < 1e-13 * condensed.norm());
 
   // 21 goes: nobody asks for it any more.
   std::vector<int> rest;
