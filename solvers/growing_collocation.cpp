@@ -20,8 +20,9 @@ namespace {
 
 /// Part of the reach of a cell, in reaches, from which a change of the cut may give it other faces (update_cells).
 constexpr double cells_see = 3;
-constexpr double rounding = 1e-12; // of the right-hand side: a smaller residual is not corrected
-constexpr double lifted = 0.15;    // eyes are lifted off a sheet, in spacings
+constexpr double rounding = 1e-12;            // of the right-hand side: a smaller residual is not corrected
+constexpr double increments_before_new = 2.2; // as advance_before_new, in increments where those are long
+constexpr double lifted = 0.15;               // eyes are lifted off a sheet, in spacings
 
 class GrowingCollocation final : public Collocation, public Growable {
  public:
@@ -79,6 +80,7 @@ class GrowingCollocation final : public Collocation, public Growable {
   std::vector<int> origin_; // node at condensation, -1: added since
   int first_count_ = 0;     // nodes at condensation
   int next_room_ = 0;
+  std::vector<Vector3> last_places_; // where the cut was new at the last increment
 };
 
 void GrowingCollocation::make_window() {
@@ -433,6 +435,14 @@ void GrowingCollocation::write_rows(const std::vector<char>& changed) {
 }
 
 bool GrowingCollocation::factor_window(const std::vector<Vector3>& places) {
+  // How far this increment went from the last one: the next are expected to be no longer.
+  double step = 0;
+  if (!last_places_.empty()) {
+    const Nearness to_last(last_places_);
+    for (const Vector3& place : places)
+      step = std::max(step, to_last(place));
+  }
+  last_places_ = places;
   if (window_->is_prepared()) {
     window_->factor();
     return true;
@@ -446,9 +456,10 @@ bool GrowingCollocation::factor_window(const std::vector<Vector3>& places) {
       reach = std::max(reach, distance[i]);
   }
   const double finest = *std::min_element(problem_.nodes.spacings.begin(), problem_.nodes.spacings.end());
+  const double ahead = std::max(advance_before_new * finest, increments_before_new * step);
   std::vector<char> kept(static_cast<std::size_t>(window_->slots()), 0);
   for (std::size_t i = 0; i < distance.size(); ++i)
-    if (slot_[i] >= 0 && distance[i] <= reach + advance_before_new * finest)
+    if (slot_[i] >= 0 && distance[i] <= reach + ahead)
       std::fill_n(kept.begin() + static_cast<std::ptrdiff_t>(stride_) * slot_[i], stride_, 1);
   window_->prepare(kept);
   return false;
@@ -512,6 +523,7 @@ void GrowingCollocation::take_over(GrowingCollocation& other) {
   std::swap(origin_, other.origin_);
   std::swap(first_count_, other.first_count_);
   std::swap(next_room_, other.next_room_);
+  std::swap(last_places_, other.last_places_);
 }
 
 BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem grown,

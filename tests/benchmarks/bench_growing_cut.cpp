@@ -3,10 +3,11 @@
 // including the condensation to the contact; the window covers the next `ahead` increments of the known path, or a fan
 // of +-45 degrees for an unknown one. Beside it: condensing anew (the background's work) and a full rebuild.
 // BM_cholesky_900 (bench_rebuild) is the yardstick of the machine.
-#include "solvers/growing_cut.hpp"
+#include "solvers/growing_body.hpp"
 #include "topology/blade.hpp"
 #include "topology/cut_sheets.hpp"
 
+#include <algorithm>
 #include <benchmark/benchmark.h>
 #include <chrono>
 #include <cmath>
@@ -151,6 +152,86 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
   state.counters["left_window"] = condensed;
 }
 
+/// The same with method collocation, whose body prepares itself; condensed to the contact with `condense_seconds`.
+void growth_of_collocation(benchmark::State& state, SightRule sight) {
+  constexpr int increments = 3;
+  using Clock = std::chrono::steady_clock;
+  const auto since = [](Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  };
+  GrowthReport sum;
+  double anew = 0, rebuild = 0, compliance = 0;
+  int count = 0, condensed = 0;
+  for (auto _ : state) {
+    Scene scene(static_cast<int>(state.range(0)));
+    GrowthOptions options = scene.options(4, false, sight);
+    options.method.method = Method::collocation;
+    std::vector<Vector3> candidates;
+    for (const int node : options.contact)
+      candidates.push_back(scene.nodes.positions[node]);
+    auto start = Clock::now();
+    const auto body = make_growable(scene.problem(), options);
+    anew += since(start);
+    double seconds = 0;
+    for (int k = 0; k <= increments; ++k) {
+      const auto before = scene.sweep.incision();
+      scene.advance();
+      scene.sprinkling.incision = scene.sweep.incision();
+      const SprinkleIncrement change =
+          extend_sprinkling(*scene.domain, scene.sprinkling, scene.nodes, before.get(), scene.retired);
+      NodeCloud next;
+      for (int i = 0, r = 0; i < scene.nodes.size(); ++i)
+        if (r < std::ssize(change.removed) && change.removed[static_cast<std::size_t>(r)] == i)
+          ++r;
+        else
+          next.add(scene.nodes.positions[i], scene.nodes.spacings[i], scene.nodes.kinds[i], scene.nodes.normals[i]);
+      for (int j = 0; j < change.added.size(); ++j)
+        next.add(change.added.positions[j], change.added.spacings[j], change.added.kinds[j], change.added.normals[j]);
+      scene.nodes = std::move(next);
+      scene.retired.assign(scene.nodes.size(), false);
+      start = Clock::now();
+      const GrowthReport report = dynamic_cast<Growable&>(*body).grow(change, scene.problem(), {}, false).update;
+      std::vector<int> contact;
+      for (const Vector3& x : candidates)
+        if (const auto found = std::find(scene.nodes.positions.begin(), scene.nodes.positions.end(), x);
+            found != scene.nodes.positions.end())
+          contact.push_back(static_cast<int>(found - scene.nodes.positions.begin()));
+      const auto condensing = Clock::now();
+      benchmark::DoNotOptimize(body->contact_compliance(contact));
+      if (k == 0) // what is eliminated ahead is chosen
+        continue;
+      compliance += since(condensing);
+      seconds += since(start);
+      condensed += report.condensed_anew ? 1 : 0;
+      sum.boxes += report.boxes;
+      sum.factored += report.factored;
+      sum.window_nodes += report.window_nodes;
+      sum.spheres_seconds += report.spheres_seconds;
+      sum.cells_seconds += report.cells_seconds;
+      sum.factor_seconds += report.factor_seconds;
+      ++count;
+    }
+    state.SetIterationTime(seconds / increments);
+    start = Clock::now();
+    benchmark::DoNotOptimize(discretise(scene.problem(), options.method));
+    rebuild += since(start);
+    state.counters["nodes"] = scene.nodes.size();
+  }
+  state.counters["window"] = static_cast<double>(sum.window_nodes) / count;
+  state.counters["factored"] = static_cast<double>(sum.factored) / count;
+  state.counters["rows"] = static_cast<double>(sum.boxes) / count;
+  state.counters["spheres_ms"] = 1e3 * sum.spheres_seconds / count;
+  state.counters["cells_ms"] = 1e3 * sum.cells_seconds / count;
+  state.counters["factor_ms"] = 1e3 * sum.factor_seconds / count;
+  state.counters["condense_ms"] = 1e3 * compliance / count;
+  state.counters["anew_ms"] = 1e3 * anew * increments / count;
+  state.counters["rebuild_ms"] = 1e3 * rebuild * increments / count;
+  state.counters["left_window"] = condensed;
+}
+
+void BM_growing_cut_collocation(benchmark::State& state) {
+  growth_of_collocation(state, SightRule::enriched);
+}
 void BM_growing_cut_enriched(benchmark::State& state) {
   growth(state, 3, false, SightRule::enriched);
 }
@@ -163,6 +244,13 @@ void BM_growing_cut_diffraction_unknown_path(benchmark::State& state) {
 
 } // namespace
 
+BENCHMARK(BM_growing_cut_collocation)
+    ->Arg(300)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->UseManualTime()
+    ->Iterations(2)
+    ->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_growing_cut_enriched)
     ->Arg(300)
     ->Arg(1000)
