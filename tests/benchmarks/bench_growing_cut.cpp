@@ -160,8 +160,8 @@ void growth_of_collocation(benchmark::State& state, SightRule sight) {
     return std::chrono::duration<double>(Clock::now() - start).count();
   };
   GrowthReport sum;
-  double anew = 0, rebuild = 0, compliance = 0;
-  int count = 0, condensed = 0;
+  double anew = 0, rebuild = 0, compliance = 0, prepared_seconds = 0;
+  int count = 0, condensed = 0, prepared = 0;
   for (auto _ : state) {
     Scene scene(static_cast<int>(state.range(0)));
     GrowthOptions options = scene.options(4, false, sight);
@@ -201,7 +201,12 @@ void growth_of_collocation(benchmark::State& state, SightRule sight) {
       if (k == 0) // what is eliminated ahead is chosen
         continue;
       compliance += since(condensing);
-      seconds += since(start);
+      const double whole = since(start);
+      seconds += whole;
+      if (report.prepared) {
+        prepared_seconds += whole;
+        ++prepared;
+      }
       condensed += report.condensed_anew ? 1 : 0;
       sum.boxes += report.boxes;
       sum.factored += report.factored;
@@ -227,6 +232,8 @@ void growth_of_collocation(benchmark::State& state, SightRule sight) {
   state.counters["anew_ms"] = 1e3 * anew * increments / count;
   state.counters["rebuild_ms"] = 1e3 * rebuild * increments / count;
   state.counters["left_window"] = condensed;
+  state.counters["prepared"] = prepared;
+  state.counters["prepared_ms"] = prepared > 0 ? 1e3 * prepared_seconds / prepared : 0;
 }
 
 void BM_growing_cut_collocation(benchmark::State& state) {
