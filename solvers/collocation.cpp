@@ -32,6 +32,7 @@ Collocation::Collocation(Problem problem, const DiscretisationOptions& options, 
   find_constrained();
   loads_ = cell_loads(cells_, problem_, stress_of(problem_.loads.initial_strain));
   assemble_rows(problem_, cells_, spheres_, supports_, mixed_, std::vector<char>(nodes.positions.size(), 1), rows_);
+  graph_ = coupled_nodes();
   treat_pieces(options.unheld);
   report_.unknowns = stride_ * nodes.size();
   report_.assembly_seconds = assembly.seconds();
@@ -44,7 +45,8 @@ Collocation::Collocation(Problem problem, const DiscretisationOptions& options)
   report_.matrix_nonzeros = system.nonZeros();
   report_.assembly_seconds += assembly.seconds();
   const Stopwatch factor;
-  factorisation_ = factor_general(system);
+  factorisation_ = factor_general(system, elimination_order());
+  graph_ = {};
   report_.factor_nonzeros = factorisation_->nonzeros();
   report_.factor_seconds = factor.seconds();
   if (options.estimate_condition) {
@@ -78,34 +80,55 @@ double Collocation::load_work(const Field& field) const {
   return field.load_factor * work;
 }
 
-std::vector<Piece> Collocation::coupled_pieces() const {
+Collocation::NodeGraph Collocation::coupled_nodes() const {
   const int count = problem_.nodes.size();
   const auto couplings = [&](const auto& couple) {
     for (int i = 0; i < count; ++i) {
-      for (const int j : rows_[i].nodes)
-        couple(i, j);
+      const auto& held = constrained_[i]; // its rows are those of its support
+      if (mixed_ || !(held[0] && held[1] && held[2]))
+        for (const int j : rows_[i].nodes)
+          couple(i, j);
       for (int k = supports_.start[i]; k < supports_.start[i + 1]; ++k)
         couple(i, supports_.nodes[k]);
     }
   };
-  // A symmetric graph, each coupling as often as it comes.
+  // Both ways, as often as they come; then each once.
   std::vector<int> start(static_cast<std::size_t>(count) + 1, 0);
   couplings([&](int i, int j) {
     ++start[i + 1];
     ++start[j + 1];
   });
   std::partial_sum(start.begin(), start.end(), start.begin());
-  std::vector<int> neighbours(static_cast<std::size_t>(start.back())), next(start.begin(), start.end() - 1);
+  std::vector<int> all(static_cast<std::size_t>(start.back())), next(start.begin(), start.end() - 1);
   couplings([&](int i, int j) {
-    neighbours[next[i]++] = j;
-    neighbours[next[j]++] = i;
+    all[next[i]++] = j;
+    all[next[j]++] = i;
   });
-  return find_pieces(problem_, start, neighbours);
+  NodeGraph graph{{0}, {}};
+  std::vector<int> seen(static_cast<std::size_t>(count), -1);
+  for (int i = 0; i < count; ++i) {
+    for (int k = start[i]; k < start[i + 1]; ++k)
+      if (seen[all[k]] != i) {
+        seen[all[k]] = i;
+        graph.neighbours.push_back(all[k]);
+      }
+    graph.start.push_back(static_cast<int>(graph.neighbours.size()));
+  }
+  return graph;
+}
+
+std::vector<int> Collocation::elimination_order() const {
+  std::vector<int> order;
+  order.reserve(static_cast<std::size_t>(stride_) * problem_.nodes.positions.size());
+  for (const int node : fill_reducing_ordering(graph_.start, graph_.neighbours))
+    for (int c = 0; c < stride_; ++c)
+      order.push_back(stride_ * node + c);
+  return order;
 }
 
 void Collocation::treat_pieces(UnheldPieces unheld) {
   const int count = problem_.nodes.size();
-  report_.pieces = coupled_pieces();
+  report_.pieces = find_pieces(problem_, graph_.start, graph_.neighbours);
   dropped_.assign(count, 0);
   if (unheld == UnheldPieces::refuse)
     require_held(report_.pieces);

@@ -42,7 +42,13 @@ class Collocation : public ElasticBody {
   [[nodiscard]] virtual MatrixX solution(const MatrixX& right) const { return factorisation_->solve(right); }
   [[nodiscard]] std::vector<Field> responses_to(const MatrixX& right) const;
   void find_constrained();
-  [[nodiscard]] std::vector<Piece> coupled_pieces() const;
+  /// Which nodes couple, in compressed rows.
+  struct NodeGraph {
+    std::vector<int> start, neighbours;
+  };
+  [[nodiscard]] NodeGraph coupled_nodes() const;
+  /// Of the unknowns, from the graph of the nodes: a tenth of the work that their own graph would be.
+  [[nodiscard]] std::vector<int> elimination_order() const;
   /// Finds the pieces; springs hold those that nothing holds, or their unknowns are dropped.
   void treat_pieces(UnheldPieces unheld);
   [[nodiscard]] SparseMatrix constrained_system() const;
@@ -137,6 +143,7 @@ class Collocation : public ElasticBody {
   std::vector<char> dropped_;                    // per node: its piece is held by nothing and taken out
   std::vector<Vector3> loads_;                   // N, loads on each cell
   std::vector<BalanceRow> rows_;
+  NodeGraph graph_;                              // while it is assembled
   std::unique_ptr<Factorisation> factorisation_; // null: solution() knows another way
 };
 

@@ -250,6 +250,7 @@ class CholeskyFactorisation final : public OrderedCholesky {
   long nonzeros_ = 0;
 };
 
+constexpr Eigen::Index few = 3; // right-hand sides: fewer are solved for one by one, and refined
 constexpr int panel_width = 16; // right-hand sides swept together: two cache lines a row
 
 // row_j -= factor row_k and row /= pivot over one panel row, for the vector widths of the machine.
@@ -369,7 +370,7 @@ class LuFactorisation final : public Factorisation {
   LuFactorisation& operator=(const LuFactorisation&) = delete;
 
   MatrixX solve(const MatrixX& right_hand_sides) const override {
-    if (right_hand_sides.cols() < panel_width / 2)
+    if (right_hand_sides.cols() < few)
       return solve_with(UMFPACK_A, right_hand_sides);
     MatrixX result(right_hand_sides.rows(), right_hand_sides.cols());
     LuFactors(numeric_, static_cast<int>(matrix_.rows())).solve(right_hand_sides, result);

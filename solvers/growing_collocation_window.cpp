@@ -100,7 +100,8 @@ void GrowingCollocation::make_window() {
   report_.matrix_nonzeros = system.nonZeros();
   report_.assembly_seconds += watch.seconds();
   const Stopwatch factor;
-  window_ = std::make_unique<LuWindow>(system, std::move(unknowns), stride_ * options_.room);
+  window_ = std::make_unique<LuWindow>(system, std::move(unknowns), stride_ * options_.room, elimination_order());
+  graph_ = {};
   window_->factor();
   report_.factor_nonzeros = window_->factor_nonzeros();
   report_.factor_seconds = factor.seconds();
