@@ -1,15 +1,96 @@
 #include "solvers/cell_shapes.hpp"
 
+#include "solvers/cut_sight.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::solvers {
 
 void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes& cell) {
   cell.points = static_cast<int>(points.size());
+  cell.stride =
+      (cell.points + shape_kernel::points_together - 1) / shape_kernel::points_together * shape_kernel::points_together;
+  cell.nodes.clear();
+  cell.reached.clear();
+  if (!evaluate_together(points, cell))
+    evaluate_each(points, cell);
+}
+
+bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, CellShapes& cell) {
+  if (spheres_.basis() != Basis::linear || points.empty())
+    return false;
+  // The candidates of all points, in ascending order.
+  std::array<const int*, most_cell_points> seen{};
+  int seen_count = 0, first_word = static_cast<int>(marked_.size()), last_word = -1;
+  for (const QuadraturePoint& point : points) {
+    const std::span<const int> ids = spheres_.candidates(point.position);
+    if (ids.empty() || std::find(seen.begin(), seen.begin() + seen_count, ids.data()) != seen.begin() + seen_count)
+      continue;
+    seen[seen_count++] = ids.data();
+    first_word = std::min(first_word, ids.front() / 64);
+    last_word = std::max(last_word, ids.back() / 64);
+    for (const int id : ids)
+      marked_[id / 64] |= std::uint64_t{1} << id % 64;
+  }
+  candidates_.clear();
+  for (int word = first_word; word <= last_word; ++word)
+    for (std::uint64_t bits = std::exchange(marked_[word], 0); bits != 0; bits &= bits - 1) {
+      const int id = 64 * word + std::countr_zero(bits);
+      const Vector3& x = spheres_.centres()[id];
+      const double radius = spheres_.radii()[id];
+      cell.nodes.push_back(id);
+      candidates_.push_back({x.x(), x.y(), x.z(), 1 / (radius * radius)});
+    }
+
+  const shape_kernel::Kernel& kernel = shape_kernel::dispatched();
+  const int batches = cell.stride / shape_kernel::points_together;
+  std::array<shape_kernel::Points, (most_cell_points - 1) / shape_kernel::points_together + 1> batch;
+  inside_.resize(candidates_.size());
+  cell.reached.assign(candidates_.size(), 0);
+  for (int b = 0; b < batches; ++b) {
+    for (int p = 0; p < shape_kernel::points_together; ++p) {
+      const int q = shape_kernel::points_together * b + p;
+      const QuadraturePoint& point = points[q < cell.points ? q : 0];
+      batch[b].x[p] = point.position.x();
+      batch[b].y[p] = point.position.y();
+      batch[b].z[p] = point.position.z();
+      batch[b].factor[p] = q < cell.points ? std::sqrt(point.weight) : 0;
+    }
+    const int here = std::min(shape_kernel::points_together, cell.points - shape_kernel::points_together * b);
+    kernel.find_inside(candidates_.data(), static_cast<int>(candidates_.size()), batch[b], inside_.data());
+    for (std::size_t k = 0; k < inside_.size(); ++k)
+      cell.reached[k] |= (std::uint32_t{inside_[k]} & ((1U << here) - 1)) << shape_kernel::points_together * b;
+  }
+  int count = 0;
+  for (std::size_t k = 0; k < inside_.size(); ++k)
+    if (cell.reached[k] != 0) {
+      if (spheres_.cut() != nullptr && spheres_.cut()->concerns(cell.nodes[k]))
+        return false;
+      cell.nodes[count] = cell.nodes[k];
+      cell.reached[count] = cell.reached[k];
+      candidates_[count++] = candidates_[k];
+    }
+  cell.nodes.resize(count);
+  cell.reached.resize(count);
+  cell.gradients.resize(static_cast<std::size_t>(3 * count) * cell.stride);
+  for (int b = 0; b < batches; ++b) {
+    alignas(64) std::array<double, shape_kernel::points_together> condition;
+    kernel.gradients_at_points(candidates_.data(), count, batch[b], cell.stride,
+                               cell.gradients.data() + static_cast<std::ptrdiff_t>(shape_kernel::points_together) * b,
+                               condition.data());
+    for (const double c : condition)
+      if (!(c <= spheres_.worst_condition()))
+        return false;
+  }
+  return true;
+}
+
+void CellEvaluator::evaluate_each(std::span<const QuadraturePoint> points, CellShapes& cell) {
   cell.nodes.clear();
   for (int q = 0; q < cell.points; ++q) {
     const Vector3& x = points[q].position;
@@ -27,19 +108,16 @@ void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes
   for (int k = 0; k < std::ssize(cell.nodes); ++k)
     place_[cell.nodes[k]] = k;
   cell.reached.assign(cell.nodes.size(), 0);
-  cell.stride = (static_cast<int>(cell.nodes.size()) + 7) / 8 * 8;
-  cell.gradients.assign(static_cast<std::size_t>(3 * cell.points) * cell.stride, 0.0);
+  cell.gradients.assign(3 * cell.nodes.size() * static_cast<std::size_t>(cell.stride), 0.0);
   for (int q = 0; q < cell.points; ++q) {
     const double root = std::sqrt(points[q].weight);
-    double* x = cell.gradients.data() + static_cast<std::size_t>(3 * q) * cell.stride;
-    double* y = x + cell.stride;
-    double* z = y + cell.stride;
     for (int k = 0; k < at_point_[q].size(); ++k) {
       const int p = place_[at_point_[q].nodes[k]];
       cell.reached[p] |= std::uint32_t{1} << q;
-      x[p] = root * at_point_[q].dx[k];
-      y[p] = root * at_point_[q].dy[k];
-      z[p] = root * at_point_[q].dz[k];
+      double* to = cell.gradients.data() + 3 * static_cast<std::ptrdiff_t>(p) * cell.stride + q;
+      to[0] = root * at_point_[q].dx[k];
+      to[cell.stride] = root * at_point_[q].dy[k];
+      to[2 * static_cast<std::ptrdiff_t>(cell.stride)] = root * at_point_[q].dz[k];
     }
   }
   for (int node : cell.nodes)

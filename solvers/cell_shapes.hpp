@@ -2,7 +2,7 @@
 #pragma once
 
 #include "solvers/background_cells.hpp"
-#include "solvers/shape_functions.hpp"
+#include "solvers/shape_kernel.hpp"
 
 #include <cstdint>
 #include <span>
@@ -14,21 +14,34 @@ struct CellShapes {
   std::vector<int> nodes;             // ascending
   std::vector<std::uint32_t> reached; // bit q: the node supports point q; nodes without a common bit do not couple
   int points = 0;
-  int stride = 0;                // columns, a multiple of 8
-  std::vector<double> gradients; // [point][axis][stride], 1/m times sqrt(weight)
+  int stride = 0;                // room for the points, a multiple of 8
+  std::vector<double> gradients; // [node][axis][stride], 1/m times sqrt(weight); zero in the room that is left
+  /// Of the k-th node at point q.
+  [[nodiscard]] Vector3 gradient(std::size_t k, int q) const {
+    const double* at = gradients.data() + 3 * k * static_cast<std::size_t>(stride) + q;
+    return {at[0], at[stride], at[2 * static_cast<std::ptrdiff_t>(stride)]};
+  }
 };
 
 /// Evaluates cells one after another; keeps its memory between them.
 class CellEvaluator {
  public:
-  explicit CellEvaluator(const Spheres& spheres) : spheres_(spheres), place_(spheres.size(), -1) {}
+  explicit CellEvaluator(const Spheres& spheres)
+      : spheres_(spheres), place_(spheres.size(), -1), marked_(spheres.size() / 64 + 1, 0) {}
 
   /// Throws NumericalError when a point has no sound support.
   void evaluate(std::span<const QuadraturePoint> points, CellShapes& cell);
 
  private:
+  /// All points at once, where no cut is near and every support is sound; else false.
+  bool evaluate_together(std::span<const QuadraturePoint> points, CellShapes& cell);
+  void evaluate_each(std::span<const QuadraturePoint> points, CellShapes& cell);
+
   const Spheres& spheres_;
-  std::vector<int> place_; // of a node in the cell, -1 outside
+  std::vector<int> place_;            // of a node in the cell, -1 outside
+  std::vector<std::uint64_t> marked_; // a bit of every node, all 0 between calls
+  std::vector<shape_kernel::Sphere> candidates_;
+  std::vector<std::uint8_t> inside_;
   std::array<ShapeFunctions, most_cell_points> at_point_;
 };
 

@@ -37,6 +37,8 @@ class CutSight {
     return any != 0;
   }
 
+  [[nodiscard]] bool concerns(int node) const { return concern_[node] != 0; }
+
   /// Whether x lies in the reach of the enrichment.
   [[nodiscard]] bool enriches(const Vector3& x) const;
 

@@ -461,10 +461,8 @@ void Galerkin::assemble_loads() {
       const CellShapes& cell = shapes_[c];
       for (int q = 0; q < cell.points; ++q) {
         const double root = std::sqrt(cells_.points[cells_.start[c] + q].weight);
-        const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
         for (std::size_t k = 0; k < cell.nodes.size(); ++k)
-          loads_.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) +=
-              root * initial * Vector3(x[k], x[cell.stride + k], x[2 * cell.stride + k]);
+          loads_.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) += root * initial * cell.gradient(k, q);
       }
     }
   clear_dropped(loads_);

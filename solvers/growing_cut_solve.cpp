@@ -53,15 +53,13 @@ VectorX GrowingCut::State::elastic_forces(const VectorX& coefficients) const {
     forces.segment<3>(3 * static_cast<Eigen::Index>(elastic_order[k])) = product.segment<3>(3 * k);
   const auto add = [&](const CellShapes& cell, double sign) {
     for (int q = 0; q < cell.points; ++q) {
-      const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
-      const double *y = x + cell.stride, *z = y + cell.stride;
       Matrix3 gradient = Matrix3::Zero();
       for (std::size_t k = 0; k < cell.nodes.size(); ++k)
-        gradient += coefficients.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) *
-                    Eigen::RowVector3d(x[k], y[k], z[k]);
+        gradient +=
+            coefficients.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) * cell.gradient(k, q).transpose();
       const Matrix3 stress = sign * stress_from_gradient(problem.material, gradient);
       for (std::size_t k = 0; k < cell.nodes.size(); ++k)
-        forces.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) += stress * Vector3(x[k], y[k], z[k]);
+        forces.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) += stress * cell.gradient(k, q);
     }
   };
   for (const Box& box : boxes)

@@ -134,11 +134,9 @@ struct GrowingCut::State {
             into.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
         }
         const CellShapes& cell = box.cells[c];
-        const double* x = cell.gradients.data() + static_cast<std::ptrdiff_t>(3 * q) * cell.stride;
         const double root = sign * std::sqrt(point.weight);
         for (std::size_t k = 0; k < cell.nodes.size(); ++k)
-          into.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) +=
-              root * initial * Vector3(x[k], x[cell.stride + k], x[2 * cell.stride + k]);
+          into.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) += root * initial * cell.gradient(k, q);
       }
   }
 

@@ -25,6 +25,18 @@ struct LinearOutput {
   std::array<double*, 6> second; // xx yy zz xy xz yz
 };
 
+/// A sphere where it stands: centre, m, and 1 / R^2, 1/m2.
+struct Sphere {
+  double x, y, z, q;
+};
+
+inline constexpr int points_together = 8;
+
+/// Points that share their candidates. Gradients there are multiplied by `factor`.
+struct Points {
+  alignas(64) double x[points_together], y[points_together], z[points_together], factor[points_together];
+};
+
 struct Kernel {
   const char* name;
   int width; // doubles per register
@@ -35,6 +47,13 @@ struct Kernel {
   double (*evaluate_linear)(const Support& support, const LinearOutput& output);
   /// The same with second derivatives.
   double (*evaluate_linear_second)(const Support& support, const LinearOutput& output);
+  /// Bit p of inside[k]: sphere k holds point p.
+  void (*find_inside)(const Sphere* spheres, int count, const Points& points, std::uint8_t* inside);
+  /// Gradients of the linear basis at all points together: of sphere k along `axis` at point p in
+  /// gradients[(3 k + axis) stride + p], zero where the sphere does not hold the point, and the condition at each point
+  /// as evaluate_linear gives it. `spheres` are all that hold any of the points.
+  void (*gradients_at_points)(const Sphere* spheres, int count, const Points& points, int stride, double* gradients,
+                              double* condition);
 };
 
 /// Runs everywhere.

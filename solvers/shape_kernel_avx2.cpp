@@ -13,10 +13,15 @@ namespace spherecut::solvers::shape_kernel {
 namespace {
 
 constexpr int width = 4;
-using Pack = __m256d;
+using Pack __attribute__((vector_size(32))) = double; // __m256d as a template argument
 
 inline Pack root(Pack v) {
   return _mm256_sqrt_pd(v);
+}
+
+// A bit for every lane that is below one.
+inline unsigned below_one(Pack v) {
+  return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(v, _mm256_set1_pd(1), _CMP_LT_OQ)));
 }
 
 // Entry m of `pick` moves the lanes whose bit is set in m to the front: positions of lanes, and of their 32-bit halves.
@@ -79,7 +84,8 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
 #pragma GCC pop_options
 
 const Kernel* avx2() {
-  static constexpr Kernel kernel{"avx2", width, collect, evaluate<false>, evaluate<true>};
+  static constexpr Kernel kernel{
+      "avx2", width, collect, evaluate<false>, evaluate<true>, find_inside, gradients_at_points};
   return &kernel;
 }
 

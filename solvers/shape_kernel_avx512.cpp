@@ -13,11 +13,16 @@ namespace spherecut::solvers::shape_kernel {
 namespace {
 
 constexpr int width = 8;
-using Pack = __m512d;
+using Pack __attribute__((vector_size(64))) = double; // __m512d as a template argument
 
 // All lanes kept by the mask: the unmasked intrinsic of GCC 12 warns of its own uninitialised operand.
 inline Pack root(Pack v) {
   return _mm512_maskz_sqrt_pd(0xff, v);
+}
+
+// A bit for every lane that is below one.
+inline unsigned below_one(Pack v) {
+  return _mm512_cmp_pd_mask(v, _mm512_set1_pd(1), _CMP_LT_OQ);
 }
 
 // Compressed in the register and stored whole: compressing stores are slow on some machines.
@@ -55,7 +60,8 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
 #pragma GCC pop_options
 
 const Kernel* avx512() {
-  static constexpr Kernel kernel{"avx512", width, collect, evaluate<false>, evaluate<true>};
+  static constexpr Kernel kernel{"avx512",           width, collect, evaluate<false>, evaluate<true>, find_inside,
+                                 gradients_at_points};
   return &kernel;
 }
 

@@ -1,5 +1,6 @@
 // Body of the shape kernel, written for registers of `width` doubles. The including unit defines, in its own namespace,
-//   width, Pack (a GCC vector of `width` doubles), root(Pack), and collect(cell, point, support).
+//   width, Pack (a GCC vector of `width` doubles), root(Pack), below_one(Pack) (a bit for every lane), and
+//   collect(cell, point, support).
 // Everything here has internal linkage: nothing compiled for a wide instruction set can be linked into portable code.
 
 inline Pack load(const double* p) {
@@ -36,27 +37,29 @@ inline void add_lanes(const Pack* packs, int count, double* sums) {
 }
 
 // Symmetric 4 x 4 matrix, upper triangle by rows: 00 01 02 03 11 12 13 22 23 33.
+template <class V>
 struct Symmetric4 {
-  double m[10];
+  V m[10];
 };
 
 // Inverse by A = L D L^T, A^-1 = L^-T D^-1 L^-1. A singular matrix gives entries that are huge or not finite.
-inline Symmetric4 inverse(const Symmetric4& a) {
-  const double* m = a.m;
-  const double i0 = 1 / m[0];
-  const double l10 = m[1] * i0, l20 = m[2] * i0, l30 = m[3] * i0;
-  const double i1 = 1 / (m[4] - l10 * m[1]);
-  const double t12 = m[5] - l10 * m[2], t13 = m[6] - l10 * m[3];
-  const double l21 = t12 * i1, l31 = t13 * i1;
-  const double i2 = 1 / (m[7] - l20 * m[2] - l21 * t12);
-  const double t23 = m[8] - l20 * m[3] - l21 * t13;
-  const double l32 = t23 * i2;
-  const double i3 = 1 / (m[9] - l30 * m[3] - l31 * t13 - l32 * t23);
+template <class V>
+Symmetric4<V> inverse(const Symmetric4<V>& a) {
+  const V* m = a.m;
+  const V i0 = 1 / m[0];
+  const V l10 = m[1] * i0, l20 = m[2] * i0, l30 = m[3] * i0;
+  const V i1 = 1 / (m[4] - l10 * m[1]);
+  const V t12 = m[5] - l10 * m[2], t13 = m[6] - l10 * m[3];
+  const V l21 = t12 * i1, l31 = t13 * i1;
+  const V i2 = 1 / (m[7] - l20 * m[2] - l21 * t12);
+  const V t23 = m[8] - l20 * m[3] - l21 * t13;
+  const V l32 = t23 * i2;
+  const V i3 = 1 / (m[9] - l30 * m[3] - l31 * t13 - l32 * t23);
   // Rows of L^-1 below the unit diagonal.
-  const double k10 = -l10, k21 = -l21, k32 = -l32;
-  const double k20 = l21 * l10 - l20, k31 = l32 * l21 - l31;
-  const double k30 = -(l30 + l31 * k10 + l32 * k20);
-  const double u10 = i1 * k10, u20 = i2 * k20, u30 = i3 * k30, u21 = i2 * k21, u31 = i3 * k31, u32 = i3 * k32;
+  const V k10 = -l10, k21 = -l21, k32 = -l32;
+  const V k20 = l21 * l10 - l20, k31 = l32 * l21 - l31;
+  const V k30 = -(l30 + l31 * k10 + l32 * k20);
+  const V u10 = i1 * k10, u20 = i2 * k20, u30 = i3 * k30, u21 = i2 * k21, u31 = i3 * k31, u32 = i3 * k32;
   return {{i0 + k10 * u10 + k20 * u20 + k30 * u30, u10 + k20 * u21 + k30 * u31, u20 + k30 * u32, u30,
            i1 + k21 * u21 + k31 * u31, u21 + k31 * u32, u31, i2 + k32 * u32, u32, i3}};
 }
@@ -64,20 +67,26 @@ inline Symmetric4 inverse(const Symmetric4& a) {
 inline double magnitude(double v) {
   return __builtin_fabs(v);
 }
-inline double larger(double a, double b) {
-  return a > b || a != a ? a : b;
+inline Pack magnitude(Pack v) {
+  return v < 0 ? -v : v;
+}
+template <class V>
+V larger(V a, V b) {
+  return (a > b) | (a != a) ? a : b;
 } // keeps a NaN in either place
 
-inline double norm1(const Symmetric4& a) {
-  const double c01 = magnitude(a.m[1]), c02 = magnitude(a.m[2]), c03 = magnitude(a.m[3]), c12 = magnitude(a.m[5]),
-               c13 = magnitude(a.m[6]), c23 = magnitude(a.m[8]);
-  const double first = larger(magnitude(a.m[0]) + c01 + c02 + c03, magnitude(a.m[4]) + c01 + c12 + c13);
-  const double second = larger(magnitude(a.m[7]) + c02 + c12 + c23, magnitude(a.m[9]) + c03 + c13 + c23);
+template <class V>
+V norm1(const Symmetric4<V>& a) {
+  const V c01 = magnitude(a.m[1]), c02 = magnitude(a.m[2]), c03 = magnitude(a.m[3]), c12 = magnitude(a.m[5]),
+          c13 = magnitude(a.m[6]), c23 = magnitude(a.m[8]);
+  const V first = larger(magnitude(a.m[0]) + c01 + c02 + c03, magnitude(a.m[4]) + c01 + c12 + c13);
+  const V second = larger(magnitude(a.m[7]) + c02 + c12 + c23, magnitude(a.m[9]) + c03 + c13 + c23);
   return larger(first, second);
 }
 
-inline void multiply(const Symmetric4& a, const double* v, double* out) {
-  const double* m = a.m;
+template <class V>
+void multiply(const Symmetric4<V>& a, const V* v, V* out) {
+  const V* m = a.m;
   out[0] = m[0] * v[0] + m[1] * v[1] + m[2] * v[2] + m[3] * v[3];
   out[1] = m[1] * v[0] + m[4] * v[1] + m[5] * v[2] + m[6] * v[3];
   out[2] = m[2] * v[0] + m[5] * v[1] + m[7] * v[2] + m[8] * v[3];
@@ -134,13 +143,13 @@ double evaluate(const Support& support, const LinearOutput& output) {
   }
   const double scale = __builtin_sqrt(support.q[0]); // 1 / l, of the first sphere of the support
   const double scale2 = scale * scale;
-  Symmetric4 a;
+  Symmetric4<double> a;
   add_lanes(moment, 10, a.m);
   for (int i = 1; i < 4; ++i)
     a.m[i] *= scale;
   for (int i = 4; i < 10; ++i)
     a.m[i] *= scale2;
-  const Symmetric4 b = inverse(a);
+  const Symmetric4<double> b = inverse(a);
   const double condition = norm1(a) * norm1(b);
 
   // From here on coefficient vectors are those of {1, d}, so that P_j . c needs no scaling.
@@ -222,4 +231,99 @@ double evaluate(const Support& support, const LinearOutput& output) {
       }
   }
   return condition;
+}
+
+inline void find_inside(const Sphere* spheres, int count, const Points& points, std::uint8_t* inside) {
+  for (int k = 0; k < count; ++k) {
+    const Sphere& sphere = spheres[k];
+    unsigned bits = 0;
+    for (int p = 0; p < points_together; p += width) {
+      const Pack x = sphere.x - load(points.x + p), y = sphere.y - load(points.y + p),
+                 z = sphere.z - load(points.z + p);
+      bits |= below_one((x * x + y * y + z * z) * sphere.q) << p;
+    }
+    inside[k] = static_cast<std::uint8_t>(bits);
+  }
+}
+
+// As evaluate(), with a point in every lane in place of a node: no sums over lanes, and one inverse for all of them.
+inline void gradients_at_points(const Sphere* spheres, int count, const Points& points, int stride, double* gradients,
+                                double* condition) {
+  for (int p = 0; p < points_together; p += width) {
+    const Pack px = load(points.x + p), py = load(points.y + p), pz = load(points.z + p);
+    Pack moment[10] = {}, first_q = {};
+    double* to = gradients + p;
+    for (int k = 0; k < count; ++k, to += 3 * static_cast<std::ptrdiff_t>(stride)) {
+      const Sphere& sphere = spheres[k];
+      const Pack x = sphere.x - px, y = sphere.y - py, z = sphere.z - pz;
+      const Pack s = root((x * x + y * y + z * z) * sphere.q);
+      Pack t = 1 - s;
+      t = t > 0 ? t : Pack{};
+      const Pack q = Pack{} + sphere.q;
+      first_q = (first_q == 0) & (t > 0) ? q : first_q;
+      const Pack t2 = t * t, w = t2 * t * (1 + 3 * s);
+      store(to, w); // until the results are known the gradients keep the weights
+      store(to + stride, 12 * t2 * q);
+      const Pack wx = w * x, wy = w * y, wz = w * z;
+      moment[0] += w;
+      moment[1] += wx;
+      moment[2] += wy;
+      moment[3] += wz;
+      moment[4] += wx * x;
+      moment[5] += wx * y;
+      moment[6] += wx * z;
+      moment[7] += wy * y;
+      moment[8] += wy * z;
+      moment[9] += wz * z;
+    }
+    const Pack scale = root(first_q), scale2 = scale * scale;
+    Symmetric4<Pack> a;
+    for (int i = 0; i < 10; ++i)
+      a.m[i] = i == 0 ? moment[i] : i < 4 ? scale * moment[i] : scale2 * moment[i];
+    const Symmetric4<Pack> b = inverse(a);
+    store(condition + p, norm1(a) * norm1(b));
+
+    Pack c[4] = {b.m[0], scale * b.m[1], scale * b.m[2], scale * b.m[3]};
+    Pack t[9] = {};
+    to = gradients + p;
+    for (int k = 0; k < count; ++k, to += 3 * static_cast<std::ptrdiff_t>(stride)) {
+      const Sphere& sphere = spheres[k];
+      const Pack x = sphere.x - px, y = sphere.y - py, z = sphere.z - pz;
+      const Pack r = load(to + stride) * (c[0] + c[1] * x + c[2] * y + c[3] * z);
+      const Pack rx = r * x, ry = r * y, rz = r * z;
+      t[0] += rx;
+      t[1] += ry;
+      t[2] += rz;
+      t[3] += rx * x;
+      t[4] += rx * y;
+      t[5] += rx * z;
+      t[6] += ry * y;
+      t[7] += ry * z;
+      t[8] += rz * z;
+    }
+    for (int i = 3; i < 9; ++i)
+      t[i] *= scale;
+    const Pack right[3][4] = {
+        {-t[0], scale - t[3], -t[4], -t[5]}, {-t[1], -t[4], scale - t[6], -t[7]}, {-t[2], -t[5], -t[7], scale - t[8]}};
+    const Pack factor = load(points.factor + p);
+    Pack c1[3][4];
+    for (int i = 0; i < 3; ++i) {
+      multiply(b, right[i], c1[i]);
+      c1[i][0] *= factor;
+      for (int e = 1; e < 4; ++e)
+        c1[i][e] *= factor * scale;
+    }
+    for (Pack& coefficient : c)
+      coefficient *= factor;
+
+    to = gradients + p;
+    for (int k = 0; k < count; ++k, to += 3 * static_cast<std::ptrdiff_t>(stride)) {
+      const Sphere& sphere = spheres[k];
+      const Pack x = sphere.x - px, y = sphere.y - py, z = sphere.z - pz;
+      const Pack w = load(to), r = load(to + stride) * (c[0] + c[1] * x + c[2] * y + c[3] * z);
+      store(to, r * x + w * (c1[0][0] + c1[0][1] * x + c1[0][2] * y + c1[0][3] * z));
+      store(to + stride, r * y + w * (c1[1][0] + c1[1][1] * x + c1[1][2] * y + c1[1][3] * z));
+      store(to + 2 * stride, r * z + w * (c1[2][0] + c1[2][1] * x + c1[2][2] * y + c1[2][3] * z));
+    }
+  }
 }

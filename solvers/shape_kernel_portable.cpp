@@ -15,9 +15,15 @@ using Pack __attribute__((vector_size(16))) = double;
 inline Pack root(Pack v) {
   return _mm_sqrt_pd(v);
 }
+inline unsigned below_one(Pack v) {
+  return static_cast<unsigned>(_mm_movemask_pd(_mm_cmplt_pd(v, _mm_set1_pd(1))));
+}
 #else
 inline Pack root(Pack v) {
   return Pack{__builtin_sqrt(v[0]), __builtin_sqrt(v[1])};
+}
+inline unsigned below_one(Pack v) {
+  return (v[0] < 1 ? 1U : 0U) | (v[1] < 1 ? 2U : 0U);
 }
 #endif
 
@@ -47,7 +53,8 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
 } // namespace
 
 const Kernel& portable() {
-  static constexpr Kernel kernel{"portable", width, collect, evaluate<false>, evaluate<true>};
+  static constexpr Kernel kernel{"portable",         width, collect, evaluate<false>, evaluate<true>, find_inside,
+                                 gradients_at_points};
   return kernel;
 }
 

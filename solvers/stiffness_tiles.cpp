@@ -62,12 +62,11 @@ void CellCluster::add(const CellShapes& cell) {
     group.by_node[lane] |= reached;
     double* to =
         gradients_.data() + local * group_stride + static_cast<std::size_t>(points_) * gradients_at_point + lane;
-    const double* from = cell.gradients.data() + k;
-    for (int q = 0; q < cell.points;
-         ++q, from += 3 * static_cast<std::ptrdiff_t>(cell.stride), to += gradients_at_point) {
+    const double* from = cell.gradients.data() + 3 * k * static_cast<std::size_t>(cell.stride);
+    for (int q = 0; q < cell.points; ++q, ++from, to += gradients_at_point) {
       to[0] = from[0];
       to[tile_nodes] = from[cell.stride];
-      to[2 * tile_nodes] = from[2 * cell.stride];
+      to[2 * tile_nodes] = from[2 * static_cast<std::ptrdiff_t>(cell.stride)];
     }
   }
   points_ += cell.points;

@@ -63,16 +63,17 @@ TEST_CASE("Every pair of nodes that cells or means couple stands in one tile wit
     for (int node = 0; node + 3 < count; ++node) // the last three are in no cell
       if (value(random) > 0.2)
         cell.nodes.push_back(node);
-    cell.stride = (static_cast<int>(cell.nodes.size()) + 7) / 8 * 8;
+    cell.stride = (cell.points + 7) / 8 * 8;
     cell.reached.assign(cell.nodes.size(), 0);
-    cell.gradients.assign(static_cast<std::size_t>(3 * cell.points) * cell.stride, 0.0);
+    cell.gradients.assign(3 * cell.nodes.size() * static_cast<std::size_t>(cell.stride), 0.0);
     for (int q = 0; q < cell.points; ++q) {
       MatrixX g = MatrixX::Zero(3, count);
       for (std::size_t k = 0; k < cell.nodes.size(); ++k)
         if (value(random) > 0.6) {
           cell.reached[k] |= std::uint32_t{1} << q;
           for (int a = 0; a < 3; ++a)
-            g(a, cell.nodes[k]) = cell.gradients[static_cast<std::size_t>(3 * q + a) * cell.stride + k] = value(random);
+            g(a, cell.nodes[k]) = cell.gradients[(3 * k + a) * static_cast<std::size_t>(cell.stride) + q] =
+                value(random);
         }
       const double sign = c < 20 ? 1 : -1;
       for (int i = 0; i < count; ++i)
