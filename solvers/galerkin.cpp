@@ -40,8 +40,7 @@ class Galerkin final : public ElasticBody {
     background.cell_size = options.cell_size;
     cells_ = background_cells(*problem_.domain, problem_.nodes, background, problem_.incision.get());
     hold_surface();
-    evaluate_cells();
-    assemble(options.unheld);
+    assemble(options.unheld, !is_factored || !initial_stress(problem_).isZero(0));
     assemble_loads();
     report_.unknowns = 3 * problem_.nodes.size();
     report_.matrix_nonzeros = stiffness_.nonZeros();
@@ -123,11 +122,10 @@ class Galerkin final : public ElasticBody {
                   const std::vector<Vector3>& nodal_forces) const override;
 
  private:
-  void evaluate_cells();
   void hold_surface();
   void treat_unheld(UnheldPieces unheld);
-  void assemble(UnheldPieces unheld);
-  [[nodiscard]] StiffnessTiles tiles_of_cells() const;
+  void assemble(UnheldPieces unheld, bool shapes_are_kept);
+  [[nodiscard]] StiffnessTiles evaluate_cells(bool shapes_are_kept);
   void order_nodes(const std::vector<StiffnessTiles::Pair>& pairs, UnheldPieces unheld);
   void build_matrix(std::vector<StiffnessTiles::Pair> pairs);
   [[nodiscard]] bool is_dropped(int node) const { return !dropped_.empty() && dropped_[node] != 0; }
@@ -245,17 +243,6 @@ class Galerkin final : public ElasticBody {
   std::unique_ptr<OrderedCholesky> factorisation_;
 };
 
-void Galerkin::evaluate_cells() {
-  shapes_.resize(cells_.start.size() - 1);
-  const SharedSightTime sight_time;
-  parallel_ranges(static_cast<int>(shapes_.size()), 64, [&](int begin, int end) {
-    const SharedSightTime::Part timed(sight_time);
-    CellEvaluator evaluator(spheres_);
-    for (int c = begin; c < end; ++c)
-      evaluator.evaluate(cells_.of(c), shapes_[c]);
-  });
-}
-
 void Galerkin::hold_surface() {
   patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
   std::vector<int> nodes;
@@ -287,31 +274,47 @@ void Galerkin::treat_unheld(UnheldPieces unheld) {
   }
 }
 
-/// The same bits with any number of threads: every column of tiles gets its clusters in their order.
-StiffnessTiles Galerkin::tiles_of_cells() const {
+/// Evaluates the cells, cluster by cluster while they are at hand. The same bits with any number of threads: every
+/// column of tiles gets its clusters in their order.
+StiffnessTiles Galerkin::evaluate_cells(bool shapes_are_kept) {
   StiffnessTiles tiles(problem_.nodes.positions);
   const std::vector<int> order = cells_by_place(cells_);
-  const int threads = thread_count(), batch = threads == 1 ? 1 : 32;
-  std::vector<CellCluster> clusters(batch, CellCluster(tiles.groups()));
-  std::vector<std::vector<int>> cells(batch);
+  shapes_.resize(shapes_are_kept ? order.size() : 0);
+  struct Worker {
+    CellEvaluator evaluator;
+    CellCluster cluster;
+    CellShapes shapes;
+    std::span<const int> cells;
+  };
+  const int threads = thread_count(), batch = threads == 1 ? 1 : 32, shares = threads == 1 ? 1 : 4 * threads;
+  std::vector<Worker> workers(batch, {CellEvaluator(spheres_), CellCluster(tiles.groups()), {}, {}});
   for (std::size_t next = 0; next < order.size();) {
     int in_batch = 0;
     for (; in_batch < batch && next < order.size(); ++in_batch) {
-      cells[in_batch].clear();
-      for (int points = 0; next < order.size() && points + shapes_[order[next]].points <= tile_points; ++next) {
-        points += shapes_[order[next]].points;
-        cells[in_batch].push_back(order[next]);
+      const std::size_t first = next;
+      for (int points = 0; next < order.size(); ++next) {
+        points += static_cast<int>(cells_.of(order[next]).size());
+        if (points > tile_points)
+          break;
       }
+      workers[in_batch].cells = std::span(order).subspan(first, next - first);
     }
-    parallel_ranges(in_batch, 1, [&](int k, int) {
-      clusters[k].clear();
-      for (const int cell : cells[k])
-        clusters[k].add(shapes_[cell]);
-    });
-    const int shares = threads == 1 ? 1 : 4 * threads;
+    {
+      const SharedSightTime sight_time;
+      parallel_ranges(in_batch, 1, [&](int k, int) {
+        const SharedSightTime::Part timed(sight_time);
+        Worker& worker = workers[k];
+        worker.cluster.clear();
+        for (const int cell : worker.cells) {
+          CellShapes& shapes = shapes_are_kept ? shapes_[cell] : worker.shapes;
+          worker.evaluator.evaluate(cells_.of(cell), shapes);
+          worker.cluster.add(shapes);
+        }
+      });
+    }
     parallel_ranges(shares, 1, [&](int share, int) {
       for (int k = 0; k < in_batch; ++k)
-        tiles.add(clusters[k], 1, share, shares);
+        tiles.add(workers[k].cluster, 1, share, shares);
     });
   }
   for (std::size_t p = 0; p < held_.size(); ++p)
@@ -320,8 +323,8 @@ StiffnessTiles Galerkin::tiles_of_cells() const {
   return tiles;
 }
 
-void Galerkin::assemble(UnheldPieces unheld) {
-  const StiffnessTiles tiles = tiles_of_cells();
+void Galerkin::assemble(UnheldPieces unheld, bool shapes_are_kept) {
+  const StiffnessTiles tiles = evaluate_cells(shapes_are_kept);
   std::vector<StiffnessTiles::Pair> pairs = tiles.pairs();
   order_nodes(pairs, unheld);
   build_matrix(std::move(pairs));
@@ -395,15 +398,25 @@ void Galerkin::build_matrix(std::vector<StiffnessTiles::Pair> pairs) {
   double* values = stiffness_.valuePtr();
   outer[0] = 0;
   const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
-  const auto for_blocks = [&](const auto& visit) { // visit(pair, its entry (0, 0), entries from one column to the next)
-    for (int j = 0; j < count; ++j)
-      for (int k = start[j]; k < start[j + 1]; ++k)
-        visit(pairs[sorted[k]], 9 * start[j] + 3 * (k - start[j]), 3 * (start[j + 1] - start[j]));
-  };
-  for (int j = 0; j < count; ++j)
+  std::vector<int> first_entry(pairs.size()); // of a pair's block
+  for (int j = 0; j < count; ++j) {
+    const int stride = 3 * (start[j + 1] - start[j]);
     for (int b = 0; b < 3; ++b)
-      outer[3 * j + b + 1] = 9 * start[j] + 3 * (start[j + 1] - start[j]) * (b + 1);
-  for_blocks([&](const StiffnessTiles::Pair& pair, int at, int stride) {
+      outer[3 * j + b + 1] = 9 * start[j] + stride * (b + 1);
+    for (int k = start[j]; k < start[j + 1]; ++k) {
+      const int first = first_entry[sorted[k]] = 9 * start[j] + 3 * (k - start[j]);
+      const int row = 3 * lower_of(pairs[sorted[k]]);
+      for (int b = 0; b < 3; ++b)
+        for (int a = 0; a < 3; ++a)
+          inner[first + b * stride + a] = row + a;
+    }
+  }
+  const auto stride_of = [&](const StiffnessTiles::Pair& pair) {
+    return 3 * (start[upper_of(pair) + 1] - start[upper_of(pair)]);
+  };
+  // In the order of the tiles, which lie in memory as the pairs do.
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const StiffnessTiles::Pair& pair = pairs[p];
     Matrix3 block = Matrix3::Zero();
     if (pair.products != nullptr)
       block = pair.stiffness(lambda, mu);
@@ -411,13 +424,11 @@ void Galerkin::build_matrix(std::vector<StiffnessTiles::Pair> pairs) {
       block.diagonal().setConstant(problem_.material.young_modulus * problem_.nodes.spacings[pair.row]);
     if (rank_[pair.row] < rank_[pair.column])
       block.transposeInPlace();
-    const int row = 3 * lower_of(pair);
-    for (int b = 0; b < 3; ++b)
-      for (int a = 0; a < 3; ++a) {
-        values[at + b * stride + a] = block(a, b);
-        inner[at + b * stride + a] = row + a;
-      }
-  });
+    double* to = values + first_entry[p];
+    for (int b = 0; b < 3; ++b, to += stride_of(pair))
+      for (int a = 0; a < 3; ++a)
+        to[a] = block(a, b);
+  }
   for (const Anchor& anchor : anchors_) {
     const int j = rank_[anchor.node], first = 9 * start[j], stride = 3 * (start[j + 1] - start[j]);
     const double spring = problem_.material.young_modulus * problem_.nodes.spacings[anchor.node];
@@ -426,10 +437,9 @@ void Galerkin::build_matrix(std::vector<StiffnessTiles::Pair> pairs) {
         values[first + stride * b + a] += spring * anchor.direction[a] * anchor.direction[b];
   }
   elastic_.assign(values, values + 9 * blocks);
-  for_blocks([&](const StiffnessTiles::Pair& pair, int at, int stride) {
-    for (int c = 0; c < 3 && pair.held != nullptr; ++c)
-      values[at + c * stride + c] += pair.held[c * tile_nodes];
-  });
+  for (std::size_t p = 0; p < pairs.size(); ++p)
+    for (int c = 0; c < 3 && pairs[p].held != nullptr; ++c)
+      values[first_entry[p] + c * stride_of(pairs[p]) + c] += pairs[p].held[c * tile_nodes];
 }
 
 void Galerkin::assemble_loads() {

@@ -16,7 +16,7 @@ struct OrderedStiffness {
   const BackgroundCells& cells;
   const Spheres& spheres;
   Eigen::Map<const SparseMatrix> elastic; // `lower` without the penalties of the held means
-  const std::vector<CellShapes>& shapes;  // of every cell
+  const std::vector<CellShapes>& shapes;  // of every cell; a body that is factored keeps them where it needs them
   const VectorX& loads;                   // N, 3 a node, prescribed displacements left out
   bool dropped = false;                   // whether unknowns of severed pieces are taken out
 };

@@ -72,7 +72,7 @@ inline Pack magnitude(Pack v) {
 }
 template <class V>
 V larger(V a, V b) {
-  return (a > b) | (a != a) ? a : b;
+  return ((a > b) | (a != a)) ? a : b;
 } // keeps a NaN in either place
 
 template <class V>
@@ -260,7 +260,7 @@ inline void gradients_at_points(const Sphere* spheres, int count, const Points& 
       Pack t = 1 - s;
       t = t > 0 ? t : Pack{};
       const Pack q = Pack{} + sphere.q;
-      first_q = (first_q == 0) & (t > 0) ? q : first_q;
+      first_q = ((first_q == 0) & (t > 0)) ? q : first_q;
       const Pack t2 = t * t, w = t2 * t * (1 + 3 * s);
       store(to, w); // until the results are known the gradients keep the weights
       store(to + stride, 12 * t2 * q);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -84,16 +85,20 @@ struct SphereGrid::Builder {
 SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<double>& radii) {
   const int n = static_cast<int>(centres.size());
   Vector3 lower = Vector3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
+  // The box of the centres will do: a sphere that reaches a point outside it also touches the cell of the box nearest
+  // to that point, since its centre lies on the inner side of whatever face of the box is between.
   for (int j = 0; j < n; ++j) {
-    lower = lower.cwiseMin((centres[j].array() - radii[j]).matrix());
-    upper = upper.cwiseMax((centres[j].array() + radii[j]).matrix());
+    lower = lower.cwiseMin(centres[j]);
+    upper = upper.cwiseMax(centres[j]);
   }
   const Vector3 extent = upper - lower;
-  // Root cells fit the spheres of median size, but are no more than a few per sphere, however large the box; octants
-  // make up for it where spheres are small.
+  // Root cells fit the spheres of median size, but are no more than one per sphere or so, however large the box;
+  // octants make up for it where spheres are small.
   std::vector<double> sorted = radii;
   std::nth_element(sorted.begin(), sorted.begin() + n / 2, sorted.end());
-  const double side = std::max(side_over_radius * sorted[n / 2], std::cbrt(extent.prod() / (4.0 * n + 512)));
+  const double median = sorted[n / 2];
+  const double side =
+      std::max(side_over_radius * median, std::cbrt(extent.cwiseMax(Vector3::Constant(median)).prod() / (n + 64.0)));
   origin_ = lower;
   inverse_side_ = 1 / side;
   for (int a = 0; a < 3; ++a)
@@ -135,12 +140,15 @@ SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<do
       }
   }
   const int root_count = roots_[0] * roots_[1] * roots_[2];
-  std::vector<int> start(static_cast<std::size_t>(root_count) + 1, 0);
-  for (const Run& run : runs)
-    for (int cell = run.first; cell <= run.last; ++cell)
-      ++start[cell + 1];
-  for (int r = 0; r < root_count; ++r)
-    start[r + 1] += start[r];
+  // Every run adds one to the count from its first cell on and takes it back behind its last.
+  std::vector<int> start(static_cast<std::size_t>(root_count) + 2, 0);
+  for (const Run& run : runs) {
+    ++start[run.first + 1];
+    --start[run.last + 2];
+  }
+  start.pop_back();
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::partial_sum(start.begin(), start.end(), start.begin());
   std::vector<int> members(start[root_count]), next(start.begin(), start.end() - 1);
   for (const Run& run : runs)
     for (int cell = run.first; cell <= run.last; ++cell)

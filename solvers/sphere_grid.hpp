@@ -26,7 +26,7 @@ class SphereGrid {
   /// Centres must be finite and radii positive, or 0 for a sphere that holds nothing (the caller checks).
   SphereGrid(const std::vector<Vector3>& centres, const std::vector<double>& radii);
 
-  /// The cell of x. Outside the box of all spheres: the nearest cell (no sphere holds such a point).
+  /// The cell of x, outside the box of all centres that of the nearest place in it.
   [[nodiscard]] Cell find(const Vector3& x) const;
 
  private:

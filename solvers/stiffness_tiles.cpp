@@ -81,6 +81,12 @@ void CellCluster::clear() {
 }
 
 int StiffnessTiles::Column::add(int group) {
+  if (tiles.empty()) {
+    constexpr int usual = 40; // of a group well inside a body
+    groups.reserve(usual);
+    tiles.reserve(usual);
+    held.reserve(usual);
+  }
   groups.push_back(group);
   tiles.emplace_back();
   held.push_back(-1);

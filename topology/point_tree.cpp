@@ -61,25 +61,27 @@ PointTree::Found PointTree::nearest(const Vector3& x) const {
 }
 
 void PointTree::nearest(int begin, int end, int axis, const Vector3& x, Found& best) const {
-  const auto consider = [&](int k) { best = std::min(best, Found{(points_[k] - x).squaredNorm(), index_[k]}); };
-  if (end - begin <= leaf_size) {
-    for (int k = begin; k < end; ++k)
-      consider(k);
-    return;
-  }
-  const int middle = (begin + end) / 2;
-  consider(middle);
-  const double offset = x[axis] - points_[middle][axis];
-  const int next = (axis + 1) % 3;
-  const auto visit = [&](bool low) {
-    if (low)
-      nearest(begin, middle, next, x, best);
-    else
-      nearest(middle + 1, end, next, x, best);
+  const auto consider = [&](int k) {
+    const double squared = (points_[k] - x).squaredNorm();
+    if (squared < best.squared_distance || (squared == best.squared_distance && index_[k] < best.index))
+      best = {squared, index_[k]};
   };
-  visit(offset < 0);
-  if (offset * offset <= best.squared_distance)
-    visit(offset >= 0);
+  while (end - begin > leaf_size) {
+    const int middle = (begin + end) / 2;
+    const double offset = x[axis] - points_[middle][axis];
+    axis = (axis + 1) % 3;
+    // The half that holds x first; the other only where it may hold something as near.
+    if (offset < 0)
+      nearest(begin, middle, axis, x, best);
+    else
+      nearest(middle + 1, end, axis, x, best);
+    if (!(offset * offset <= best.squared_distance))
+      return;
+    consider(middle);
+    (offset < 0 ? begin : end) = offset < 0 ? middle + 1 : middle;
+  }
+  for (int k = begin; k < end; ++k)
+    consider(k);
 }
 
 } // namespace spherecut::topology

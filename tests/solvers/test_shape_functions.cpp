@@ -213,6 +213,64 @@ TEST_CASE("Every kernel this machine runs gives the same shape functions", "[sha
   }
 }
 
+TEST_CASE("Every kernel gives points together the gradients that each has alone", "[shape_functions]") {
+  const Cloud cloud = graded(0.04, 0.4, 9);
+  const Spheres spheres(cloud.centres, cloud.spacings, 1.8);
+  std::mt19937_64 random(6);
+  std::vector<const shape_kernel::Kernel*> kernels{&shape_kernel::portable(), &shape_kernel::dispatched()};
+  if (shape_kernel::avx2() != nullptr && shape_kernel::dispatched().width >= 4)
+    kernels.push_back(shape_kernel::avx2());
+  constexpr int together = shape_kernel::points_together, stride = 16;
+  for (int trial = 0; trial < 30; ++trial) {
+    const Vector3 middle = corner + random_point(random, 0.1, 0.9);
+    shape_kernel::Points points;
+    std::array<ShapeFunctions, together> alone;
+    for (int p = 0; p < together; ++p) {
+      const Vector3 x = middle + random_point(random, -0.02, 0.02);
+      points.x[p] = x.x();
+      points.y[p] = x.y();
+      points.z[p] = x.z();
+      points.factor[p] = 0.5 + p;
+      REQUIRE(shape_kernel::evaluate_with(shape_kernel::portable(), spheres, x, alone[p]));
+    }
+    std::vector<shape_kernel::Sphere> all;
+    for (int j = 0; j < spheres.size(); ++j) {
+      const Vector3& x = spheres.centres()[j];
+      all.push_back({x.x(), x.y(), x.z(), 1 / (spheres.radii()[j] * spheres.radii()[j])});
+    }
+    for (const shape_kernel::Kernel* kernel : kernels) {
+      std::vector<std::uint8_t> inside(all.size());
+      kernel->find_inside(all.data(), spheres.size(), points, inside.data());
+      std::vector<shape_kernel::Sphere> near;
+      std::vector<int> ids;
+      for (int j = 0; j < spheres.size(); ++j)
+        if (inside[j] != 0) {
+          near.push_back(all[j]);
+          ids.push_back(j);
+        }
+      std::vector<double> gradients(3 * stride * near.size(), 7.0);
+      std::array<double, together> condition{};
+      kernel->gradients_at_points(near.data(), static_cast<int>(near.size()), points, stride, gradients.data(),
+                                  condition.data());
+      for (int p = 0; p < together; ++p) {
+        CHECK(condition[p] == Approx(alone[p].moment_condition).epsilon(1e-9));
+        std::size_t next = 0;
+        double worst = 0;
+        for (std::size_t k = 0; k < near.size(); ++k) {
+          const bool is_inside = (inside[ids[k]] >> p & 1) != 0;
+          REQUIRE(is_inside == (next < alone[p].nodes.size() && alone[p].nodes[next] == ids[k]));
+          const Vector3 expected = is_inside ? alone[p].gradient(static_cast<int>(next++)) : Vector3(Vector3::Zero());
+          for (std::size_t a = 0; a < 3; ++a)
+            worst = std::max(worst, std::abs(gradients[(3 * k + a) * stride + p] - points.factor[p] * expected[a]));
+          CHECK(gradients[3 * k * stride + together + p] == 7.0); // room of other points
+        }
+        CHECK(next == alone[p].nodes.size());
+        CHECK(worst * 0.04 < 1e-11);
+      }
+    }
+  }
+}
+
 TEST_CASE("The moment condition is that of the scaled matrix", "[shape_functions]") {
   const Cloud cloud = lattice(4, 0.02, 1);
   const Spheres spheres(cloud.centres, cloud.spacings, 1.8);
