@@ -207,6 +207,15 @@ std::vector<Field> Collocation::force_responses(const std::vector<int>& candidat
   return responses_to(right);
 }
 
+std::vector<Field> Collocation::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
+  MatrixX right = MatrixX::Zero(report_.unknowns, forces.cols());
+  for (Eigen::Index k = 0; k < std::ssize(nodes); ++k)
+    for (int c = 0; c < 3; ++c)
+      if (!constrained_[nodes[k]][c])
+        right.row(Eigen::Index{stride_} * nodes[k] + c) += forces.row(3 * k + c);
+  return responses_to(right);
+}
+
 // A force at a point goes to the cells around it in the shares of the shape functions there, which keep its sum and,
 // since they reproduce linear fields, its moment.
 std::vector<Field> Collocation::pattern_responses(const std::vector<ForcePattern>& patterns) const {

@@ -25,6 +25,7 @@ class Collocation : public ElasticBody {
   Field solve() const override { return solve_for(loads_, 1, prescribed_values(problem_)); }
   double load_work(const Field& field) const override;
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
+  std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const override;
   std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;
   Field prescribed_response(const std::vector<Vector3>& values) const override {
     return solve_for({}, 0, prescribed_values(problem_, values));

@@ -16,13 +16,28 @@ void Field::add(double factor, const Field& other) {
   prescribed += factor * other.prescribed;
 }
 
-Field Discretisation::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
+std::vector<Field> Discretisation::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
   const std::vector<Field> units = force_responses(nodes);
-  Field sum = units.front();
-  sum.add(forces.front().x() - 1, units.front());
-  for (std::size_t k = 1; k < units.size(); ++k)
-    sum.add(forces[k / 3][static_cast<Eigen::Index>(k % 3)], units[k]);
-  return sum;
+  std::vector<Field> responses;
+  for (Eigen::Index c = 0; c < forces.cols(); ++c) {
+    Field sum = units.front();
+    sum.add(forces(0, c) - 1, units.front());
+    for (Eigen::Index k = 1; k < forces.rows(); ++k)
+      sum.add(forces(k, c), units[k]);
+    responses.push_back(std::move(sum));
+  }
+  return responses;
+}
+
+Field Discretisation::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
+  MatrixX together(3 * std::ssize(nodes), 1);
+  for (Eigen::Index k = 0; k < std::ssize(nodes); ++k)
+    together.col(0).segment<3>(3 * k) = forces[k];
+  return case_responses(nodes, together).front();
+}
+
+MatrixX Discretisation::compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const {
+  return contact_displacements(at, force_responses(forced));
 }
 
 MatrixX Discretisation::contact_compliance(const std::vector<int>& candidates) const {

@@ -137,12 +137,17 @@ class Discretisation {
   /// candidates[c], with homogeneous loads and prescribed displacements.
   [[nodiscard]] virtual std::vector<Field> force_responses(const std::vector<int>& candidates) const = 0;
 
+  /// Response to every case of forces (N) on nodes: a column of `forces` is a case, with three rows a node.
+  [[nodiscard]] virtual std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const;
+
   /// Response to all these forces (N) on nodes together.
-  [[nodiscard]] virtual Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const;
+  [[nodiscard]] Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const;
 
   /// Displacements of the candidates (3 each, rows) under unit forces on them (columns), m/N: those of
   /// contact_displacements under force_responses, without the fields where the method knows them otherwise.
   [[nodiscard]] virtual MatrixX contact_compliance(const std::vector<int>& candidates) const;
+  /// The same of nodes `at` (rows) under unit forces on nodes `forced` (columns).
+  [[nodiscard]] virtual MatrixX compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const;
 
   /// Response to every pattern at amplitude 1, with homogeneous loads and prescribed displacements. Throws InputError
   /// where the method has no forces in newtons (`published`) and NumericalError at a point without a sound support.

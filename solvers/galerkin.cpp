@@ -78,11 +78,14 @@ class Galerkin final : public ElasticBody {
     return fields_of(solve_ordered(unit_forces(candidates)));
   }
 
-  Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const override {
-    MatrixX right = MatrixX::Zero(report_.unknowns, 1);
-    for (std::size_t c = 0; c < nodes.size(); ++c)
-      add_force(contact_mean(nodes[c]), forces[c], right.col(0));
-    return fields_of(solve_ordered(right)).front();
+  std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const override {
+    MatrixX right = MatrixX::Zero(report_.unknowns, forces.cols());
+    for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
+      const DisplacementMean mean = contact_mean(nodes[c]);
+      for (Eigen::Index k = 0; k < forces.cols(); ++k)
+        add_force(mean, forces.col(k).segment<3>(3 * c), right.col(k));
+    }
+    return fields_of(solve_ordered(right));
   }
 
   // B^T A^-1 B = (L^-1 B)^T (L^-1 B): half the way of a solution.

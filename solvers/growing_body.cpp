@@ -169,11 +169,14 @@ std::vector<Field> GrowingBody::force_responses(const std::vector<int>& candidat
   return responses_to(unit_forces(candidates));
 }
 
-Field GrowingBody::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
-  MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), 1);
-  for (std::size_t c = 0; c < nodes.size(); ++c)
-    add_force(cut_->mean(id_[nodes[c]]), forces[c], right.col(0));
-  return responses_to(right).front();
+std::vector<Field> GrowingBody::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
+  MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), forces.cols());
+  for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
+    const DisplacementMean& mean = cut_->mean(id_[nodes[c]]);
+    for (Eigen::Index k = 0; k < forces.cols(); ++k)
+      add_force(mean, forces.col(k).segment<3>(3 * c), right.col(k));
+  }
+  return responses_to(right);
 }
 
 MatrixX GrowingBody::contact_compliance(const std::vector<int>& candidates) const {

@@ -49,7 +49,7 @@ class GrowingBody final : public Discretisation, public Growable {
   [[nodiscard]] Field solve() const override;
   [[nodiscard]] double load_work(const Field& field) const override;
   [[nodiscard]] std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
-  [[nodiscard]] Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const override;
+  [[nodiscard]] std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const override;
   /// That of the candidates in GrowthOptions::contact is there after every increment; others cost a solution each.
   [[nodiscard]] MatrixX contact_compliance(const std::vector<int>& candidates) const override;
   [[nodiscard]] std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;

@@ -15,8 +15,8 @@ class GrowingCollocation final : public Collocation, public Growable {
 
   BodyGrowth grow(const SprinkleIncrement& change, Problem grown,
                   const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) override;
-  Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const override;
   MatrixX contact_compliance(const std::vector<int>& candidates) const override;
+  MatrixX compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const override;
 
  private:
   /// What an increment makes, before it is known whether the window covers it.
@@ -33,6 +33,9 @@ class GrowingCollocation final : public Collocation, public Growable {
   };
 
   [[nodiscard]] MatrixX solution(const MatrixX& right) const override;
+  /// Whether the window has these nodes and their supports.
+  [[nodiscard]] bool in_window(const std::vector<int>& nodes) const;
+  [[nodiscard]] MatrixX unit_forces(const std::vector<int>& nodes) const; // by slots
   [[nodiscard]] MatrixX window_solution(const MatrixX& right) const;
   [[nodiscard]] double rho() const { return collocation_support_radius(options_.method); }
   void make_window();

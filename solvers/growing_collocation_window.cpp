@@ -149,36 +149,46 @@ MatrixX GrowingCollocation::solution(const MatrixX& right) const {
   return found;
 }
 
-Field GrowingCollocation::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
-  MatrixX right = MatrixX::Zero(report_.unknowns, 1);
-  for (std::size_t k = 0; k < nodes.size(); ++k)
-    for (int c = 0; c < 3; ++c)
-      if (!constrained_[nodes[k]][c])
-        right(stride_ * nodes[k] + c, 0) += forces[k][c];
-  return responses_to(right).front();
-}
-
-MatrixX GrowingCollocation::contact_compliance(const std::vector<int>& candidates) const {
-  const auto in_window = [&](int node) {
+bool GrowingCollocation::in_window(const std::vector<int>& nodes) const {
+  return std::all_of(nodes.begin(), nodes.end(), [&](int node) {
     for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
       if (slot_[supports_.nodes[k]] < 0)
         return false;
     return slot_[node] >= 0;
-  };
-  if (!std::all_of(candidates.begin(), candidates.end(), in_window))
+  });
+}
+
+MatrixX GrowingCollocation::unit_forces(const std::vector<int>& nodes) const {
+  MatrixX right = MatrixX::Zero(window_->slots(), 3 * std::ssize(nodes));
+  for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
+    for (int axis = 0; axis < 3; ++axis)
+      if (!constrained_[nodes[c]][axis])
+        right(stride_ * slot_[nodes[c]] + axis, 3 * c + axis) = 1;
+  return right;
+}
+
+MatrixX GrowingCollocation::contact_compliance(const std::vector<int>& candidates) const {
+  if (!in_window(candidates))
     return ElasticBody::contact_compliance(candidates);
   const auto count = std::ssize(candidates);
-  MatrixX right = MatrixX::Zero(window_->slots(), 3 * count);
-  for (Eigen::Index c = 0; c < count; ++c)
-    for (int axis = 0; axis < 3; ++axis)
-      if (!constrained_[candidates[c]][axis])
-        right(stride_ * slot_[candidates[c]] + axis, 3 * c + axis) = 1;
   MatrixX functionals = MatrixX::Zero(window_->slots(), 3 * count);
   for (Eigen::Index c = 0; c < count; ++c)
     for (int k = supports_.start[candidates[c]]; k < supports_.start[candidates[c] + 1]; ++k)
       for (int axis = 0; axis < 3; ++axis)
         functionals(stride_ * slot_[supports_.nodes[k]] + axis, 3 * c + axis) += supports_.value[k];
-  return window_->condense(functionals, right);
+  return window_->condense(functionals, unit_forces(candidates));
+}
+
+MatrixX GrowingCollocation::compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const {
+  if (!in_window(at) || !in_window(forced))
+    return ElasticBody::compliance_between(at, forced);
+  const MatrixX solved = window_->solve(unit_forces(forced));
+  MatrixX compliance = MatrixX::Zero(3 * std::ssize(at), solved.cols());
+  for (Eigen::Index c = 0; c < std::ssize(at); ++c)
+    for (int k = supports_.start[at[c]]; k < supports_.start[at[c] + 1]; ++k)
+      compliance.middleRows<3>(3 * c) +=
+          supports_.value[k] * solved.middleRows<3>(Eigen::Index{stride_} * slot_[supports_.nodes[k]]);
+  return compliance;
 }
 
 void GrowingCollocation::write_rows(const std::vector<char>& changed) {

@@ -27,16 +27,21 @@ std::array<Vector3, 3> mode_axes(const Vector3& normal) {
   return {normal, first, normal.cross(first)};
 }
 
-/// Openings of the pairs in the entries of the patch, one column per field.
-MatrixX openings(const Discretisation& body, const std::vector<LipPair>& pairs, int modes,
-                 const std::vector<Field>& fields) {
-  std::vector<int> plus, minus;
-  for (const LipPair& pair : pairs) {
-    plus.push_back(pair.plus);
-    minus.push_back(pair.minus);
-  }
-  const MatrixX apart = body.contact_displacements(plus, fields) - body.contact_displacements(minus, fields);
-  MatrixX result(modes * std::ssize(pairs), std::ssize(fields));
+/// Nodes of the pairs: all on the one side, then all on the other.
+std::vector<int> nodes_of(const std::vector<LipPair>& pairs) {
+  std::vector<int> nodes;
+  for (const LipPair& pair : pairs)
+    nodes.push_back(pair.plus);
+  for (const LipPair& pair : pairs)
+    nodes.push_back(pair.minus);
+  return nodes;
+}
+
+/// Openings of the pairs in the entries of the patch, from displacements of nodes_of() in columns.
+MatrixX openings(const std::vector<LipPair>& pairs, int modes, const MatrixX& displacements) {
+  const Eigen::Index half = 3 * std::ssize(pairs);
+  const MatrixX apart = displacements.topRows(half) - displacements.bottomRows(half);
+  MatrixX result(modes * std::ssize(pairs), displacements.cols());
   for (Eigen::Index p = 0; p < std::ssize(pairs); ++p) {
     const std::array<Vector3, 3> axes = mode_axes(pairs[p].normal);
     for (int m = 0; m < modes; ++m)
@@ -45,8 +50,9 @@ MatrixX openings(const Discretisation& body, const std::vector<LipPair>& pairs, 
   return result;
 }
 
-Field scaled(const Field& field, double factor) {
-  return {factor * field.coefficients, factor * field.pressure, factor * field.load_factor, factor * field.prescribed};
+MatrixX openings(const Discretisation& body, const std::vector<LipPair>& pairs, int modes,
+                 const std::vector<Field>& fields) {
+  return openings(pairs, modes, body.contact_displacements(nodes_of(pairs), fields));
 }
 
 std::vector<int> closed_entries(const std::vector<char>& closed, int modes) {
@@ -217,35 +223,28 @@ LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& p
   LipPatch lips;
   lips.pairs = pairs;
   lips.modes = condition == LipCondition::sticking ? 3 : 1;
-  // Unit forces on all plus nodes, then on all minus nodes, combined into pair forces.
-  std::vector<int> plus, minus;
-  for (const LipPair& pair : pairs) {
-    plus.push_back(pair.plus);
-    minus.push_back(pair.minus);
-  }
+  const std::vector<int> nodes = nodes_of(pairs);
   if (!pairs.empty()) {
-    const std::vector<Field> on_plus = body.force_responses(plus);
-    const std::vector<Field> on_minus = body.force_responses(minus);
-    for (std::size_t p = 0; p < pairs.size(); ++p) {
+    MatrixX forces = MatrixX::Zero(3 * std::ssize(nodes), lips.modes * std::ssize(pairs));
+    for (Eigen::Index p = 0; p < std::ssize(pairs); ++p) {
       const std::array<Vector3, 3> axes = mode_axes(pairs[p].normal);
       for (int m = 0; m < lips.modes; ++m) {
-        Field response = scaled(on_plus[3 * p], axes[m].x());
-        for (int axis = 1; axis < 3; ++axis)
-          response.add(axes[m][axis], on_plus[3 * p + axis]);
-        for (int axis = 0; axis < 3; ++axis)
-          response.add(-axes[m][axis], on_minus[3 * p + axis]);
-        lips.responses.push_back(std::move(response));
+        forces.col(lips.modes * p + m).segment<3>(3 * p) = axes[m];
+        forces.col(lips.modes * p + m).segment<3>(3 * (std::ssize(pairs) + p)) = -axes[m];
       }
     }
+    lips.responses = body.case_responses(nodes, forces);
   }
   lips.compliance = openings(body, pairs, lips.modes, lips.responses);
   lips.base_opening = openings(body, pairs, lips.modes, {tool != nullptr ? tool->base : body.solve()}).col(0);
   if (tool != nullptr) {
     lips.tool_of_lips = body.contact_displacements(tool->nodes, lips.responses);
     // A symmetric body opens its lips under a force on a node as it moves the node under that force between the lips.
-    lips.lips_of_tool = std::ssize(tool->responses) < 3 * std::ssize(tool->nodes) && body.method() == Method::galerkin
+    const bool has_fields = std::ssize(tool->responses) == 3 * std::ssize(tool->nodes);
+    lips.lips_of_tool = has_fields ? openings(body, pairs, lips.modes, tool->responses)
+                        : body.method() == Method::galerkin
                             ? MatrixX(lips.tool_of_lips.transpose())
-                            : openings(body, pairs, lips.modes, tool->responses);
+                            : openings(pairs, lips.modes, body.compliance_between(nodes, tool->nodes));
   }
   if (!lips.compliance.allFinite())
     throw NumericalError(fmt::format("the compliance of {} lip pairs is not finite", pairs.size()));

@@ -1,6 +1,7 @@
 #include "solvers/collocation.hpp"
 #include "solvers/contact_solver.hpp"
 #include "solvers/growing_body.hpp"
+#include "solvers/lip_contact.hpp"
 #include "tests/solvers/growing_scene.hpp"
 #include "topology/errors.hpp"
 #include "topology/voronoi_cells.hpp"
@@ -74,6 +75,14 @@ TEST_CASE("Balance rows that have followed a cut are those of a body built anew,
       const Field pulled = body->force_response(mixed, forces);
       CHECK((pulled.coefficients - anew->force_response(mixed, forces).coefficients).norm() <
             1e-9 * pulled.coefficients.norm());
+      // Lips that meet beside a tool, on a patch with fields and without.
+      const std::vector<LipPair> pairs = lip_pairs(scene.nodes);
+      const ContactPatch full = condense(*anew, patch), bare = condense_without_fields(*body, patch);
+      const LipPatch lips = condense_lips(*body, pairs, LipCondition::sticking, &bare);
+      const LipPatch wanted = condense_lips(*anew, pairs, LipCondition::sticking, &full);
+      CHECK((lips.compliance - wanted.compliance).norm() < 1e-8 * wanted.compliance.norm());
+      CHECK((lips.tool_of_lips - wanted.tool_of_lips).norm() < 1e-8 * wanted.tool_of_lips.norm());
+      CHECK((lips.lips_of_tool - wanted.lips_of_tool).norm() < 1e-8 * wanted.lips_of_tool.norm());
       const std::vector<Vector3> moved(scene.problem().prescribed.size(), Vector3(1, 2, 3));
       const Vector3 inside(0.013, -0.011, -0.012);
       CHECK((body->at(inside, body->prescribed_response(moved)).displacement - Vector3(1, 2, 3)).norm() < 1e-7);
