@@ -30,6 +30,7 @@ std::array<Vector3, 3> mode_axes(const Vector3& normal) {
 /// Nodes of the pairs: all on the one side, then all on the other.
 std::vector<int> nodes_of(const std::vector<LipPair>& pairs) {
   std::vector<int> nodes;
+  nodes.reserve(2 * pairs.size());
   for (const LipPair& pair : pairs)
     nodes.push_back(pair.plus);
   for (const LipPair& pair : pairs)
