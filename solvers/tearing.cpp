@@ -138,6 +138,23 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
   return states;
 }
 
+namespace {
+
+/// Intensities at the tip of a short kink off a front, in the plane across it; `angle` rad, positive to the + side
+/// [Cotterell and Rice 1980].
+Intensities turned(const Intensities& k, double angle) {
+  const double c = std::cos(angle / 2), s = std::sin(angle / 2), c3 = std::cos(1.5 * angle), s3 = std::sin(1.5 * angle);
+  return {0.25 * (3 * c + c3) * k[0] - 0.75 * (s + s3) * k[1], 0.25 * (s + s3) * k[0] + 0.25 * (c + 3 * c3) * k[1],
+          k[2]};
+}
+
+/// Angle in the plane across `frame` of a direction, rad.
+double angle_of(const FrontFrame& frame, const Vector3& direction) {
+  return std::atan2(direction.dot(frame.normal), direction.dot(frame.ahead));
+}
+
+} // namespace
+
 std::vector<FrontState> averaged(const Material& material, const std::vector<FrontState>& states, double length) {
   std::vector<FrontState> result = states;
   for (FrontState& state : result) {
@@ -147,7 +164,7 @@ std::vector<FrontState> averaged(const Material& material, const std::vector<Fro
       if (other.frame.normal.dot(state.frame.normal) < 0.5)
         continue; // of another front
       const double weight = std::exp(-0.5 * (other.frame.point - state.frame.point).squaredNorm() / (length * length));
-      sum += weight * other.intensities;
+      sum += weight * turned(other.intensities, -angle_of(state.frame, other.frame.ahead));
       weights += weight;
     }
     state.intensities = sum / weights;
@@ -245,7 +262,8 @@ std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> st
     lengths.push_back(excess < 0 ? 0 : std::max(0.1 * longest, longest - behind));
   }
   return [states = std::move(states), lengths = std::move(lengths), smoothing](const FrontFrame& frame) -> Vector3 {
-    double weights = 0, length = 0, angle = 0, nearest = std::numeric_limits<double>::infinity();
+    double weights = 0, length = 0, nearest = std::numeric_limits<double>::infinity();
+    Vector3 direction = Vector3::Zero();
     for (const FrontState& state : states)
       nearest = std::min(nearest, (state.frame.point - frame.point).squaredNorm());
     for (std::size_t k = 0; k < states.size(); ++k) {
@@ -256,12 +274,13 @@ std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> st
       const double weight = std::exp(-0.5 * squared / (smoothing * smoothing));
       weights += weight;
       length += weight * lengths[k];
-      angle += weight * states[k].angle;
+      const FrontFrame& at = states[k].frame;
+      direction += weight * (std::cos(states[k].angle) * at.ahead + std::sin(states[k].angle) * at.normal);
     }
     if (!(weights > 0))
       return Vector3::Zero();
     length /= weights;
-    angle /= weights;
+    const double angle = angle_of(frame, direction);
     return length * (std::cos(angle) * frame.ahead + std::sin(angle) * frame.normal);
   };
 }

@@ -41,7 +41,9 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
 
 /// The states with intensities averaged along the front over about `length` m (standard deviation of the weight), and
 /// what follows from them. Intensities scatter from place to place with the nodes; a front that followed that would
-/// grow ragged.
+/// grow ragged. So would one whose places each took the mean with their own triangle's way ahead: what the field says
+/// against that way is lost in the mean. Intensities of other places are turned into the way ahead of the one that they
+/// are averaged for (those of a short kink at the angle between the two).
 std::vector<FrontState> averaged(const Material& material, const std::vector<FrontState>& states, double length);
 
 /// First share (0 to 1) of a way of loading at which G / G_c is `drive` anywhere along the front, its intensities going
@@ -65,8 +67,9 @@ std::vector<FrontState> directed(std::vector<FrontState> states, TearDirection r
                                  const std::function<double(const Vector3&)>& toughness, double probe);
 
 /// How the front moves in one step of quasi-static growth: where G >= G_c by up to `longest` m, in proportion to
-/// (G / G_c - 1) over its largest, never less than a tenth of it where G >= G_c; elsewhere not. Directions and lengths
-/// between the places are averages over about `smoothing` m. The states must not be empty.
+/// (G / G_c - 1) over its largest, never less than a tenth of it where G >= G_c; elsewhere not. Directions (in space,
+/// not as angles against a place's own frame) and lengths between the places are averages over about `smoothing` m. The
+/// states must not be empty.
 ///
 /// The motions of places that move differ by at most `slope` m for each unit of G / G_c. A wave of length 2 pi / k and
 /// height A on a straight front changes G by k A of itself [Rice 1985], so a slope of 1 / k flattens it in one step and

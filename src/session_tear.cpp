@@ -32,19 +32,6 @@ double drive_of(const std::vector<solvers::FrontState>& states) {
   return most;
 }
 
-/// Mean G / G_c of the places that move while the load is followed: it is they that have to pay for the new surface.
-double drive_of_moving(const std::vector<solvers::FrontState>& states) {
-  const double most = drive_of(states);
-  double sum = 0;
-  int count = 0;
-  for (const solvers::FrontState& state : states)
-    if (const double drive = state.release / state.toughness; along * drive >= most) {
-      sum += drive;
-      ++count;
-    }
-  return count > 0 ? sum / count : 0;
-}
-
 double mean_toughness(const topology::FrontGrowth& growth, const topology::Incision& before,
                       const topology::Domain& domain, const std::function<double(const Vector3&)>& toughness) {
   double area = 0, sum = 0;
@@ -65,19 +52,25 @@ double mean_toughness(const topology::FrontGrowth& growth, const topology::Incis
   return area > 0 ? sum / area : 0;
 }
 
-/// G - G_c of `states`, weighted by how far the nearest of the places `from` moves; J/m2. Zero without weights.
-double mean_surplus(const std::vector<solvers::FrontState>& states, const std::vector<solvers::FrontState>& from,
-                    const std::vector<double>& advance) {
-  double sum = 0, weights = 0;
+/// Means over what is swept: weighted by how far the nearest of the places `from` moves. Zero without weights.
+struct Swept {
+  double surplus = 0; // G - G_c, J/m2
+  double drive = 0;   // G / G_c
+};
+Swept swept(const std::vector<solvers::FrontState>& states, const std::vector<solvers::FrontState>& from,
+            const std::vector<double>& advance) {
+  Swept mean;
+  double weights = 0;
   for (const solvers::FrontState& state : states) {
     const auto nearest = std::min_element(from.begin(), from.end(), [&](const auto& a, const auto& b) {
       return (a.frame.point - state.frame.point).squaredNorm() < (b.frame.point - state.frame.point).squaredNorm();
     });
     const double weight = advance[static_cast<std::size_t>(nearest - from.begin())];
-    sum += weight * (state.release - state.toughness);
+    mean.surplus += weight * (state.release - state.toughness);
+    mean.drive += weight * state.release / state.toughness;
     weights += weight;
   }
-  return weights > 0 ? sum / weights : 0;
+  return weights > 0 ? Swept{mean.surplus / weights, mean.drive / weights} : Swept{};
 }
 
 TearIncrement increment_of(const std::vector<solvers::FrontState>& states, const topology::Incision* incision) {
@@ -221,6 +214,25 @@ std::vector<solvers::FrontState> acting(std::vector<solvers::FrontState> states,
   return states;
 }
 
+/// How far each of the places moves, m.
+std::vector<double> advances(const std::vector<solvers::FrontState>& places,
+                             const std::vector<solvers::FrontState>& moving, double longest, double fine) {
+  const auto motion = solvers::tear_motion(moving, longest, smoothing * fine, slope * fine);
+  std::vector<double> result;
+  result.reserve(places.size());
+  for (const solvers::FrontState& place : places)
+    result.push_back(motion(place.frame).norm());
+  return result;
+}
+
+/// Mean G / G_c of the next increment's front while the load is followed: what it sweeps has to pay for itself.
+double moving_drive_of(const std::vector<solvers::FrontState>& states, double longest, double fine) {
+  const double drive = drive_of(states);
+  if (!(drive > 0))
+    return 0;
+  return swept(states, states, advances(states, acting(states, drive), longest, fine)).drive;
+}
+
 } // namespace
 
 void Session::tear(const StepSample& sample, const Loading& loading, StepResult& result) {
@@ -288,14 +300,14 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
   }
   for (int number = 1;; ++number) {
     double drive = states ? drive_of(*states) : 0, ahead = drive; // now, and at the end of the step
-    const double moving_drive = states ? drive_of_moving(*states) : 0;
-    if (share < 1 && moving_drive < in_balance) {
+    // G falls by exp(-decay way) in the increment: half of that before, half after what moves is in balance.
+    const double moving_drive = states ? moving_drive_of(*states, way_of(drive), fine) : 0;
+    if (share < 1 && moving_drive < std::max(in_balance, std::exp(0.5 * tears_->decay * way_of(drive)))) {
       const States now = states;
       solve(sample, model_);
       const States full = known_states();
       ahead = full ? drive_of(*full) : 0;
       states = now;
-      // G falls by exp(-decay way) in the increment: half of that before, half after those that move are in balance.
       const double above = moving_drive > 0 ? drive / moving_drive : 1;
       if (ahead < in_balance)
         load_to(1);
@@ -362,14 +374,12 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     const double free = tears_->last.potential() - now.potential(), surface = toughness * torn;
     double surplus = free - surface; // of a front that is gone, or comes about, by the energies alone
     if (!seed && !gives_way && !joins && next && !next->empty()) {
-      std::vector<double> advance;
-      const auto motion = solvers::tear_motion(moving, longest, smoothing * fine, slope * fine);
-      for (const solvers::FrontState& state : *states)
-        advance.push_back(motion(state.frame).norm());
-      surplus = 0.5 * (mean_surplus(*states, *states, advance) + mean_surplus(*next, *states, advance)) * torn;
+      const std::vector<double> advance = advances(*states, moving, longest, fine);
+      const Swept was = swept(*states, *states, advance), is = swept(*next, *states, advance);
+      surplus = 0.5 * (was.surplus + is.surplus) * torn;
       const double drive_after = drive_of(*next);
       if (longest >= told * stride) {
-        tears_->decay = std::max(0.0, std::log(drive / std::max(drive_after, 1e-3)) / longest);
+        tears_->decay = std::max(0.0, std::log(was.drive / std::max(is.drive, 1e-3)) / longest);
         kept += drive_after >= kept_drive * start ? 1 : 0;
       }
     }

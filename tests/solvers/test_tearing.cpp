@@ -117,6 +117,30 @@ TEST_CASE("A wavy front straightens where motions are even enough, and grows rag
   CHECK_THROWS_AS(tear_motion({state_at(0, 2)}, 0.1, 1, 0), InputError);
 }
 
+TEST_CASE("A front on a rough sheet goes on where its field opens it, not where its triangles point", "[tearing]") {
+  // Mode I along x; the frames of the places lean by up to 0.2 rad, in turn to one side and the other. Intensities in a
+  // frame that leans by t: those of a short kink at t [Cotterell and Rice 1980], G falling to cos(t/2)^4 of itself.
+  const Material material{1000, 0.3, 0};
+  std::vector<FrontState> states;
+  for (int i = 0; i < 21; ++i) {
+    FrontState state = state_at(i, 0);
+    const double t = 0.2 * std::cos(std::numbers::pi * i) * (1 - 0.5 * (i % 3) / 2.0);
+    state.frame.ahead = {std::cos(t), 0, std::sin(t)};
+    state.frame.normal = {-std::sin(t), 0, std::cos(t)};
+    state.intensities = {10 * std::pow(std::cos(t / 2), 3), 10 * std::sin(t / 2) * std::pow(std::cos(t / 2), 2), 0};
+    state.toughness = 0.5 * driving_release_rate(material, {10, 0, 0});
+    states.push_back(state);
+  }
+  const std::vector<FrontState> means = averaged(material, states, 1.5);
+  const auto motion = tear_motion(means, 0.5, 1);
+  for (const FrontState& state : means) {
+    CHECK(state.release == Approx(driving_release_rate(material, {10, 0, 0})).epsilon(0.025));
+    const Vector3 step = motion(state.frame);
+    CHECK(step.norm() == Approx(0.5).epsilon(0.1));
+    CHECK(std::abs(std::atan2(step.z(), step.x())) < 0.02);
+  }
+}
+
 TEST_CASE("A cut that is pressed together and sticks is not driven on", "[tearing]") {
   const tests::CutBlock block = tests::cut_block(8, false, 2);
   const tests::CutFrame& cut = block.frame;
