@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace spherecut::solvers {
 
@@ -112,14 +113,22 @@ GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& ch
   next.cells = topology::update_cells(cells_, next.was, nodes.positions, nodes.spacings, *grown.domain,
                                       grown.incision.get(), touched);
 
+  // A support that was not sound reached beyond the spheres, and knows nodes that none of them tells of.
+  const auto names_removed = [&](std::span<const int> named) {
+    return std::any_of(named.begin(), named.end(), [&](int node) { return next.place[node] < 0; });
+  };
+  const auto names_removed_in_support = [&](int was) {
+    return names_removed(
+        std::span(supports_.nodes).subspan(supports_.start[was], supports_.start[was + 1] - supports_.start[was]));
+  };
   const topology::CellComplex& cells = next.cells.cells;
   std::vector<char> seen_anew(static_cast<std::size_t>(count), 0);
   next.wanted = next.cells.made;
   for (int i = 0; i < count; ++i) {
     const double half = std::max(cells.reaches[i], next.was[i] >= 0 ? cells_.reaches[next.was[i]] : 0);
-    if (next.was[i] < 0 || sees_change(nodes.positions[i], 0))
+    if (next.was[i] < 0 || sees_change(nodes.positions[i], 0) || names_removed_in_support(next.was[i]))
       seen_anew[i] = 1;
-    if (seen_anew[i] != 0 || sees_change(nodes.positions[i], half))
+    if (seen_anew[i] != 0 || sees_change(nodes.positions[i], half) || names_removed(rows_[next.was[i]].nodes))
       next.wanted[i] = 1;
   }
   for (const topology::CellFace& face : cells.faces) // whose rows ask for each other's supports
@@ -134,6 +143,7 @@ GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& ch
   for (const Prescribed& entry : grown.prescribed)
     for (int c = 0; c < 3; ++c)
       next.constrained[entry.node][c] = next.constrained[entry.node][c] || entry.components[c];
+  next.loads = cell_loads(cells, grown, stress_of(grown.loads.initial_strain));
   find_changed_rows(next);
   report.boxes = static_cast<int>(std::count(next.wanted.begin(), next.wanted.end(), 1));
   report.cells_seconds = cell_watch.seconds();
@@ -242,7 +252,7 @@ void GrowingCollocation::put_in(Next next, Problem grown, const std::vector<int>
   rows_ = std::move(next.rows);
   constrained_ = std::move(next.constrained);
   dropped_.assign(static_cast<std::size_t>(count), 0);
-  loads_ = cell_loads(cells_, problem_, stress_of(problem_.loads.initial_strain));
+  loads_ = std::move(next.loads);
   report_.nodes = count;
   report_.unknowns = stride_ * count;
   report_.grown_supports = spheres_.grown();
@@ -344,6 +354,7 @@ BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem gro
   }
   const Stopwatch commit_watch;
   Problem before = problem_;
+  std::vector<int> contact_before = options_.contact;
   std::erase_if(options_.contact, [&](int& node) { return (node = place[node]) < 0; });
   next_room_ += change.added.size();
   const std::vector<Vector3> places = std::move(next.places);
@@ -357,7 +368,7 @@ BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem gro
     try {
       anew("the window became singular", problem_, true);
     } catch (...) {
-      options_.contact.clear();
+      options_.contact = std::move(contact_before);
       anew("as it was", std::move(before), true);
       throw;
     }

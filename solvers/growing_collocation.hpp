@@ -29,6 +29,7 @@ class GrowingCollocation final : public Collocation, public Growable {
     std::vector<BalanceRow> rows;
     std::vector<char> changed; // rows of the system that differ
     std::vector<std::array<bool, 3>> constrained;
+    std::vector<Vector3> loads;  // N
     std::vector<Vector3> places; // where the cut is new
   };
 

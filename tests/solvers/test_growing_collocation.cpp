@@ -109,6 +109,47 @@ TEST_CASE("An update of the balance that the window does not cover is declined, 
   CHECK((body->solve().coefficients - expected).norm() < 1e-10 * expected.norm());
 }
 
+TEST_CASE("A load that throws leaves the body whose balance follows a cut as it was") {
+  Scene scene(0.3);
+  const auto body = make_growable(scene.problem(), scene.options());
+  const Field before = body->solve();
+  const int count = scene.nodes.size();
+  const SprinkleIncrement change = scene.grow();
+  Problem grown = scene.problem();
+  grown.loads.body_force = [](const Vector3& /*x*/) -> Vector3 { throw InputError("no force is known here"); };
+  CHECK_THROWS_WITH(growable(*body).grow(change, grown, {}, false), Catch::Contains("no force is known"));
+  REQUIRE(body->problem().nodes.size() == count);
+  CHECK(body->solve().coefficients == before.coefficients);
+  CHECK(body->residual(before, {}, {}) < 1e-10);
+  const BodyGrowth growth = growable(*body).grow(change, scene.problem(), {}, true);
+  CHECK(std::string(growth.uncovered).empty());
+  const VectorX expected = discretise(scene.problem(), scene.options().method)->solve().coefficients;
+  CHECK((body->solve().coefficients - expected).norm() < 1e-10 * expected.norm());
+}
+
+TEST_CASE("A body whose balance becomes singular with its cut is made again as it was") {
+  Scene scene(0.3);
+  GrowthOptions options = scene.options();
+  options.way = topology::make_rectangle_sheet({0, 0, -0.015}, Vector3::UnitY(), Vector3::UnitZ(), 0.06, 0.03, 0.004);
+  options.contact = patch_of(scene);
+  const auto body = make_growable(scene.problem(), options); // all of it in the window
+  const std::vector<int> patch = patch_of(scene);
+  const VectorX before = body->solve().coefficients;
+  const MatrixX compliance = body->contact_compliance(patch);
+  const SprinkleIncrement change = scene.grow();
+  Problem loose = scene.problem(); // held along x alone
+  for (Prescribed& entry : loose.prescribed)
+    entry.components = {true, false, false};
+  CHECK_THROWS_AS(growable(*body).grow(change, loose, {}, true), NumericalError);
+  CHECK((body->solve().coefficients - before).norm() < 1e-10 * before.norm());
+  CHECK((body->contact_compliance(patch) - compliance).norm() < 1e-9 * compliance.norm());
+  const BodyGrowth growth = growable(*body).grow(change, scene.problem(), {}, true);
+  CHECK(std::string(growth.uncovered).empty());
+  CHECK_FALSE(growth.update.condensed_anew);
+  const VectorX expected = discretise(scene.problem(), options.method)->solve().coefficients;
+  CHECK((body->solve().coefficients - expected).norm() < 1e-10 * expected.norm());
+}
+
 TEST_CASE("A piece that comes free is not covered by an update of the balance either") {
   Scene scene(0.3, -0.034); // through the whole height
   const auto held_end = [&] {
