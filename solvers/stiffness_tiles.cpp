@@ -54,14 +54,13 @@ void CellCluster::add(const CellShapes& cell) {
     if (local < 0) {
       local = static_cast<int>(members_.size());
       members_.push_back({place / tile_nodes});
-      gradients_.resize(members_.size() * group_stride, 0.0);
+      gradients_.emplace_back();
     }
     Group& group = members_[local];
     const std::uint64_t reached = std::uint64_t{cell.reached[k]} << points_;
     group.reached |= reached;
     group.by_node[lane] |= reached;
-    double* to =
-        gradients_.data() + local * group_stride + static_cast<std::size_t>(points_) * gradients_at_point + lane;
+    double* to = gradients_[local].at + static_cast<std::ptrdiff_t>(points_) * gradients_at_point + lane;
     const double* from = cell.gradients.data() + 3 * k * static_cast<std::size_t>(cell.stride);
     for (int q = 0; q < cell.points; ++q, ++from, to += gradients_at_point) {
       to[0] = from[0];
@@ -108,7 +107,7 @@ void StiffnessTiles::add(const CellCluster& cluster, double sign, int share, int
         continue;
       if (place[other.id] < 0)
         place[other.id] = column.add(other.id);
-      add_to_tile(cluster.gradients(r), other.reached, cluster.gradients(c), own.by_node.data(), sign,
+      add_to_tile(cluster.gradients_[r].at, other.reached, cluster.gradients_[c].at, own.by_node.data(), sign,
                   column.tiles[place[other.id]]);
     }
     for (const int group : column.groups)

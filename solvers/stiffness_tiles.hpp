@@ -40,13 +40,14 @@ class CellCluster {
     std::uint64_t reached = 0;                       // by some node
     std::array<std::uint64_t, tile_nodes> by_node{}; // bit q: the node reaches point q
   };
-  [[nodiscard]] const double* gradients(std::size_t local) const { return gradients_.data() + local * group_stride; }
-
-  static constexpr std::size_t group_stride = static_cast<std::size_t>(tile_points) * gradients_at_point;
+  /// [point][axis][lane]; no load of four lanes crosses a cache line.
+  struct Gradients {
+    alignas(64) double at[tile_points * gradients_at_point];
+  };
   const NodeGroups* groups_;
   std::vector<int> local_; // of every group in members_, -1 outside
   std::vector<Group> members_;
-  std::vector<double> gradients_; // [member][point][axis][lane]
+  std::vector<Gradients> gradients_; // of every member
   int points_ = 0;
 };
 
