@@ -60,7 +60,8 @@ std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domai
 solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Domain& domain,
                                     const solvers::SprinkleOptions& options, const solvers::NodeCloud& previous);
 
-/// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead the body is one that can follow it. Throws as solvers::discretise does.
+/// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead the body
+/// is one that can follow it. Throws as solvers::discretise does.
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
               const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
 
