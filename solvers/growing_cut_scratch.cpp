@@ -20,6 +20,7 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
   }
   StiffnessTiles tiles(problem.nodes.positions);
   std::vector<const CellShapes*> all;
+  all.reserve(cells.size());
   for (const CellShapes& cell : cells)
     all.push_back(&cell);
   tiles.add_all(all);
