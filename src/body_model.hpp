@@ -66,7 +66,7 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
               const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
 
 /// Reason not to follow: the window would hold more of the body than pays.
-inline constexpr const char* most_of_body = "the cut concerns most of the body";
+inline constexpr const char* too_much_of_body = "the cut concerns too much of the body";
 
 /// Nodes that updates may add before a body is condensed anew.
 inline constexpr int growth_room = 150;

@@ -69,7 +69,7 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
       return;
   } else {
     entry = way_into_body(sample);
-    if (result.cut->triangles > 0 || std::string_view(model_.not_following) == most_of_body ||
+    if (result.cut->triangles > 0 || std::string_view(model_.not_following) == too_much_of_body ||
         entry > way_spacings * fine ||
         !hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty())
       return;
@@ -85,7 +85,7 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
     recondensing_way_ = std::move(way);
     return;
   }
-  model_.not_following = most_of_body; // and is not asked again before it is built anew
+  model_.not_following = too_much_of_body; // and is not asked again before it is built anew
 }
 
 // m, from the edge to the surface at rest; 0 inside.
