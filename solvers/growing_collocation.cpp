@@ -51,13 +51,13 @@ NodalSupports GrowingCollocation::next_supports(const Next& next, const std::vec
   return supports;
 }
 
-GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& change, const Problem& grown,
-                                                     GrowthReport& report) const {
+GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& change, std::vector<int> place,
+                                                     const Problem& grown, GrowthReport& report) const {
   const Stopwatch sphere_watch;
   Next next;
   const NodeCloud &nodes = grown.nodes, &old = problem_.nodes;
   const int count = nodes.size();
-  next.place = places_after(change, old.size(), count);
+  next.place = std::move(place);
   next.was.assign(count, -1);
   for (int i = 0; i < old.size(); ++i)
     if (next.place[i] >= 0)
@@ -338,7 +338,7 @@ BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem gro
     anew("no room for the added nodes", std::move(grown), false);
     return finish();
   }
-  Next next = next_of(change, grown, report);
+  Next next = next_of(change, place, grown, report);
   std::vector<int> slot(next.was.size());
   for (std::size_t i = 0, added = 0; i < slot.size(); ++i)
     slot[i] = next.was[i] >= 0 ? slot_[next.was[i]] : next_room_ + static_cast<int>(added++);

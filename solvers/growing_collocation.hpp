@@ -40,7 +40,8 @@ class GrowingCollocation final : public Collocation, public Growable {
   [[nodiscard]] MatrixX window_solution(const MatrixX& right) const;
   [[nodiscard]] double rho() const { return collocation_support_radius(options_.method); }
   void make_window();
-  [[nodiscard]] Next next_of(const SprinkleIncrement& change, const Problem& grown, GrowthReport& report) const;
+  [[nodiscard]] Next next_of(const SprinkleIncrement& change, std::vector<int> place, const Problem& grown,
+                             GrowthReport& report) const;
   [[nodiscard]] NodalSupports next_supports(const Next& next, const std::vector<char>& seen_anew) const;
   void find_changed_rows(Next& next) const;
   /// Why the window does not cover it; empty: it does.

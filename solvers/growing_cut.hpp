@@ -41,7 +41,7 @@ struct GrowthReport {
   bool condensed_anew = false;
   bool declined = false;   // it was to be an update alone and cannot be one; all is as it was
   const char* reason = ""; // why it had to be, or cannot
-  int boxes = 0;           // background boxes exchanged
+  int boxes = 0;           // background boxes exchanged; rows of cells made again (collocation)
   int window_nodes = 0;    // nodes in the dense system
   bool prepared = false;   // what prepare() had eliminated ahead could stay
   int factored = 0;        // unknowns of the dense system factored in the increment itself

@@ -249,33 +249,13 @@ void BM_growing_cut_diffraction_unknown_path(benchmark::State& state) {
   growth(state, 3, true, SightRule::diffraction);
 }
 
+void at_three_sizes(benchmark::internal::Benchmark* benchmark) {
+  benchmark->Arg(300)->Arg(1000)->Arg(2000)->UseManualTime()->Iterations(2)->Unit(benchmark::kMillisecond);
+}
+
 } // namespace
 
-BENCHMARK(BM_growing_cut_collocation)
-    ->Arg(300)
-    ->Arg(1000)
-    ->Arg(2000)
-    ->UseManualTime()
-    ->Iterations(2)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_growing_cut_enriched)
-    ->Arg(300)
-    ->Arg(1000)
-    ->Arg(2000)
-    ->UseManualTime()
-    ->Iterations(2)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_growing_cut_diffraction)
-    ->Arg(300)
-    ->Arg(1000)
-    ->Arg(2000)
-    ->UseManualTime()
-    ->Iterations(2)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_growing_cut_diffraction_unknown_path)
-    ->Arg(300)
-    ->Arg(1000)
-    ->Arg(2000)
-    ->UseManualTime()
-    ->Iterations(2)
-    ->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_growing_cut_collocation)->Apply(at_three_sizes);
+BENCHMARK(BM_growing_cut_enriched)->Apply(at_three_sizes);
+BENCHMARK(BM_growing_cut_diffraction)->Apply(at_three_sizes);
+BENCHMARK(BM_growing_cut_diffraction_unknown_path)->Apply(at_three_sizes);
