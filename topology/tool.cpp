@@ -17,11 +17,6 @@ struct Overloaded : Visitors... {
 template <class... Visitors>
 Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
-struct DistanceAndNormal {
-  double distance;
-  Vector3 normal;
-};
-
 /// Some unit vector perpendicular to the axis, always the same one for the same axis.
 Vector3 perpendicular(const Vector3& axis) {
   Eigen::Index smallest = 0;
@@ -55,19 +50,6 @@ DistanceAndNormal cylinder(const Vector3& base, const Vector3& axis, double leng
     return {distance, (beyond_side * sideways + beyond_end * endways) / distance};
   }
   return beyond_side > beyond_end ? DistanceAndNormal{beyond_side, sideways} : DistanceAndNormal{beyond_end, endways};
-}
-
-DistanceAndNormal distance_and_normal(const ToolShape& tool, const ToolPose& pose, const Vector3& x) {
-  const Overloaded by_shape{
-      [&](const SphereTip& tip) { return ball(pose.point + tip.radius * pose.axis, tip.radius, pose.axis, x); },
-      [&](const FlatPunch& punch) { return cylinder(pose.point, pose.axis, punch.length, punch.radius, x); },
-      [&](const Laparoscope& scope) {
-        const Vector3 centre = pose.point + scope.tip_radius * pose.axis;
-        const DistanceAndNormal tip = ball(centre, scope.tip_radius, pose.axis, x);
-        const DistanceAndNormal shaft = capsule(centre, pose.axis, scope.shaft_length, scope.shaft_radius, x);
-        return shaft.distance < tip.distance ? shaft : tip;
-      }};
-  return std::visit(by_shape, tool);
 }
 
 void require_positive(const char* field, double value) {
@@ -160,12 +142,25 @@ ToolPose pose_at(const ToolShape& tool, const Vector3& point, const Vector3& axi
   return {point, direction.stableNormalized()};
 }
 
+DistanceAndNormal tool_distance_and_normal(const ToolShape& tool, const ToolPose& pose, const Vector3& x) {
+  const Overloaded by_shape{
+      [&](const SphereTip& tip) { return ball(pose.point + tip.radius * pose.axis, tip.radius, pose.axis, x); },
+      [&](const FlatPunch& punch) { return cylinder(pose.point, pose.axis, punch.length, punch.radius, x); },
+      [&](const Laparoscope& scope) {
+        const Vector3 centre = pose.point + scope.tip_radius * pose.axis;
+        const DistanceAndNormal tip = ball(centre, scope.tip_radius, pose.axis, x);
+        const DistanceAndNormal shaft = capsule(centre, pose.axis, scope.shaft_length, scope.shaft_radius, x);
+        return shaft.distance < tip.distance ? shaft : tip;
+      }};
+  return std::visit(by_shape, tool);
+}
+
 double tool_distance(const ToolShape& tool, const ToolPose& pose, const Vector3& x) {
-  return distance_and_normal(tool, pose, x).distance;
+  return tool_distance_and_normal(tool, pose, x).distance;
 }
 
 Vector3 tool_normal(const ToolShape& tool, const ToolPose& pose, const Vector3& x) {
-  return distance_and_normal(tool, pose, x).normal;
+  return tool_distance_and_normal(tool, pose, x).normal;
 }
 
 double tip_radius(const ToolShape& tool) {

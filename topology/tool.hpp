@@ -50,6 +50,13 @@ double tool_distance(const ToolShape& tool, const ToolPose& pose, const Vector3&
 /// of a ball, an axis) one of them, always the same.
 Vector3 tool_normal(const ToolShape& tool, const ToolPose& pose, const Vector3& x);
 
+/// Both at once.
+struct DistanceAndNormal {
+  double distance; // m
+  Vector3 normal;
+};
+DistanceAndNormal tool_distance_and_normal(const ToolShape& tool, const ToolPose& pose, const Vector3& x);
+
 /// Radius of the part that touches first, m: of the ball, of the flat end, of the instrument's tip.
 double tip_radius(const ToolShape& tool);
 

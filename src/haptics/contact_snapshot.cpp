@@ -1,27 +1,84 @@
 #include "src/haptics/contact_snapshot.hpp"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
 #include <numeric>
 
 namespace spherecut::app {
 
 ContactSnapshot::ContactSnapshot()
-    : rest(most_candidates), normals(most_candidates), base(most_candidates), displacement(most_candidates),
-      forces(most_candidates), along(most_candidates), bond(most_candidates), active(most_candidates),
-      compliance(static_cast<std::size_t>(3 * most_candidates) * (3 * most_candidates)) {}
+    : displacement(most_candidates), forces(most_candidates), along(most_candidates), bond(most_candidates),
+      active(most_candidates) {}
+
+std::shared_ptr<const CondensedContact> numbered(CondensedContact condensed) {
+  static std::atomic<std::uint64_t> made = 0;
+  condensed.number = ++made;
+  return std::make_shared<const CondensedContact>(std::move(condensed));
+}
 
 void clear(ContactSnapshot& snapshot) {
   snapshot.count = 0;
   snapshot.force.setZero();
   snapshot.blade = {};
-  snapshot.asymmetry = 0;
   snapshot.reach = 0;
   snapshot.rest_sum = 0;
-  snapshot.compliance_sum = 0;
+  snapshot.condensed.reset();
 }
 
+namespace {
+
+/// Of the chosen candidates. The symmetric part is made three columns at a time, and nothing of it is kept before one
+/// differs from `last`.
+std::shared_ptr<const CondensedContact> condensed_contact(const solvers::ContactPatch& patch,
+                                                          const std::vector<int>& chosen,
+                                                          const std::shared_ptr<const CondensedContact>& last) {
+  const std::size_t rows = 3 * chosen.size();
+  CondensedContact made;
+  for (const int c : chosen) {
+    made.rest.push_back(patch.rest[c]);
+    made.normals.push_back(patch.normals[c]);
+    made.base.emplace_back(patch.base_displacement.segment<3>(3 * c));
+  }
+  bool same = last != nullptr && last->rest == made.rest && last->normals == made.normals && last->base == made.base;
+  std::array<double, static_cast<std::size_t>(9 * most_candidates)> columns;
+  double skew = 0;
+  double sum = 0;
+  for (std::size_t l = 0; l < chosen.size(); ++l) {
+    const int d = 3 * chosen[l];
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      const int c = 3 * chosen[k];
+      const Matrix3 here = patch.compliance.block<3, 3>(c, d);
+      const Matrix3 there = patch.compliance.block<3, 3>(d, c).transpose();
+      skew += (here - there).squaredNorm();
+      sum += (here + there).squaredNorm();
+      const Matrix3 mean = 0.5 * (here + there);
+      for (int j = 0; j < 3; ++j)
+        std::copy_n(mean.col(j).data(), 3, &columns[static_cast<std::size_t>(j) * rows + 3 * k]);
+    }
+    const std::size_t done = 3 * l * rows;
+    if (same && !std::equal(columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(3 * rows),
+                            last->compliance.begin() + static_cast<std::ptrdiff_t>(done))) {
+      same = false;
+      made.compliance.assign(last->compliance.begin(), last->compliance.begin() + static_cast<std::ptrdiff_t>(done));
+    }
+    if (!same) {
+      made.compliance.resize(rows * rows);
+      std::copy_n(columns.begin(), 3 * rows, made.compliance.begin() + static_cast<std::ptrdiff_t>(done));
+    }
+  }
+  if (same)
+    return last;
+  made.asymmetry = sum > 0 ? std::sqrt(skew / sum) : 0;
+  return numbered(std::move(made));
+}
+
+} // namespace
+
 void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state,
-          const topology::SurfaceContact& contact, solvers::ContactCondition condition, ContactSnapshot& snapshot) {
+          const topology::SurfaceContact& contact, solvers::ContactCondition condition,
+          const std::shared_ptr<const CondensedContact>& last, ContactSnapshot& snapshot) {
   std::vector<int> chosen(patch.nodes.size());
   std::iota(chosen.begin(), chosen.end(), 0);
   if (std::ssize(chosen) > most_candidates) {
@@ -41,38 +98,18 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
   snapshot.pose = state.pose;
   snapshot.force = state.tool_force;
   snapshot.reach = 0;
-  const auto size = 3 * static_cast<std::size_t>(snapshot.count);
-  double skew = 0;
   snapshot.rest_sum = 0;
-  snapshot.compliance_sum = 0;
-  double sum = 0;
   for (int k = 0; k < snapshot.count; ++k) {
     const int c = chosen[static_cast<std::size_t>(k)];
-    snapshot.rest[k] = patch.rest[c];
     snapshot.rest_sum += patch.rest[c].dot(Vector3(1, 1.7, 2.9)) * (1 + k);
-    snapshot.normals[k] = patch.normals[c];
-    snapshot.base[k] = patch.base_displacement.segment<3>(3 * c);
     snapshot.displacement[k] = state.displacement.segment<3>(3 * c);
     snapshot.forces[k] = state.nodal_forces[c];
     snapshot.along[k] = state.along.empty() ? Vector3::Zero() : state.along[c];
     snapshot.bond[k] = state.bond.empty() ? Vector3::Zero() : state.bond[c];
     snapshot.active[k] = state.active[c];
     snapshot.reach = std::max(snapshot.reach, (patch.rest[c] - contact.point).norm());
-    for (int l = 0; l < snapshot.count; ++l) {
-      const int d = chosen[static_cast<std::size_t>(l)];
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-          const double here = patch.compliance(3 * c + i, 3 * d + j);
-          const double there = patch.compliance(3 * d + j, 3 * c + i);
-          snapshot.compliance_sum += here * (1 + i + 3 * j + 9 * (k % 7));
-          skew += (here - there) * (here - there);
-          sum += (here + there) * (here + there);
-          snapshot.compliance[static_cast<std::size_t>(3 * l + j) * size + static_cast<std::size_t>(3 * k + i)] =
-              0.5 * (here + there);
-        }
-    }
   }
-  snapshot.asymmetry = sum > 0 ? std::sqrt(skew / sum) : 0;
+  snapshot.condensed = condensed_contact(patch, chosen, last);
 }
 
 } // namespace spherecut::app

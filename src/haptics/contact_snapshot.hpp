@@ -7,17 +7,30 @@
 #include "topology/contact.hpp"
 
 #include <cstdint>
+#include <memory>
 
 namespace spherecut::app {
 
 /// Candidates of a snapshot. Of a larger patch those nearest to the contact are handed over.
 inline constexpr int most_candidates = 128;
 
-/// u = base + compliance * f over the candidates, and the state of the solve. Closed lips are held: their compliance is
-/// already taken out. Every array is allocated once, for most_candidates; only the first `count` entries count. With
-/// the method `collocation` the compliance is not symmetric; what is handed over is its symmetric part (see
-/// `asymmetry`), because a symmetric compliance derives from a potential, so that no closed loop of the tool at
-/// constant contact can give energy to the hand.
+/// Candidates and the body condensed onto them, u = base + compliance * f, with closed lips held. With the method
+/// `collocation` the compliance is not symmetric; what is handed over is its symmetric part, because that derives from
+/// a potential, so that no closed loop of the tool at constant contact can give energy to the hand. It does not change
+/// once it is made: solves of one body on one choice of candidates share it, and the haptic thread, which reads it at
+/// every tick, keeps it in its caches from solve to solve.
+struct CondensedContact {
+  std::uint64_t number = 0;       // its own: no two have the same
+  std::vector<Vector3> rest;      // m
+  std::vector<Vector3> normals;   // outward, of the surface at rest
+  std::vector<Vector3> base;      // m, displacement without tool
+  std::vector<double> compliance; // m/N, column-major, 3 rows a candidate
+  double asymmetry = 0;           // |C - C^T| / |C + C^T| before it was made symmetric
+};
+
+/// The condensed contact and the state of the solve. Every array is allocated once, for most_candidates; only the first
+/// `count` entries count. The condensed contact is given up by the thread that fills the next solve in, never by the
+/// one that reads.
 struct ContactSnapshot {
   ContactSnapshot();
 
@@ -31,19 +44,15 @@ struct ContactSnapshot {
   solvers::ContactCondition condition = solvers::ContactCondition::frictionless;
   double friction = 0; // coefficient, frictional
 
-  int count = 0;                           // candidates; 0: the tool is far
-  std::vector<Vector3> rest;               // m
-  std::vector<Vector3> normals;            // outward, of the surface at rest
-  std::vector<Vector3> base;               // m, displacement without tool
-  std::vector<Vector3> displacement;       // m, in the solve
-  std::vector<Vector3> forces;             // N on the body, in the solve
-  std::vector<Vector3> along;              // N, frictional: part of the forces that acts along the tool's surface
-  std::vector<Vector3> bond;               // m, displacement at which an active node sticks to the tool
-  std::vector<char> active;                // in contact
-  std::vector<double> compliance;          // m/N, column-major 3 count x 3 count
-  double asymmetry = 0;                    // |C - C^T| / |C + C^T| of the compliance before it was made symmetric
-  double rest_sum = 0, compliance_sum = 0; // of all entries: equal sums mean the same candidates, the same body
-  double reach = 0;                        // m, of the candidates about the contact's point
+  int count = 0;                     // candidates; 0: the tool is far
+  std::vector<Vector3> displacement; // m, in the solve
+  std::vector<Vector3> forces;       // N on the body, in the solve
+  std::vector<Vector3> along;        // N, frictional: part of the forces that acts along the tool's surface
+  std::vector<Vector3> bond;         // m, displacement at which an active node sticks to the tool
+  std::vector<char> active;          // in contact
+  double rest_sum = 0;               // of all entries: equal sums mean the same candidates
+  double reach = 0;                  // m, of the candidates about the contact's point
+  std::shared_ptr<const CondensedContact> condensed; // null: no candidates
 
   BladeGrip blade; // of a blade that the tissue resists, in the hand; `pose.point` is then that of its frame
 
@@ -55,10 +64,14 @@ struct ContactSnapshot {
   double solve_seconds = 0;   // wall clock, from pose to snapshot
 };
 
+/// Numbers it and lets nobody change it any more.
+std::shared_ptr<const CondensedContact> numbered(CondensedContact condensed);
+
 /// Copies the state of a patch; `candidates` beyond most_candidates are left out, those farthest from the contact
-/// first. Allocates for its own work, but never inside the snapshot.
+/// first. Where the condensed contact is as `last` (null: none), bit by bit, that is shared.
 void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state,
-          const topology::SurfaceContact& contact, solvers::ContactCondition condition, ContactSnapshot& snapshot);
+          const topology::SurfaceContact& contact, solvers::ContactCondition condition,
+          const std::shared_ptr<const CondensedContact>& last, ContactSnapshot& snapshot);
 
 /// No candidates: the tool is far.
 void clear(ContactSnapshot& snapshot);

@@ -133,9 +133,10 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
                                                 [](char closed) { return closed != 0; });
     if (lips)
       fill(solvers::held_patch(model.patch, *model.lips, model.state->lips.closed), model.state->tool, result_.contact,
-           condition, snapshot);
+           condition, condensed_, snapshot);
     else
-      fill(model.patch, model.state->tool, result_.contact, condition, snapshot);
+      fill(model.patch, model.state->tool, result_.contact, condition, condensed_, snapshot);
+    condensed_ = snapshot.condensed;
   }
   if (holds_blade()) {
     clear(snapshot);

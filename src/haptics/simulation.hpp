@@ -66,6 +66,7 @@ class HapticSimulation {
 
   Session session_;
   StepResult result_;
+  std::shared_ptr<const CondensedContact> condensed_; // handed over last
   std::optional<topology::ToolPose> parked_;
   int degradation_ = 0;
   HandMode mode_ = HandMode::usual; // of the last solve

@@ -77,26 +77,28 @@ TangentModel::TangentModel(const topology::ToolShape& tool)
 }
 
 std::span<const Vector3> TangentModel::rest() const {
-  return {snapshot_->rest.data(), static_cast<std::size_t>(snapshot_->count)};
+  return {condensed_->rest.data(), static_cast<std::size_t>(snapshot_->count)};
 }
 
 std::span<const Vector3> TangentModel::normals() const {
-  return {snapshot_->normals.data(), static_cast<std::size_t>(snapshot_->count)};
+  return {condensed_->normals.data(), static_cast<std::size_t>(snapshot_->count)};
 }
 
 bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
   const bool same_places = count_ == snapshot.count && rest_sum_ == snapshot.rest_sum;
-  const bool same_body = same_places && compliance_sum_ == snapshot.compliance_sum;
+  const std::uint64_t number = snapshot.condensed != nullptr ? snapshot.condensed->number : 0;
+  const bool same_body = same_places && condensed_number_ == number;
   const bool bladed = blade_.solved(snapshot);
   const bool bonded = snapshot.condition == solvers::ContactCondition::bonded;
   snapshot_ = &snapshot;
   count_ = snapshot.count;
   rest_sum_ = snapshot.rest_sum;
-  compliance_sum_ = snapshot.compliance_sum;
-  travelled_ = 0;
-  clearance_.fill(0);
+  condensed_number_ = number;
+  condensed_ = snapshot.condensed.get();
   if (bonded ? same_body : same_places)
     return same_body && !bladed; // what has been found since is nearer to the tool's place now than the solve
+  travelled_ = 0;
+  clearance_.fill(0);
   pose_ = snapshot.pose;
   chosen_count_ = 0;
   for (int c = 0; c < snapshot.count; ++c) {
@@ -138,7 +140,7 @@ bool TangentModel::solve_active() noexcept {
     const int c = chosen_[a];
     double* response = &response_[static_cast<std::size_t>(c) * ld];
     if (fresh_[c] == 0) {
-      combine(response, &snapshot_->compliance[3 * static_cast<std::size_t>(c) * rows], normal_[c].data(), rows);
+      combine(response, &condensed_->compliance[3 * static_cast<std::size_t>(c) * rows], normal_[c].data(), rows);
       fresh_[c] = 1;
     }
     double* column = &factor_[a * most_candidates];
@@ -146,7 +148,7 @@ bool TangentModel::solve_active() noexcept {
       column[b] = normal_[chosen_[b]].dot(Eigen::Map<const Vector3>(response + 3 * chosen_[b]));
     right_[a] = -gap_[c];
     if (frictional)
-      right_[a] -= normal_[c].dot(bare_[c] - snapshot_->base[c]);
+      right_[a] -= normal_[c].dot(bare_[c] - condensed_->base[c]);
   }
   for (std::size_t a = 0; a < size; ++a) {
     double* column = &factor_[a * most_candidates];
@@ -209,12 +211,12 @@ void TangentModel::displace() noexcept {
   if (snapshot_->condition == solvers::ContactCondition::frictional)
     std::copy(bare_.begin(), bare_.begin() + snapshot_->count, moved_.begin());
   else
-    std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, moved_.begin());
+    std::copy(condensed_->base.begin(), condensed_->base.begin() + snapshot_->count, moved_.begin());
   for (int a = 0; a < chosen_count_; ++a) {
     const auto c = static_cast<std::size_t>(chosen_[a]);
     double* response = &response_[c * ld];
     if (bonded)
-      combine(response, &snapshot_->compliance[3 * c * rows], bond_force_[c].data(), rows);
+      combine(response, &condensed_->compliance[3 * c * rows], bond_force_[c].data(), rows);
     add_scaled(u, response, bonded ? 1 : pressure_[c], rows);
   }
 }
@@ -222,12 +224,12 @@ void TangentModel::displace() noexcept {
 // Displacements under friction alone: `bare_` = b + C t.
 void TangentModel::drag_along() noexcept {
   const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
-  std::copy(snapshot_->base.begin(), snapshot_->base.begin() + snapshot_->count, bare_.begin());
+  std::copy(condensed_->base.begin(), condensed_->base.begin() + snapshot_->count, bare_.begin());
   for (int k = 0; k < near_count_; ++k) {
     const auto c = static_cast<std::size_t>(near_[k]);
     if (along_[c].isZero(0))
       continue;
-    combine(share_.data(), &snapshot_->compliance[3 * c * rows], along_[c].data(), rows);
+    combine(share_.data(), &condensed_->compliance[3 * c * rows], along_[c].data(), rows);
     add_scaled(bare_[0].data(), share_.data(), 1, rows);
   }
 }
@@ -243,7 +245,7 @@ bool TangentModel::rub() noexcept {
     slip_[c] = moved_[c] - bond_[c];
   }
   const solvers::SlidingContact contact{{chosen_.data(), static_cast<std::size_t>(chosen_count_)},
-                                        snapshot_->compliance.data(),
+                                        condensed_->compliance.data(),
                                         3 * static_cast<std::size_t>(snapshot_->count),
                                         normal_,
                                         limit_};
@@ -276,7 +278,7 @@ void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
   for (int c = 0; c < snapshot_->count; ++c) {
     if (active_[c] == 0 && clearance_[c] - travelled_ > far)
       continue;
-    const double gap = solvers::contact_gap(tool, snapshot_->rest[c] + displacement_[c]).distance;
+    const double gap = solvers::contact_gap(tool, condensed_->rest[c] + displacement_[c]).distance;
     clearance_[c] = gap + travelled_;
     if (active_[c] != 0 || gap <= 2 * far)
       near_[near_count_++] = c;
@@ -290,7 +292,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
   if (frictional)
     for (int c = 0; c < count; ++c)
       if (active_[c] != 0)
-        bond_[c] += solvers::tool_motion(pose_, pose, snapshot_->rest[c] + bond_[c]);
+        bond_[c] += solvers::tool_motion(pose_, pose, condensed_->rest[c] + bond_[c]);
   look_around(tool);
   if (frictional)
     drag_along();
@@ -304,9 +306,9 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     ++result.rounds;
     for (int k = 0; k < near_count_; ++k) {
       const int c = near_[k];
-      const solvers::Gap gap = solvers::contact_gap(tool, snapshot_->rest[c] + displacement_[c]);
+      const solvers::Gap gap = solvers::contact_gap(tool, condensed_->rest[c] + displacement_[c]);
       normal_[c] = gap.normal;
-      gap_[c] = gap.distance + gap.normal.dot(snapshot_->base[c] - displacement_[c]);
+      gap_[c] = gap.distance + gap.normal.dot(condensed_->base[c] - displacement_[c]);
       fresh_[c] = 0;
     }
     int fewest = std::numeric_limits<int>::max();
@@ -320,7 +322,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       int last = -1;
       const auto is_wrong = [&](int c) {
         return active_[c] != 0 ? pressure_[c] < 0
-                               : gap_[c] + normal_[c].dot(moved_[c] - snapshot_->base[c]) < -gap_slack;
+                               : gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c]) < -gap_slack;
       };
       for (int k = 0; k < near_count_; ++k) {
         const int c = near_[k];
@@ -382,7 +384,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       ++result.active;
       const Vector3 on_body = frictional ? Vector3(pressure * normal_[c] + along_[c]) : Vector3(pressure * normal_[c]);
       result.force -= on_body;
-      stored += 0.5 * on_body.dot(moved_[c] - snapshot_->base[c]);
+      stored += 0.5 * on_body.dot(moved_[c] - condensed_->base[c]);
     }
   }
   if (frictional)
@@ -391,7 +393,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
   result.stiffness = stiffness_along(result.force);
   for (int k = 0; k < near_count_; ++k) {
     const int c = near_[k];
-    result.sinking = std::max(result.sinking, -(gap_[c] + normal_[c].dot(moved_[c] - snapshot_->base[c])));
+    result.sinking = std::max(result.sinking, -(gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c])));
   }
   travelled_ += went;
   pose_ = pose;
@@ -400,7 +402,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
 
 // Adds a candidate to those that move with the tool: three more rows of the factor. False: it depends on the others.
 bool TangentModel::catch_node(int candidate) noexcept {
-  const std::vector<double>& compliance = snapshot_->compliance;
+  const std::vector<double>& compliance = condensed_->compliance;
   const auto rows = 3 * static_cast<std::size_t>(snapshot_->count);
   chosen_[chosen_count_] = candidate;
   for (int i = 0; i < 3; ++i) {
@@ -440,7 +442,7 @@ ModelForce TangentModel::follow(const topology::ToolPose& pose) noexcept {
     for (int r = 0; r < size; ++r) {
       const int c = chosen_[r / 3];
       const double* row = &factor_[static_cast<std::size_t>(r) * ld];
-      double value = bond_[c][r % 3] - snapshot_->base[c][r % 3];
+      double value = bond_[c][r % 3] - condensed_->base[c][r % 3];
       for (int k = 0; k < r; ++k)
         value -= row[k] * right_[k];
       right_[r] = value / row[r];
@@ -456,7 +458,7 @@ ModelForce TangentModel::follow(const topology::ToolPose& pose) noexcept {
     for (int c = 0; c < count && chosen_count_ < most_bonded; ++c) {
       if (active_[c] != 0)
         continue;
-      const solvers::Gap gap = solvers::contact_gap(tool, snapshot_->rest[c] + moved_[c]);
+      const solvers::Gap gap = solvers::contact_gap(tool, condensed_->rest[c] + moved_[c]);
       result.sinking = std::max(result.sinking, -gap.distance);
       if (gap.distance < -gap_slack) {
         bond_[c] = moved_[c] - gap.distance * gap.normal;
@@ -470,7 +472,7 @@ ModelForce TangentModel::follow(const topology::ToolPose& pose) noexcept {
     const int c = chosen_[a];
     displacement_[c] = moved_[c];
     result.force -= bond_force_[c];
-    stored += 0.5 * bond_force_[c].dot(moved_[c] - snapshot_->base[c]);
+    stored += 0.5 * bond_force_[c].dot(moved_[c] - condensed_->base[c]);
   }
   result.active = chosen_count_;
   result.stored = stored;

@@ -41,12 +41,14 @@ class TangentModel : public ForceModel {
   const topology::ToolShape& tool_;
   BladeModel blade_;
   const ContactSnapshot* snapshot_ = nullptr;
-  topology::ToolPose pose_;            // of the last tick
-  PerCandidate<Vector3> displacement_; // m, of the candidates
-  PerCandidate<Vector3> moved_;        // m, the same for the forces of this round
-  PerCandidate<Vector3> normal_;       // of the tool
-  PerCandidate<double> gap_;           // m, linearised, at the displacement without tool
-  PerCandidate<double> pressure_;      // N along the normal
+  const CondensedContact* condensed_ = nullptr; // of it
+  std::uint64_t condensed_number_ = 0;          // 0: none
+  topology::ToolPose pose_;                     // of the last tick
+  PerCandidate<Vector3> displacement_;          // m, of the candidates
+  PerCandidate<Vector3> moved_;                 // m, the same for the forces of this round
+  PerCandidate<Vector3> normal_;                // of the tool
+  PerCandidate<double> gap_;                    // m, linearised, at the displacement without tool
+  PerCandidate<double> pressure_;               // N along the normal
   PerCandidate<char> active_;
   PerCandidate<char> wrong_;         // candidates that change sides in a pivot
   PerCandidate<Vector3> step_;       // m, of the last round
@@ -63,8 +65,8 @@ class TangentModel : public ForceModel {
   PerCandidate<char> fresh_;       // whose response_ is that to normal_
   PerCandidate<double> clearance_; // m, gap when last looked at, plus travelled_ then
   double travelled_ = 0;           // m, of tool and surface towards one another, at most
-  int count_ = 0;                  // of the last snapshot, and its sums
-  double rest_sum_ = 0, compliance_sum_ = 0;
+  int count_ = 0;                  // of the last snapshot, and its sum
+  double rest_sum_ = 0;
   std::vector<double> factor_;   // Cholesky factor of the active block: by columns; bonded: by rows
   std::vector<double> right_;    // right-hand sides of it
   std::vector<double> share_;    // m, of one candidate's friction in the displacements

@@ -89,7 +89,7 @@ SolveRecord record_of(const SolveEvent& event, const ContactSnapshot& snapshot) 
   for (int c = 0; c < snapshot.count; ++c)
     record.active += snapshot.active[c];
   record.topology = snapshot.topology;
-  record.asymmetry = snapshot.asymmetry;
+  record.asymmetry = snapshot.condensed != nullptr ? snapshot.condensed->asymmetry : 0;
   record.force = snapshot.force;
   record.seconds = snapshot.solve_seconds;
   return record;

@@ -32,16 +32,18 @@ void solve(const DeviceState& device, std::uint64_t sequence, ContactSnapshot& s
   snapshot.contact.point = {0, 0, 0.01};
   snapshot.reach = 0.02;
   snapshot.rest_sum = 1;
-  snapshot.compliance_sum = stiffness;
-  std::fill(snapshot.compliance.begin(), snapshot.compliance.end(), 0);
+  CondensedContact condensed;
+  condensed.compliance.resize(static_cast<std::size_t>(75 * 75));
   for (int c = 0; c < snapshot.count; ++c) {
-    snapshot.rest[c] = {0.001 * (c % 5 - 2), 0.001 * (c / 5 - 2), 0.01};
-    snapshot.normals[c] = Vector3::UnitZ();
-    snapshot.base[c] = snapshot.displacement[c] = snapshot.forces[c] = snapshot.bond[c] = Vector3::Zero();
+    condensed.rest.emplace_back(0.001 * (c % 5 - 2), 0.001 * (c / 5 - 2), 0.01);
+    condensed.normals.emplace_back(Vector3::UnitZ());
+    condensed.base.emplace_back(Vector3::Zero());
+    snapshot.displacement[c] = snapshot.forces[c] = snapshot.bond[c] = Vector3::Zero();
     snapshot.active[c] = 0;
     for (int i = 0; i < 3; ++i)
-      snapshot.compliance[static_cast<std::size_t>((3 * c + i) * 76)] = 1 / stiffness;
+      condensed.compliance[static_cast<std::size_t>((3 * c + i) * 76)] = 1 / stiffness;
   }
+  snapshot.condensed = numbered(std::move(condensed));
 }
 
 } // namespace

@@ -167,21 +167,33 @@ TEST_CASE("A snapshot holds the symmetric part of the compliance and the candida
   state.displacement = VectorX::Random(3 * nodes);
   state.tool_force = {0, 0, 3};
   ContactSnapshot snapshot;
-  const auto size = snapshot.compliance.size();
-  fill(patch, state, {}, solvers::ContactCondition::frictionless, snapshot);
+  fill(patch, state, {}, solvers::ContactCondition::frictionless, nullptr, snapshot);
   REQUIRE(snapshot.count == most_candidates);
-  CHECK(snapshot.rest[most_candidates - 1] == patch.rest.back()); // far, but in contact
-  CHECK(snapshot.rest[most_candidates - 2] == patch.rest[most_candidates - 2]);
+  CHECK(snapshot.condensed->rest[most_candidates - 1] == patch.rest.back()); // far, but in contact
+  CHECK(snapshot.condensed->rest[most_candidates - 2] == patch.rest[most_candidates - 2]);
   CHECK(snapshot.force == state.tool_force);
   const int rows = 3 * snapshot.count;
   double worst = 0;
   for (int i = 0; i < rows - 3; ++i)
     for (int j = 0; j < rows - 3; ++j)
-      worst = std::max(worst, std::abs(snapshot.compliance[static_cast<std::size_t>(i + j * rows)] -
+      worst = std::max(worst, std::abs(snapshot.condensed->compliance[static_cast<std::size_t>(i + j * rows)] -
                                        0.5 * (patch.compliance(i, j) + patch.compliance(j, i))));
   CHECK(worst < 1e-15);
-  CHECK(snapshot.asymmetry > 0.5);
-  CHECK(snapshot.compliance.size() == size);
+  CHECK(snapshot.condensed->asymmetry > 0.5);
+  const auto last = snapshot.condensed;
+  ContactSnapshot next;
+  fill(patch, state, {}, solvers::ContactCondition::frictionless, last, next);
+  CHECK(next.condensed == last); // the same body: the reader's caches stay warm
+  const int late = patch.nodes[most_candidates - 2];
+  patch.compliance(3 * late, 3 * late) += 1e-9;
+  fill(patch, state, {}, solvers::ContactCondition::frictionless, last, next);
+  REQUIRE(next.condensed != last);
+  CHECK(next.condensed->number != last->number);
+  CHECK(next.condensed->compliance.size() == last->compliance.size());
+  ContactSnapshot alone;
+  fill(patch, state, {}, solvers::ContactCondition::frictionless, nullptr, alone);
+  CHECK(alone.condensed->compliance == next.condensed->compliance);
+  CHECK(alone.condensed->asymmetry == next.condensed->asymmetry);
   clear(snapshot);
   CHECK(snapshot.count == 0);
   CHECK(snapshot.force.norm() == 0);

@@ -45,16 +45,15 @@ Vector3 around(std::uint64_t tick) {
 void spring(double stiffness, const Vector3& at, ContactSnapshot& snapshot) {
   clear(snapshot);
   snapshot.count = 1;
-  snapshot.rest[0] = at;
-  snapshot.normals[0] = Vector3::UnitZ();
-  snapshot.base[0] = snapshot.displacement[0] = snapshot.forces[0] = snapshot.bond[0] = Vector3::Zero();
+  snapshot.displacement[0] = snapshot.forces[0] = snapshot.bond[0] = Vector3::Zero();
   snapshot.active[0] = 0;
   snapshot.pose.point = at;
   snapshot.reach = 1;
-  snapshot.compliance_sum = 1 / stiffness;
   snapshot.condition = solvers::ContactCondition::frictionless;
+  CondensedContact condensed{0, {at}, {Vector3::UnitZ()}, {Vector3::Zero()}, {}, 0};
   for (std::size_t i = 0; i < 9; ++i)
-    snapshot.compliance[i] = i % 4 == 0 ? 1 / stiffness : 0;
+    condensed.compliance.push_back(i % 4 == 0 ? 1 / stiffness : 0);
+  snapshot.condensed = numbered(std::move(condensed));
 }
 
 const topology::ToolShape punch = topology::FlatPunch{0.005, 0.05};
@@ -179,7 +178,7 @@ TEST_CASE("Around a closed loop at constant contact the tangent model gives no e
   ContactSnapshot snapshot;
   simulation.solve(device_at(0, around(0)), 0, snapshot);
   if (method == "collocation")
-    CHECK(snapshot.asymmetry > 1e-4);
+    CHECK(snapshot.condensed->asymmetry > 1e-4);
   const auto model = make_force_model(ForceModelKind::tangent, simulation.tool());
   model->solved(snapshot);
   double work = 0;
