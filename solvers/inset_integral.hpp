@@ -11,4 +11,8 @@ namespace spherecut::solvers {
 Intensities inset_integral(const Discretisation& body, const Field& field, const topology::FrontFrame& front,
                            double inset, const InteractionOptions& options = {});
 
+/// The same as interaction_rule().
+IntensityRule inset_rule(const Discretisation& body, bool with_pressure, const topology::FrontFrame& front,
+                         double inset, const InteractionOptions& options = {});
+
 } // namespace spherecut::solvers

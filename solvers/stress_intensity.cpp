@@ -2,6 +2,7 @@
 
 #include "solvers/elastic_body.hpp"
 #include "solvers/inset_integral.hpp"
+#include "solvers/shape_functions.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Dense>
@@ -175,6 +176,14 @@ struct GaussRule {
   std::array<double, 2> place{-0.5773502691896257, 0.5773502691896257};
 };
 
+/// A point of the integral. To that of mode m it adds stress[m] : sigma + gradient[m] : grad u + load[m] times the load
+/// factor of the field.
+struct Sample {
+  Vector3 position;
+  std::array<Matrix3, 3> stress, gradient;
+  Vector3 load;
+};
+
 // With xi = q e the virtual shift of the front (e ahead, q = 1 at the front and 0 on the outside of the tube),
 //   I Q = int [sigma_ij v_i,k + tau_ij u_i,k - sigma_mn v_m,n delta_kj] xi_k,j dV + int (tau_ij,j u_i,k - b_i v_i,k)
 //   xi_k dV
@@ -182,8 +191,11 @@ struct GaussRule {
 // u, sigma the field, v, tau = C grad v the auxiliary one, b the body force, t the traction on the faces, n out of the
 // material. v keeps its components in axes that turn with the front: tau is not quite in equilibrium then.
 // Within `inset_spacings` of the surface of the body xi fades to nothing (0: it does not, and the tube must not leave).
-Intensities integral_over(const Discretisation& body, const Field& field, const FrontFrame& front,
-                          const InteractionOptions& options, double inset_spacings) {
+//
+// Calls visit(sample) for every point and gives the factors that make intensities of the sums.
+template <class Visitor>
+Intensities each_sample(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
+                        double inset_spacings, Visitor&& visit_sample) {
   const topology::Incision& incision = incision_of(body);
   const Problem& problem = body.problem();
   const Material& material = problem.material;
@@ -231,11 +243,18 @@ Intensities integral_over(const Discretisation& body, const Field& field, const 
                         "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
                         outer, 2 * half_length, front.point.x(), front.point.y(), front.point.z()));
   const std::array<Intensities, 3> modes{Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()};
-  Vector3 integral = Vector3::Zero();
-
   const GaussRule gauss;
   const int cells_along = std::max(1, options.along / 2), cells_radial = std::max(1, options.radial / 2);
   const int cells_around = std::max(1, options.around / 2);
+  double total = 0; // of the bump, by the same rule
+  for (int a = 0; a < cells_along; ++a)
+    for (const double ga : gauss.place) {
+      const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1);
+      total += half_length / cells_along * bump(s).first * cover(tube.at(0, 0, s).position).share;
+    }
+  if (!(total > 0))
+    throw InputError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
+                                 2 * half_length));
   // r = outer t^2: the singular products of the two fields are smooth in t.
   const auto each_section = [&](const auto& visit) { // (s, weight ds, r, weight dr)
     for (int a = 0; a < cells_along; ++a)
@@ -270,10 +289,9 @@ Intensities integral_over(const Discretisation& body, const Field& field, const 
       if (covered.share == 0)
         continue;
       const double q_r = fade_r * covered.share;
-      const PointState state = body.at(place.position, field);
-      const Matrix3 stress = place.axes.transpose() * state.stress * place.axes;
-      const Matrix3 gradient = place.axes.transpose() * state.gradient * place.axes;
       const double weight = r * (pi / cells_around) * ds * dr * place.stretch;
+      Sample sample;
+      sample.position = place.position;
       // Gradient of xi = q e in the axes of the place; e turns along the front.
       Matrix3 shift = Matrix3::Zero();
       shift.row(0) = covered.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta),
@@ -287,16 +305,17 @@ Intensities integral_over(const Discretisation& body, const Field& field, const 
           return stress_from_gradient(material, tube.curved_gradient(tip_field(material, modes[m], x, z), x));
         };
         const Matrix3 tau = stress_from_gradient(material, v);
-        const Matrix3 flow =
-            v.transpose() * stress + gradient.transpose() * tau - stress.cwiseProduct(v).sum() * Matrix3::Identity();
-        double density = flow.cwiseProduct(shift).sum();
+        sample.stress[m] = weight * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
+        Matrix3 by_gradient = tau * shift.transpose();
         if (tube.curvature() != 0)
-          density += q_r * q_s * tube.divergence(tau_at, ahead, above, 1e-4 * r).dot(gradient.col(0));
+          by_gradient.col(0) += q_r * q_s * tube.divergence(tau_at, ahead, above, 1e-4 * r);
+        sample.gradient[m] = weight * place.axes * by_gradient * place.axes.transpose();
+        sample.load[m] = 0;
         if (problem.loads.body_force)
-          density -= q_r * q_s * field.load_factor *
-                     (place.axes.transpose() * problem.loads.body_force(place.position)).dot(v.col(0));
-        integral[m] += weight * density;
+          sample.load[m] =
+              -weight * q_r * q_s * (place.axes.transpose() * problem.loads.body_force(place.position)).dot(v.col(0));
       }
+      visit_sample(sample);
     }
     // Both faces.
     for (const double side : {1.0, -1.0}) {
@@ -310,32 +329,112 @@ Intensities integral_over(const Discretisation& body, const Field& field, const 
       const Vector3 outward = -side * front.normal;
       Vector3 traction = Vector3::Zero();
       if (problem.loads.lip_traction)
-        traction = field.load_factor * place.axes.transpose() * problem.loads.lip_traction(place.position, outward);
+        traction = place.axes.transpose() * problem.loads.lip_traction(place.position, outward);
       if (traction.isZero(0) && tube.curvature() == 0)
         continue;
-      const Matrix3 gradient = place.axes.transpose() * body.at(place.position, field).gradient * place.axes;
+      Sample sample;
+      sample.position = place.position;
+      const double weight = q_r * q_s * ds * dr * place.stretch;
       for (int m = 0; m < 3; ++m) {
         const Matrix3 v = tube.curved_gradient(tip_field(material, modes[m], -r, side * 1e-12 * r), -r);
         const Vector3 pull = -side * stress_from_gradient(material, v).col(1);
-        integral[m] -= q_r * q_s * ds * dr * place.stretch * (traction.dot(v.col(0)) + pull.dot(gradient.col(0)));
+        sample.stress[m].setZero();
+        sample.gradient[m] = -weight * place.axes * pull * place.axes.col(0).transpose();
+        sample.load[m] = -weight * traction.dot(v.col(0));
       }
+      visit_sample(sample);
     }
   });
-  double total = 0; // of the bump, by the same rule
-  for (int a = 0; a < cells_along; ++a)
-    for (const double ga : gauss.place) {
-      const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1);
-      total += half_length / cells_along * bump(s).first * cover(tube.at(0, 0, s).position).share;
-    }
-  if (!(total > 0))
-    throw InputError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
-                                 2 * half_length));
-  integral /= total;
   const double plane = plane_strain_modulus(material);
-  return {0.5 * plane * integral[0], 0.5 * plane * integral[1], material.shear_modulus() * integral[2]};
+  return Vector3(0.5 * plane, 0.5 * plane, material.shear_modulus()) / total;
+}
+
+Intensities integral_over(const Discretisation& body, const Field& field, const FrontFrame& front,
+                          const InteractionOptions& options, double inset) {
+  Vector3 integral = Vector3::Zero();
+  const Vector3 factors = each_sample(body, front, options, inset, [&](const Sample& sample) {
+    const PointState state = body.at(sample.position, field);
+    for (int m = 0; m < 3; ++m)
+      integral[m] += sample.stress[m].cwiseProduct(state.stress).sum() +
+                     sample.gradient[m].cwiseProduct(state.gradient).sum() + field.load_factor * sample.load[m];
+  });
+  return factors.cwiseProduct(integral);
+}
+
+void require_inset(double inset) {
+  if (!(inset > 0) || !std::isfinite(inset))
+    throw InputError(
+        fmt::format("stress intensity: a shift that fades over {} node spacings; it must be positive", inset));
+}
+
+// Of a point's shape functions: sigma and grad u are linear in the coefficients (state_from).
+IntensityRule rule_over(const Discretisation& body, bool with_pressure, const FrontFrame& front,
+                        const InteractionOptions& options, double inset) {
+  const Problem& problem = body.problem();
+  const double mu = problem.material.shear_modulus();
+  const double lambda = with_pressure ? 0 : problem.material.lame_lambda();
+  const Matrix3 initial = 0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose());
+  const Matrix3 relieved = lambda * initial.trace() * Matrix3::Identity() + 2 * mu * initial;
+  const std::size_t count = problem.nodes.positions.size();
+  std::vector<Matrix3> weights(count, Matrix3::Zero()); // row: mode
+  std::vector<Vector3> pressures(with_pressure ? count : 0, Vector3::Zero());
+  std::vector<char> known(count, 0);
+  IntensityRule rule;
+  ShapeFunctions shape;
+  const Vector3 factors = each_sample(body, front, options, inset, [&](const Sample& sample) {
+    body.shape_at(sample.position, shape);
+    std::array<Matrix3, 3> by_gradient;
+    Vector3 traces;
+    for (int m = 0; m < 3; ++m) {
+      const Matrix3& by_stress = sample.stress[m];
+      traces[m] = by_stress.trace();
+      by_gradient[m] =
+          sample.gradient[m] + lambda * traces[m] * Matrix3::Identity() + mu * (by_stress + by_stress.transpose());
+      rule.loads[m] += sample.load[m] - by_stress.cwiseProduct(relieved).sum();
+    }
+    for (int k = 0; k < shape.size(); ++k) {
+      const auto node = static_cast<std::size_t>(shape.nodes[k]);
+      known[node] = 1;
+      for (int m = 0; m < 3; ++m)
+        weights[node].row(m) += (by_gradient[m] * shape.gradient(k)).transpose();
+      if (with_pressure)
+        pressures[node] -= shape.value[k] * traces;
+    }
+  });
+  rule.loads = factors.cwiseProduct(rule.loads);
+  for (std::size_t i = 0; i < count; ++i)
+    if (known[i] != 0) {
+      rule.nodes.push_back(static_cast<int>(i));
+      rule.coefficients.emplace_back(factors.asDiagonal() * weights[i]);
+      if (with_pressure)
+        rule.pressures.emplace_back(factors.cwiseProduct(pressures[i]));
+    }
+  return rule;
 }
 
 } // namespace
+
+Intensities IntensityRule::operator()(const Field& field) const {
+  if ((field.pressure.size() > 0) != !pressures.empty())
+    throw InputError("stress intensity: the rule is for fields of another form, with or without pressure");
+  Intensities k = field.load_factor * loads;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    k += coefficients[i] * field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(nodes[i]));
+  for (std::size_t i = 0; i < pressures.size(); ++i)
+    k += field.pressure[nodes[i]] * pressures[i];
+  return k;
+}
+
+IntensityRule interaction_rule(const Discretisation& body, bool with_pressure, const FrontFrame& front,
+                               const InteractionOptions& options) {
+  return rule_over(body, with_pressure, front, options, 0);
+}
+
+IntensityRule inset_rule(const Discretisation& body, bool with_pressure, const FrontFrame& front, double inset,
+                         const InteractionOptions& options) {
+  require_inset(inset);
+  return rule_over(body, with_pressure, front, options, inset);
+}
 
 Intensities interaction_integral(const Discretisation& body, const Field& field, const FrontFrame& front,
                                  const InteractionOptions& options) {
@@ -344,9 +443,7 @@ Intensities interaction_integral(const Discretisation& body, const Field& field,
 
 Intensities inset_integral(const Discretisation& body, const Field& field, const FrontFrame& front, double inset,
                            const InteractionOptions& options) {
-  if (!(inset > 0) || !std::isfinite(inset))
-    throw InputError(
-        fmt::format("stress intensity: a shift that fades over {} node spacings; it must be positive", inset));
+  require_inset(inset);
   return integral_over(body, field, front, options, inset);
 }
 

@@ -43,4 +43,19 @@ struct InteractionOptions {
 Intensities interaction_integral(const Discretisation& body, const Field& field, const topology::FrontFrame& front,
                                  const InteractionOptions& options = {});
 
+/// The interaction integral at one place of the front of a body as a linear function of the field: shape functions and
+/// sight lines at the points of the tube are found once for all fields on the body.
+struct IntensityRule {
+  std::vector<int> nodes;
+  std::vector<Matrix3> coefficients;       // by node: row m gives the intensity of mode m
+  std::vector<Vector3> pressures;          // by node, of fields that have pressures; else empty
+  Intensities loads = Intensities::Zero(); // what the loads add at load factor 1
+  /// Throws InputError when the field has pressures and the rule none, or the other way round.
+  [[nodiscard]] Intensities operator()(const Field& field) const;
+};
+/// `with_pressure`: whether the fields have pressures. Throws as interaction_integral(), and InputError where the
+/// method has no spheres.
+IntensityRule interaction_rule(const Discretisation& body, bool with_pressure, const topology::FrontFrame& front,
+                               const InteractionOptions& options = {});
+
 } // namespace spherecut::solvers

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace spherecut::solvers {
 
@@ -42,30 +43,27 @@ constexpr double deepest_inset = 1; // of the tube's shift from the surface, in 
 constexpr double least_inset = 0.5; // nearer to the surface nodes do not resolve the field
 constexpr int along_inset = 8;      // points along the front where the shift varies fast
 
-/// By the integral over the usual tube, or a smaller one, or what of the usual one lies in the body; false when the
-/// front is too near to the surface for any.
-bool intensities_at(const Discretisation& body, const Field& field, FrontState& state) {
+/// The integral over the usual tube, or a smaller one, or what of the usual one lies in the body; none when the front
+/// is too near to the surface for any.
+std::optional<IntensityRule> rule_at(const Discretisation& body, bool with_pressure, const FrontFrame& frame) {
   for (const InteractionOptions& tube :
        {InteractionOptions{}, InteractionOptions{.outer = 2, .half_length = 0.5},
         InteractionOptions{.inner = 0.3, .outer = 1.2, .half_length = 0.5}}) { // in flaps two spacings thick
     try {
-      state.intensities = interaction_integral(body, field, state.frame, tube);
-      return true;
+      return interaction_rule(body, with_pressure, frame, tube);
     } catch (const InputError&) { // the tube leaves the body, or the front turns within it
     }
   }
   const Problem& problem = body.problem();
-  const double depth = -problem.domain->signed_distance(state.frame.point) / spacing_near(problem, state.frame.point);
+  const double depth = -problem.domain->signed_distance(frame.point) / spacing_near(problem, frame.point);
   if (depth < least_inset)
-    return false;
+    return std::nullopt;
   try {
-    state.intensities =
-        inset_integral(body, field, state.frame, std::min(depth, deepest_inset),
-                       {.half_length = std::min(InteractionOptions{}.half_length, depth), .along = along_inset});
-    return true;
+    return inset_rule(body, with_pressure, frame, std::min(depth, deepest_inset),
+                      {.half_length = std::min(InteractionOptions{}.half_length, depth), .along = along_inset});
   } catch (const InputError&) { // too near to the surface, or the front turns within the tube
   }
-  return false;
+  return std::nullopt;
 }
 
 /// Whether faces are in contact behind the front where the tube of the integral passes.
@@ -83,12 +81,19 @@ bool presses_behind(const Problem& problem, const FrontFrame& frame, const std::
 
 std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
                                      const std::function<double(const Vector3&)>& toughness, double spacing,
-                                     const std::vector<Vector3>& closed) {
+                                     const std::vector<Vector3>& closed, FrontRules* rules) {
   const Problem& problem = body.problem();
   if (problem.incision == nullptr)
     throw InputError("tearing: the body has no cut");
   std::vector<FrontState> states, without; // without: places where neither way fits
-  for (const FrontFrame& frame : front_samples(*problem.incision, spacing)) {
+  const std::vector<FrontFrame> frames = front_samples(*problem.incision, spacing);
+  FrontRules once;
+  if (rules == nullptr)
+    rules = &once;
+  if (rules->spacing != spacing || rules->places.size() != frames.size())
+    *rules = {spacing, std::vector<FrontRules::Place>(frames.size())};
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    const FrontFrame& frame = frames[f];
     FrontState state;
     state.frame = frame;
     state.toughness = toughness(frame.point);
@@ -105,7 +110,12 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
         without.push_back(state);
       }
     } else {
-      (intensities_at(body, field, state) ? states : without).push_back(state);
+      FrontRules::Place& place = rules->places[f];
+      if (!std::exchange(place.asked, true))
+        place.rule = rule_at(body, field.pressure.size() > 0, frame);
+      if (place.rule)
+        state.intensities = (*place.rule)(field);
+      (place.rule ? states : without).push_back(state);
     }
   }
   const std::size_t known = states.size();

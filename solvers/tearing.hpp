@@ -4,6 +4,7 @@
 #include "solvers/stress_intensity.hpp"
 
 #include <limits>
+#include <optional>
 
 namespace spherecut::solvers {
 
@@ -29,15 +30,26 @@ struct FrontState {
   bool by_integral = true;                       // there or near by; false: by the jump behind the front
 };
 
+/// The integrals along the front of one body, for every field on it; filled as they are asked for. Another body,
+/// another cut or other nodes ask for another one.
+struct FrontRules {
+  double spacing = 0; // m, of the places along the front
+  struct Place {
+    bool asked = false;
+    std::optional<IntensityRule> rule; // none: no tube fits there
+  };
+  std::vector<Place> places{};
+};
+
 /// Intensities along the whole front at places about `spacing` m apart, by interaction integral. Where its tube does
 /// not fit (near the surface), those of the nearest place that has it within 3 node spacings, else by displacement
 /// correlation. Faces that press on one another carry tractions which the integral does not know: where pairs of lip
 /// nodes are in contact (`closed`, places of such pairs) behind the front within its tube, correlation it is.
-/// `toughness` at a point of the body at rest, J/m2. Throws InputError when `spacing` or a toughness is not positive,
-/// NumericalError when the intensities cannot be had.
+/// `toughness` at a point of the body at rest, J/m2. `rules`: of this body, null: they are not kept. Throws InputError
+/// when `spacing` or a toughness is not positive, NumericalError when the intensities cannot be had.
 std::vector<FrontState> front_states(const Discretisation& body, const Field& field,
                                      const std::function<double(const Vector3&)>& toughness, double spacing,
-                                     const std::vector<Vector3>& closed = {});
+                                     const std::vector<Vector3>& closed = {}, FrontRules* rules = nullptr);
 
 /// The states with intensities averaged along the front over about `length` m (standard deviation of the weight), and
 /// what follows from them. Intensities scatter from place to place with the nodes; a front that followed that would

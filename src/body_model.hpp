@@ -4,17 +4,13 @@
 
 #include "solvers/growing_body.hpp"
 #include "solvers/lip_contact.hpp"
+#include "solvers/tearing.hpp"
 #include "src/recondensing.hpp"
 #include "src/scenario.hpp"
 
 #include "topology/contact.hpp"
 
 namespace spherecut::app {
-
-/// Wall clock of the stages of a rebuild, s.
-struct RebuildSeconds {
-  double topology = 0, level_sets = 0, visibility = 0, sprinkling = 0, assembly = 0, solve = 0;
-};
 
 struct BodyModel {
   std::shared_ptr<const topology::Incision> incision; // null: uncut
@@ -31,6 +27,7 @@ struct BodyModel {
   std::optional<solvers::LipPatch> lips;         // empty: no pair has had to be held yet
   std::optional<solvers::CutContactState> state; // empty: not solved yet
   solvers::Field field;                          // solution
+  mutable solvers::FrontRules front_rules{};     // of these nodes and this cut, found as they are asked for
 
   /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
   /// rest before the first solution.

@@ -3,22 +3,13 @@
 
 #include "src/blade_force.hpp"
 #include "src/body_model.hpp"
+#include "src/body_update.hpp"
 #include "topology/wound.hpp"
 
 namespace spherecut::app {
 
-/// How the system of equations came to the cut of a step.
-enum class SystemUpdate : std::uint8_t {
-  none,           // nothing was cut
-  updated,        // only what the cut touched was computed
-  taken_over,     // updated, on a body that had been condensed anew in the background
-  condensed_anew, // updated, after everything away from the predicted way had been eliminated anew
-  rebuilt,        // from scratch
-};
-std::string_view to_string(SystemUpdate update);
-
-/// The cut at the end of a step.
-struct CutReport {
+/// The cut at the end of a step, and how the body followed what the blade cut in it.
+struct CutReport : BodyUpdate {
   int triangles = 0;                 // of sheet, added in this step
   bool refused = false;              // the cut of this step; everything is as before it
   std::string reason;                // why it was refused, or why the blade added nothing
@@ -31,10 +22,6 @@ struct CutReport {
   double opening_volume = 0;   // m3, between the faces
   int lip_pairs = 0, closed_pairs = 0;
   bool lips_converged = true;
-  int nodes = 0, kept_nodes = 0; // kept: with the place they had before this step's cut
-  SystemUpdate update = SystemUpdate::none;
-  std::string update_reason;      // why not merely updated
-  RebuildSeconds seconds;         // of this step
   std::uint64_t surface_hash = 0; // of the wound at rest
   BladeReport blade;              // where the tissue has a toughness
 };

@@ -121,6 +121,9 @@ void RunOutput::add(const Session& session, const StepResult& step) {
     add_row(*tears_, "tears.csv", tear_rows(*step.tear));
     findings_.tear = *step.tear;
     findings_.tear_increments += static_cast<int>(step.tear->increments.size()) - 1;
+    for (const TearIncrement& increment : step.tear->increments)
+      if (increment.number > 0)
+        ++findings_.tear_updates[increment.body.update];
     findings_.torn_unstably = findings_.torn_unstably || step.tear->unstable;
     findings_.severed_by_tear = findings_.severed_by_tear || step.tear->severed;
     findings_.seeds += step.tear->seeded ? 1 : 0;

@@ -25,8 +25,9 @@ struct RunFindings {
   CutReport cut;                                      // of the last step
   double largest_opening = 0;                         // m
   int increments = 0, refused_cuts = 0;
-  TearReport tear;         // of the last step, its account of the whole run
-  int tear_increments = 0; // of the whole run, as the next three
+  TearReport tear;                          // of the last step, its account of the whole run
+  int tear_increments = 0;                  // of the whole run, as the next four
+  std::map<SystemUpdate, int> tear_updates; // how the system followed them
   bool torn_unstably = false, severed_by_tear = false;
   int seeds = 0;
   /// Second opinions on the pieces: whenever their number has changed, and at the end.

@@ -101,14 +101,6 @@ void Session::lay_out_zone() {
         solvers::spacing_for_count(*organ_.domain, zone_.spacing, scenario_.nodes.count, sprinkle_options(model_));
 }
 
-// The way of the blade and the front of the cut.
-std::vector<std::array<Vector3, 2>> Session::fine_segments(const topology::Incision& incision) const {
-  std::vector<std::array<Vector3, 2>> segments = tracks_;
-  const auto fronts = solvers::front_segments(incision, zone_.spacing.fine);
-  segments.insert(segments.end(), fronts.begin(), fronts.end());
-  return segments;
-}
-
 topology::SurfaceContact Session::find_contact(const topology::ToolPose& pose) const {
   const topology::ToolShape& shape = scenario_.tool->shape;
   if (scenario_.tool->grasp)

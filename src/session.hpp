@@ -42,6 +42,7 @@ struct StepResult {
 /// Wall clock of each stage, s, summed over the run.
 struct SessionProfile {
   double organ = 0, sprinkle = 0, discretise = 0, condense = 0, press = 0, evaluate = 0, topology = 0, level_sets = 0;
+  double intensities = 0; // at the fronts of tears
 };
 
 /// Fine spacings ahead of the blade for which a body is condensed: in the step that needs it.
@@ -161,12 +162,22 @@ class Session {
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
   bool move_blade(const StepSample& sample, CutReport& report);
   bool cut(const StepSample& sample, CutReport& report);
-  void build_cut(const StepSample& sample, const topology::RestMap& to_rest, bool keep, BodyModel& next,
-                 CutReport& report);
+  /// An increment of the cut, for a body to follow.
+  struct CutGrowth {
+    std::function<topology::SurfaceMesh()> way_ahead; // where the cut is going to be next
+    std::string renewed{};                            // why all nodes are made anew; empty: those beside it are
+    bool beside = false;                              // the body as it is stays
+  };
+  void build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report);
+  void take_back_cut(const solvers::Discretisation* body);
+  std::string lead_zone(const topology::Incision& incision, const topology::SurfaceMesh& way_ahead);
+  [[nodiscard]] topology::SurfaceMesh way_of_front(const topology::Incision* before,
+                                                   const topology::Incision& now) const;
+  [[nodiscard]] topology::SurfaceMesh way_of_blade(const StepSample& sample, const topology::RestMap& to_rest) const;
   [[nodiscard]] std::vector<topology::BladePose>
   blade_ahead(const StepSample& sample, const std::optional<topology::BladePose>& last, double length) const;
   [[nodiscard]] solvers::BodyGrowth follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& next,
-                                               CutReport& report);
+                                               BodyUpdate& report);
   void watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last, StepResult& result);
   [[nodiscard]] double way_into_body(const StepSample& sample) const;
   bool take_recondensed(BodyModel& into, solvers::ContactPatch& patch);
@@ -205,7 +216,7 @@ class Session {
   [[nodiscard]] std::optional<topology::SurfaceMesh> seed_of_tear() const;
   [[nodiscard]] topology::FrontGrowth grow_tear(const std::vector<solvers::FrontState>& states, double longest) const;
   [[nodiscard]] topology::FrontGrowth join_tears(const std::vector<solvers::FrontState>& states) const;
-  bool take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report);
+  bool take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report, BodyUpdate& update);
   void report_cut(CutReport& report) const;
   void evaluate(StepResult& result);
   void evaluate_nodes(StepResult& result);

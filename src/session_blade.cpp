@@ -148,11 +148,9 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();
     }
-    build_cut(sample, to_rest, true, next, report);
+    build_cut({.way_ahead = [&] { return way_of_blade(sample, to_rest); }, .beside = true}, next, report);
     const StageTimer timer(report.seconds.solve);
     solve(sample, next);
-    const std::vector<int>& from = next.sprinkling.kept_from;
-    report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
     return next;
   } catch (const InputError& error) {
     report.reason = error.what();

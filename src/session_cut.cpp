@@ -1,5 +1,4 @@
 // The cuts of a session: the blade carried to the tissue at rest, the incision it makes, and the body that follows it.
-#include "solvers/cut_sight.hpp"
 #include "src/session.hpp"
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
@@ -74,51 +73,9 @@ Session::blade_ahead(const StepSample& sample, const std::optional<topology::Bla
   return poses;
 }
 
-// Nodes and system of the body with the new cut: of what was there, what the cut did not touch stays. `keep`: the body
-// as it is stays beside it.
-void Session::build_cut(const StepSample& sample, const topology::RestMap& to_rest, bool keep, BodyModel& next,
-                        CutReport& report) {
-  const auto way_ahead = [&] {
-    return incisions_->way_through(blade_ahead(sample, last_blade_, way_spacings * zone_.spacing.fine), to_rest);
-  };
-  const std::string hindrance =
-      model_.coarseness != coarseness_ ? "the spacing has changed"
-      : keep                           ? "the blade is resisted"
-             : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
-  std::optional<solvers::SprinkleIncrement>& change = followed_;
-  change.reset();
-  report.update = SystemUpdate::rebuilt;
-  report.update_reason = hindrance;
-  {
-    const StageTimer timer(report.seconds.sprinkling);
-    if (hindrance.empty())
-      try {
-        const StageTimer sprinkle_timer(profile_.sprinkle);
-        change = exchange_nodes(*organ_.domain, sprinkle_options(next), model_, next.sprinkling);
-        next.coarseness = coarseness_;
-      } catch (const NumericalError& error) {
-        report.update_reason = error.what();
-      }
-    if (!change)
-      sprinkle(&model_.sprinkling.nodes, next);
-  }
-  const std::vector<int> near = tool_in_reach() ? candidates(next) : std::vector<int>{};
-  const double seen = solvers::sight_seconds();
-  {
-    const StageTimer timer(report.seconds.assembly);
-    if (change && updating_) {
-      const StageTimer growth_timer(profile_.discretise);
-      const solvers::BodyGrowth growth = follow_cut(way_ahead, next, report);
-      report.update_reason = next.body == nullptr ? growth.uncovered : growth.update.reason;
-    }
-    if (next.body == nullptr)
-      assemble(next, change && updating_ ? way_ahead() : topology::SurfaceMesh{}, near);
-  }
-  report.seconds.visibility = solvers::sight_seconds() - seen;
-  report.seconds.solve = next.body->report().factor_seconds;
-  report.seconds.assembly -= report.seconds.visibility + report.seconds.solve;
-  const StageTimer timer(report.seconds.solve);
-  condense(near, next, true);
+// What the edge is going to sweep next, at rest.
+topology::SurfaceMesh Session::way_of_blade(const StepSample& sample, const topology::RestMap& to_rest) const {
+  return incisions_->way_through(blade_ahead(sample, last_blade_, way_spacings * zone_.spacing.fine), to_rest);
 }
 
 void Session::lift_blade() {
@@ -207,13 +164,11 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();
     }
-    build_cut(sample, to_rest, false, next, report);
+    build_cut({.way_ahead = [&] { return way_of_blade(sample, to_rest); }}, next, report);
     {
       const StageTimer timer(report.seconds.solve);
       solve(sample, next);
     }
-    const std::vector<int>& from = next.sprinkling.kept_from;
-    report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
     profile_.topology += report.seconds.topology;
     profile_.level_sets += report.seconds.level_sets;
     model_ = std::move(next);
@@ -224,13 +179,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
   } catch (const NumericalError& error) {
     refuse(error.what());
   }
-  incisions_->take_back();
-  if (body != nullptr && model_.body == nullptr) { // it had followed the cut before that was refused
-    drop_recondensing();
-    app::assemble(scenario_, organ_.domain, model_);
-  } else if (model_.body.get() != body) { // another took over before that
-    condense(std::vector<int>(model_.patch.nodes), model_, true);
-  }
+  take_back_cut(body);
   return false;
 }
 

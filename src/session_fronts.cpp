@@ -61,7 +61,8 @@ std::vector<solvers::FrontState> Session::front_states() const {
     for (std::size_t p = 0; p < model_.state->lips.closed.size(); ++p)
       if (model_.state->lips.closed[p] != 0)
         closed.push_back(model_.sprinkling.nodes.positions[model_.pairs[p].plus]);
-  std::vector<solvers::FrontState> states = solvers::front_states(*model_.body, model_.field, toughness_, fine, closed);
+  std::vector<solvers::FrontState> states =
+      solvers::front_states(*model_.body, model_.field, toughness_, fine, closed, &model_.front_rules);
   std::erase_if(states, [&](const solvers::FrontState& state) {
     return !state.intensities.allFinite() || has_met(*model_.incision, state.frame, fine);
   });

@@ -28,7 +28,7 @@ void Session::set_recondensing(bool on) {
 
 // By an update alone where a replacement is on its way; where that cannot be, the replacement takes over and follows.
 solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& next,
-                                        CutReport& report) {
+                                        BodyUpdate& report) {
   const bool follows = dynamic_cast<const solvers::Growable*>(model_.body.get()) != nullptr;
   const auto grow = [&](bool only_update) {
     return app::follow_cut(scenario_, organ_.domain, *followed_, way_ahead, model_, next, only_update);

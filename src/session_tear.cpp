@@ -142,14 +142,15 @@ bool Session::follows_load(const StepSample& sample, const Loading& loading) con
 }
 
 // Cuts as `grow` does and solves the body with it; where that cannot be, all is as before and the report says why.
-bool Session::take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report) {
+bool Session::take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report,
+                        BodyUpdate& update) {
   const auto refuse = [&](const char* why) {
     report.reason = fmt::format("refused: {}", why);
     warn("tear refused", fmt::format("a tear was refused at t = {:g} s: {}", sample.time, why));
     return false;
   };
   try {
-    const StageTimer timer(profile_.topology);
+    const StageTimer timer(update.seconds.topology);
     grow();
   } catch (const InputError& error) {
     return refuse(error.what());
@@ -158,27 +159,33 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
   }
   const auto segments = zone_.spacing.segments;
   const auto grasp = grasp_;
+  const solvers::Discretisation* const body = model_.body.get();
+  const auto before = model_.incision;
   try {
     BodyModel next;
     next.incision = incisions_->incision();
+    CutGrowth growth{.way_ahead = [&] { return way_of_front(before.get(), *next.incision); }};
     if (!grasps())
       require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
     check_pieces(sample.time);
     {
-      const StageTimer timer(profile_.level_sets);
+      const StageTimer timer(update.seconds.level_sets);
       incisions_->update_fields();
     }
-    if (!next.incision->front().empty())
-      zone_.spacing.segments = fine_segments(*next.incision);
+    growth.renewed = lead_zone(*next.incision, growth.way_ahead());
     if (grasps() && grasped_piece_is_free()) {
       grasp_.reset();
+      growth.renewed = "the piece in the grasper has come off";
       warn("grip", fmt::format("t = {:g} s: the piece in the grasper has come off", sample.time));
     }
-    sprinkle(&model_.sprinkling.nodes, next);
-    const std::vector<int> near = tool_in_reach() ? candidates(next) : std::vector<int>{};
-    assemble(next, {}, near);
-    condense(near, next, true); // the next increment has a body of its own
-    solve(sample, next);
+    drop_following();
+    build_cut(growth, next, update);
+    {
+      const StageTimer timer(update.seconds.solve);
+      solve(sample, next);
+    }
+    profile_.topology += update.seconds.topology;
+    profile_.level_sets += update.seconds.level_sets;
     model_ = std::move(next);
     lost_grip_ = lost_grip_ || (grasp && !grasp_);
     return true;
@@ -189,7 +196,7 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
   }
   zone_.spacing.segments = segments;
   grasp_ = grasp;
-  incisions_->take_back();
+  take_back_cut(body);
   return false;
 }
 
@@ -243,7 +250,12 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
   const std::size_t pieces = wound()->pieces.size();
   const bool proposed = mark_.has_value();
   using States = std::optional<std::vector<solvers::FrontState>>;
-  States states = known_states();
+  double intensity_seconds = 0;
+  const auto find_states = [&] {
+    const StageTimer timer(intensity_seconds);
+    return known_states();
+  };
+  States states = find_states();
   const auto way_of = [&](double drive) { // of the front in the next increment, as far as it is known how G falls
     if (tears_->decay > 0)
       return stride * std::clamp(std::log(std::max(drive, 1.0)) / (tears_->decay * stride), least_step, 1.0);
@@ -264,7 +276,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     const StepSample part = loaded(from, since, sample, share);
     solve(part, model_);
     book_loading(part, share < 1 ? Loading{} : loading);
-    states = known_states();
+    states = find_states();
   };
   // On to where the largest G / G_c is `target`, if it comes to that in this step, else to its end. `states` is at
   // `share`, `full` at its end; the solution is at either.
@@ -277,7 +289,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
   if (follows) {
     const States full = states;
     solve(loaded(from, since, sample, 0), model_);
-    states = known_states();
+    states = find_states();
     load_until(1, full);
   } else {
     book_loading(sample, loading);
@@ -288,6 +300,9 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     report.increments.back().time = loaded(from, since, sample, share).time;
     report.increments.back().force = model_.state->tool.tool_force.norm();
     report.increments.back().ledger = ledger;
+    report.increments.back().body.nodes = model_.sprinkling.nodes.size();
+    report.increments.back().intensity_seconds = intensity_seconds;
+    profile_.intensities += std::exchange(intensity_seconds, 0);
   };
   add_row();
   double start = states ? drive_of(*states) : 0;
@@ -305,7 +320,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     if (share < 1 && moving_drive < std::max(in_balance, std::exp(0.5 * tears_->decay * way_of(drive)))) {
       const States now = states;
       solve(sample, model_);
-      const States full = known_states();
+      const States full = find_states();
       ahead = full ? drive_of(*full) : 0;
       states = now;
       const double above = moving_drive > 0 ? drive / moving_drive : 1;
@@ -365,11 +380,12 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     const double toughness = before == nullptr ? toughness_(seed->vertices.front())
                                                : mean_toughness(growth, *before, *organ_.domain, toughness_);
     const auto grow = [&] { seed ? incisions_->seed(*seed) : incisions_->tear(growth.sheets); };
-    if (!take_tear(loaded(from, since, sample, share), grow, report))
+    BodyUpdate update;
+    if (!take_tear(loaded(from, since, sample, share), grow, report, update))
       break;
     report.seeded = report.seeded || seed.has_value();
     const double torn = model_.incision->area() - area_before;
-    const States next = known_states();
+    const States next = find_states();
     const Energies now = energies(model_);
     const double free = tears_->last.potential() - now.potential(), surface = toughness * torn;
     double surplus = free - surface; // of a front that is gone, or comes about, by the energies alone
@@ -397,6 +413,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     row.number = number;
     row.triangles = growth.triangles;
     row.advance = seed || joins ? 0 : longest;
+    row.body = std::move(update);
     if (kept >= kept_to_tell && !report.unstable) {
       report.unstable = true;
       if (!std::exchange(tears_->told, true))

@@ -122,7 +122,13 @@ Json cut(const Session& session, const RunFindings& findings) {
 Json tear(const RunFindings& findings) {
   const EnergyLedger& ledger = findings.tear.ledger;
   const double spent = ledger.surface + ledger.dissipation;
+  Json systems = Json::object();
+  for (const SystemUpdate update : {SystemUpdate::updated, SystemUpdate::condensed_anew, SystemUpdate::rebuilt}) {
+    const auto known = findings.tear_updates.find(update);
+    systems[std::string(to_string(update))] = known == findings.tear_updates.end() ? 0 : known->second;
+  }
   return {{"increments", findings.tear_increments},
+          {"systems", systems},
           {"seeds", findings.seeds},
           {"area_m2", findings.tear.area},
           {"unstable", findings.torn_unstably},
@@ -140,7 +146,7 @@ Json tear(const RunFindings& findings) {
 Json timings(const SessionProfile& profile) {
   return {{"organ", profile.organ},       {"topology", profile.topology},     {"level_sets", profile.level_sets},
           {"sprinkle", profile.sprinkle}, {"discretise", profile.discretise}, {"condense", profile.condense},
-          {"press", profile.press},       {"evaluate", profile.evaluate}};
+          {"press", profile.press},       {"evaluate", profile.evaluate},     {"intensities", profile.intensities}};
 }
 
 } // namespace

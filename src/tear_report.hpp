@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/body_model.hpp"
+#include "src/body_update.hpp"
 
 #include <string>
 
@@ -42,6 +43,8 @@ struct TearIncrement {
   solvers::Intensities intensities = solvers::Intensities::Zero(); // Pa sqrt(m)
   double release = 0, toughness = 0;                               // J/m2
   EnergyLedger ledger;
+  BodyUpdate body;              // how it followed the increment; of loading (number 0): its nodes alone
+  double intensity_seconds = 0; // wall clock of the intensities since the row before
 };
 
 /// The tears of a step.

@@ -157,6 +157,17 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   snapshot.solve_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+namespace {
+
+/// Of the blade's cut in this step or, if there was none, of the last increment of a tear.
+SystemUpdate update_of(const StepResult& result) {
+  if (result.cut->update != SystemUpdate::none || !result.tear)
+    return result.cut->update;
+  return result.tear->increments.back().body.update;
+}
+
+} // namespace
+
 SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
                             ContactSnapshot& snapshot) {
   const auto failed = [&](const std::exception& error) {
@@ -181,7 +192,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
   if (const auto& cut = simulation.result().cut) {
     record.cut_area = cut->area;
     record.residual = simulation.result().residual;
-    record.update = to_string(cut->update);
+    record.update = to_string(update_of(simulation.result()));
     record.blade_force = cut->blade.force;
     record.blade_edge = cut->blade.edge_force;
     record.blade_release = cut->blade.release;

@@ -141,6 +141,61 @@ TEST_CASE("A front on a rough sheet goes on where its field opens it, not where 
   }
 }
 
+TEST_CASE("The integral as a rule for all fields on a body gives what it gives for each", "[tearing]") {
+  const auto [method, poisson_ratio] = GENERATE(
+      table<Method, double>({{Method::galerkin, 0.3}, {Method::collocation, 0.3}, {Method::collocation, 0.45}}));
+  const tests::CutBlock block = tests::cut_block(8, false, 2);
+  const tests::CutFrame& cut = block.frame;
+  Problem problem;
+  problem.domain = block.domain;
+  problem.incision = block.incision;
+  problem.nodes = block.nodes;
+  problem.material = {1000, poisson_ratio, 0};
+  problem.loads.body_force = [](const Vector3& x) { return Vector3(3 * x.y(), 1, -2); };
+  problem.loads.initial_strain = 1e-3 * cut.normal * cut.normal.transpose();
+  problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -2 * n; };
+  for (int i = 0; i < block.nodes.size(); ++i)
+    if ((block.nodes.kinds[i] == NodeKind::surface || block.nodes.kinds[i] == NodeKind::edge) &&
+        std::abs((block.nodes.positions[i] - cut.origin).dot(cut.normal)) > 0.3)
+      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  DiscretisationOptions options;
+  options.method = method;
+  const auto body = discretise(problem, options);
+  Field field = body->solve();
+  const bool with_pressure = field.pressure.size() > 0;
+  CHECK(with_pressure == (poisson_ratio > 0.4));
+  int places = 0;
+  for (const topology::FrontFrame& frame : front_samples(*problem.incision, 0.2, 0.35)) {
+    std::optional<IntensityRule> rule;
+    try {
+      rule = interaction_rule(*body, with_pressure, frame);
+    } catch (const InputError&) {
+      continue;
+    }
+    ++places;
+    for (const double load : {1.0, 0.4}) {
+      Field other = field;
+      other.load_factor = load;
+      other.coefficients *= 1 + load;
+      const Intensities expected = interaction_integral(*body, other, frame);
+      CHECK(((*rule)(other)-expected).norm() < 1e-10 * expected.norm());
+    }
+    Field unfit = field;
+    unfit.pressure = with_pressure ? VectorX() : VectorX::Zero(problem.nodes.size());
+    CHECK_THROWS_AS((*rule)(unfit), InputError);
+  }
+  CHECK(places >= 1);
+  const auto tough = [](const Vector3&) { return 1.0; };
+  FrontRules rules;
+  const auto first = front_states(*body, field, tough, 0.1, {}, &rules);
+  field.coefficients *= 2;
+  const auto kept = front_states(*body, field, tough, 0.1, {}, &rules);
+  const auto anew = front_states(*body, field, tough, 0.1);
+  REQUIRE(kept.size() == anew.size());
+  for (std::size_t k = 0; k < anew.size(); ++k)
+    CHECK(kept[k].intensities == anew[k].intensities);
+}
+
 TEST_CASE("A cut that is pressed together and sticks is not driven on", "[tearing]") {
   const tests::CutBlock block = tests::cut_block(8, false, 2);
   const tests::CutFrame& cut = block.frame;

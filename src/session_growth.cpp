@@ -1,0 +1,152 @@
+// The body of a session follows an increment of its cut, a blade's or a tear's: nodes beside what is new are exchanged
+// and the system is updated where it is touched; where that cannot be, or does not pay, it is built anew.
+#include "solvers/cut_sight.hpp"
+#include "solvers/node_sheets.hpp"
+#include "src/session.hpp"
+#include "src/stage_timer.hpp"
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace spherecut::app {
+namespace {
+
+// In fine spacings:
+constexpr double zone_ahead = 1;  // so far ahead of a front that may tear nodes are fine beforehand
+constexpr double zone_left = 0.5; // a front this far off the middle of the fine zone has left it
+constexpr double moved_near = 1;  // a front this near to what is new of the cut is expected to go on
+
+} // namespace
+
+// The way of the blade and the front of the cut.
+std::vector<std::array<Vector3, 2>> Session::fine_segments(const topology::Incision& incision) const {
+  std::vector<std::array<Vector3, 2>> segments = tracks_;
+  const auto fronts = solvers::front_segments(incision, zone_.spacing.fine);
+  segments.insert(segments.end(), fronts.begin(), fronts.end());
+  return segments;
+}
+
+// Nodes are fine about a front that tears, as far as its intensities ask for it. Where updates pay, its way ahead is in
+// the fine zone too, so that the zone lasts for some increments; elsewhere the zone goes along at every increment. Says
+// why all nodes have to be made anew for it; empty: they have not.
+std::string Session::lead_zone(const topology::Incision& incision, const topology::SurfaceMesh& way_ahead) {
+  const double fine = zone_.spacing.fine;
+  if (incision.front().empty())
+    return "no front is left";
+  const bool follows =
+      !way_ahead.triangles.empty() && model_.body != nullptr &&
+      hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty() &&
+      can_follow(scenario_, model_, way_ahead);
+  if (!follows) {
+    zone_.spacing.segments = fine_segments(incision);
+    return too_much_of_body;
+  }
+  const bool leads = model_.incision != nullptr && zone_.spacing.segments != fine_segments(*model_.incision);
+  const bool holds =
+      leads && std::all_of(incision.front().begin(), incision.front().end(), [&](const topology::FrontSegment& front) {
+        return solvers::distance_to_segments(front.to, zone_.spacing.segments) <= zone_left * fine;
+      });
+  if (holds)
+    return "";
+  zone_.spacing.segments = fine_segments(incision);
+  for (std::array<Vector3, 2> ends : solvers::front_segments(incision, fine)) {
+    for (Vector3& x : ends)
+      if (const auto front = incision.front_frame(x, fine))
+        x += zone_ahead * fine * front->ahead;
+    zone_.spacing.segments.push_back(ends);
+  }
+  return leads ? "the front has left the fine zone" : "the fine zone had nothing of the way ahead";
+}
+
+// Where the fronts that have just moved will come to while the fine zone lasts, if they go straight on.
+topology::SurfaceMesh Session::way_of_front(const topology::Incision* before, const topology::Incision& now) const {
+  const double fine = zone_.spacing.fine;
+  std::vector<Vector3> moved;
+  for (std::size_t s = 0; s < now.sheets().size(); ++s) {
+    const topology::SurfaceMesh& sheet = now.sheets()[s];
+    const std::size_t known =
+        before != nullptr && s < before->sheets().size() ? before->sheets()[s].vertices.size() : 0;
+    moved.insert(moved.end(), sheet.vertices.begin() + static_cast<std::ptrdiff_t>(known), sheet.vertices.end());
+  }
+  const topology::FrontGrowth ahead = topology::grow_front(
+      now,
+      [&](const topology::FrontFrame& frame) -> Vector3 {
+        const bool moves = std::any_of(moved.begin(), moved.end(), [&](const Vector3& x) {
+          return (x - frame.point).squaredNorm() < moved_near * moved_near * fine * fine;
+        });
+        return moves ? Vector3((zone_ahead + zone_left) * fine * frame.ahead) : Vector3::Zero();
+      },
+      fine);
+  topology::SurfaceMesh way;
+  for (std::size_t s = 0; s < ahead.sheets.size(); ++s) {
+    const topology::SurfaceMesh& sheet = ahead.sheets[s];
+    for (std::size_t t = now.sheets()[s].triangles.size(); t < sheet.triangles.size(); ++t) {
+      const int first = static_cast<int>(way.vertices.size());
+      for (const int vertex : sheet.triangles[t])
+        way.vertices.push_back(sheet.vertices[static_cast<std::size_t>(vertex)]);
+      way.triangles.push_back({first, first + 1, first + 2});
+    }
+  }
+  return way;
+}
+
+// Nodes and system of the body with the new cut: of what was there, what the cut did not touch stays.
+void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report) {
+  const std::string unfollowed =
+      growth.beside ? "the blade is resisted"
+                    : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+  const bool follows = updating_ && unfollowed.empty();
+  followed_.reset();
+  report.update = SystemUpdate::rebuilt;
+  report.update_reason = !unfollowed.empty()                ? unfollowed
+                         : model_.coarseness != coarseness_ ? "the spacing has changed"
+                                                            : growth.renewed;
+  if (report.update_reason.empty()) {
+    const StageTimer timer(report.seconds.sprinkling);
+    const StageTimer sprinkle_timer(profile_.sprinkle);
+    try {
+      followed_ = exchange_nodes(*organ_.domain, sprinkle_options(next), model_, next.sprinkling);
+      next.coarseness = coarseness_;
+    } catch (const NumericalError& error) {
+      report.update_reason = error.what();
+    }
+  }
+  if (!followed_) {
+    const StageTimer timer(report.seconds.sprinkling);
+    sprinkle(&model_.sprinkling.nodes, next);
+  }
+  const std::vector<int> near = tool_in_reach() ? candidates(next) : std::vector<int>{};
+  const double seen = solvers::sight_seconds();
+  {
+    const StageTimer timer(report.seconds.assembly);
+    if (followed_ && follows) {
+      const StageTimer growth_timer(profile_.discretise);
+      const solvers::BodyGrowth grown = follow_cut(growth.way_ahead, next, report);
+      report.update_reason = next.body == nullptr ? grown.uncovered : grown.update.reason;
+    }
+    if (next.body == nullptr)
+      assemble(next, follows ? growth.way_ahead() : topology::SurfaceMesh{}, near);
+  }
+  report.seconds.visibility = solvers::sight_seconds() - seen;
+  report.seconds.solve = next.body->report().factor_seconds;
+  report.seconds.assembly -= report.seconds.visibility + report.seconds.solve;
+  report.nodes = next.sprinkling.nodes.size();
+  const std::vector<int>& from = next.sprinkling.kept_from;
+  report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+  const StageTimer timer(report.seconds.solve);
+  condense(near, next, true);
+}
+
+// After a cut that was refused: incision, wound and body as they were. `body`: that of the model before.
+void Session::take_back_cut(const solvers::Discretisation* body) {
+  incisions_->take_back();
+  if (body != nullptr && model_.body == nullptr) { // it had followed the cut before that was refused
+    drop_recondensing();
+    app::assemble(scenario_, organ_.domain, model_);
+  } else if (model_.body.get() != body) { // another took over before that
+    condense(std::vector<int>(model_.patch.nodes), model_, true);
+  }
+}
+
+} // namespace spherecut::app
