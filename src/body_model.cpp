@@ -11,11 +11,7 @@ namespace {
 
 constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
 constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
-// Of the nodes in a window that is worth its while. Processor time of an increment, updated against rebuilt, and what
-// making the window takes in place of the latter: 0.46, 0.95 and 1.7 s where it holds a quarter (1600 nodes), 0.35,
-// 0.34 and 0.55 s at 0.54 (590 nodes), 1.25, 1.4 and 2.9 s at two thirds (1380 nodes). A window lasts two to six
-// increments. block_slice.toml (0.72) took 8.4 s with updates and takes 5.0 s without.
-constexpr double largest_share = 0.5;
+constexpr double largest_share = 0.8;  // of the nodes in a window that is worth its while
 // Nodes of a body of `collocation` that is followed: the dense L U of its window costs more than the sparse one of the
 // whole body beyond. A run of liver_cut.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with windows
 // and takes 27 s without; steps of 0.1 mm at 1000 nodes a third of the rebuild's time with them.

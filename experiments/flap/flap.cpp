@@ -1,7 +1,8 @@
 // Problem:   scenarios/liver_flap.toml: a flap cut from the dome of a liver is lifted by a grasper and tears on.
-// Reference: none but the account of energies; G is at most the toughness where the tear has come to rest.
+// Reference: none but the account of energies (median of three node sets); G is at most the toughness where the tear has come to rest.
 // Command:   spherecut experiment run flap --out DIR
 #include "experiments/registered.hpp"
+#include "experiments/support/statistics.hpp"
 
 #include "flap_scenario.hpp"
 #include "src/cut_output.hpp"
@@ -13,16 +14,16 @@
 
 namespace spherecut::experiments {
 
-std::vector<Check> run_flap(const ExperimentContext& context) {
-  app::Scenario scenario = app::read_scenario_text("liver_flap.toml", liver_flap);
-  if (context.quick) {
-    std::get<app::LiverOrgan>(scenario.organ.shape).triangles = 5000;
-    scenario.nodes.fine_spacing = 0.007;
-    scenario.nodes.coarse_spacing = 0.03;
-    scenario.tool->step = 0.5;
-    scenario.tearing.step = 1;
-    scenario.tearing.most_increments = 4;
-  }
+namespace {
+
+/// Share of what is spent that the account leaves open at the end.
+double open_share(const app::EnergyLedger& ledger) {
+  const double spent = ledger.surface + ledger.dissipation;
+  return spent > 0 ? std::abs(ledger.imbalance()) / spent : 1;
+}
+
+/// The last step on the scenario's nodes; tables and pictures go to the folder.
+app::StepResult lift(const app::Scenario& scenario, const ExperimentContext& context) {
   app::Session session(scenario, context.say);
   app::Table table({"time", "pull_N", "area_m2", "torn_m2", "increments", "work_J", "elastic_J", "surface_J",
                     "dissipation_J", "imbalance_J"});
@@ -57,14 +58,40 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
     app::write_png(drawn, context.out / name);
   app::write_wound(context.out / "flap.vtp", session);
   app::write_incision(context.out / "incision.vtp", *session.incision());
+  return last;
+}
+
+} // namespace
+
+std::vector<Check> run_flap(const ExperimentContext& context) {
+  app::Scenario scenario = app::read_scenario_text("liver_flap.toml", liver_flap);
+  if (context.quick) {
+    std::get<app::LiverOrgan>(scenario.organ.shape).triangles = 5000;
+    scenario.nodes.fine_spacing = 0.007;
+    scenario.nodes.coarse_spacing = 0.03;
+    scenario.tool->step = 0.5;
+    scenario.tearing.step = 1;
+    scenario.tearing.most_increments = 4;
+  }
+  const app::StepResult last = lift(scenario, context);
+  std::vector<double> open{open_share(last.tear->ledger)};
+  for (int seed = 2; seed <= 3 && !context.quick; ++seed) { // what the account leaves open scatters with the nodes
+    scenario.nodes.random_seed = static_cast<std::uint64_t>(seed);
+    app::Session session(scenario, context.say);
+    app::StepResult end;
+    for (const app::StepSample& sample : session.steps())
+      end = session.step(sample);
+    open.push_back(open_share(end.tear->ledger));
+    context.say(fmt::format("node set {}: {:.3g} cm2 torn, the account is open by {:.1f} %", seed, 1e4 * end.tear->area,
+                            100 * open.back()));
+  }
   const app::EnergyLedger& ledger = last.tear->ledger;
-  const double spent = ledger.surface + ledger.dissipation;
-  std::vector<Check> checks{{"flap_torn_cm2", 1e4 * last.tear->area, ">=", context.quick ? 0.5 : 2.0},
-                            {context.quick ? "flap_energy_balance_reported" : "flap_energy_balance",
-                             spent > 0 ? std::abs(ledger.imbalance()) / spent : 1,
-                             context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.05},
-                            {"flap_dissipation_share", ledger.dissipation / spent, ">=", 0},
-                            {"flap_pieces", static_cast<double>(last.cut->pieces), "<=", 1}};
+  std::vector<Check> checks{
+      {"flap_torn_cm2", 1e4 * last.tear->area, ">=", context.quick ? 0.5 : 2.0},
+      {context.quick ? "flap_energy_balance_reported" : "flap_energy_balance", median(open),
+       context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.05},
+      {"flap_dissipation_share", ledger.dissipation / (ledger.surface + ledger.dissipation), ">=", 0},
+      {"flap_pieces", static_cast<double>(last.cut->pieces), "<=", 1}};
   return checks;
 }
 

@@ -176,8 +176,7 @@ position = [0.0007, -0.012, 0]
 time = 1
 position = [0.0009, -0.0015, 0]
 )";
-  Session session(
-      scenario_of(long_bar(0.15, 0.3, blade + "[tearing]\nstep = 0.4\nmost_increments = 4\nmost_area = 4e-5\n")));
+  Session session(scenario_of(long_bar(0.04, 0.3, blade + "[tearing]\nstep = 0.4\nmost_increments = 4\n")));
   int updated = 0, by_blade = 0;
   double torn = 0;
   for (const StepResult& result : run(session)) {
