@@ -1,6 +1,7 @@
 // Problem:   scenarios/liver_flap.toml: a flap cut from the dome of a liver is lifted by a grasper and tears on.
 // Reference: none but the account of energies (median of three node sets); G is at most the toughness where the tear
-// has come to rest. Command:   spherecut experiment run flap --out DIR
+//            has come to rest.
+// Command:   spherecut experiment run flap --out DIR
 #include "experiments/registered.hpp"
 #include "experiments/support/statistics.hpp"
 
