@@ -1,6 +1,7 @@
 #include "solvers/collocation_body.hpp"
 
 #include "solvers/cell_loads.hpp"
+#include "solvers/elimination_order.hpp"
 #include "solvers/factorisation.hpp"
 #include "topology/errors.hpp"
 #include "topology/voronoi_cells.hpp"

@@ -9,7 +9,6 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <umfpack.h>
@@ -401,35 +400,6 @@ class LuFactorisation final : public Factorisation {
 };
 
 } // namespace
-
-std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours) {
-  const int n = static_cast<int>(start.size()) - 1;
-  // The lower triangle: rows are written in ascending order, so every column's are.
-  SparseMatrix graph(n, n);
-  std::vector<int> entries(n, 0);
-  for (int row = 0; row < n; ++row)
-    for (int k = start[row]; k < start[row + 1]; ++k)
-      if (neighbours[k] <= row)
-        ++entries[neighbours[k]];
-  graph.resizeNonZeros(std::accumulate(entries.begin(), entries.end(), 0));
-  int* const outer = graph.outerIndexPtr();
-  std::partial_sum(entries.begin(), entries.end(), outer + 1);
-  std::copy(outer, outer + n, entries.begin());
-  for (int row = 0; row < n; ++row)
-    for (int k = start[row]; k < start[row + 1]; ++k)
-      if (neighbours[k] <= row)
-        graph.innerIndexPtr()[entries[neighbours[k]]++] = row;
-  std::fill_n(graph.valuePtr(), graph.nonZeros(), 1.0);
-  CholmodCommon workspace;
-  cholmod_sparse matrix = view(graph, -1);
-  cholmod_factor* factor = cholmod_analyze(&matrix, &workspace.common);
-  if (factor == nullptr)
-    throw NumericalError("ordering the node graph ran out of memory");
-  const int* permutation = static_cast<const int*>(factor->Perm);
-  std::vector<int> ordering(permutation, permutation + n);
-  cholmod_free_factor(&factor, &workspace.common);
-  return ordering;
-}
 
 std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower) {
   return std::make_unique<CholeskyFactorisation>(lower, false);

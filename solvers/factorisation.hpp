@@ -33,10 +33,6 @@ class OrderedCholesky : public Factorisation {
   [[nodiscard]] virtual MatrixX trailing(int count) const = 0;
 };
 
-/// Fill-reducing ordering of a symmetric graph given in compressed rows (nested dissection or minimum degree, whichever
-/// CHOLMOD finds better). Returns the permutation: entry k is the vertex eliminated k-th.
-std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours);
-
 /// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle; CHOLMOD orders it. Throws
 /// NumericalError naming the column where the matrix is not
 /// positive definite.

@@ -13,6 +13,7 @@
 #include "solvers/cut_sight.hpp"
 #include "solvers/dense_products.hpp"
 #include "solvers/elastic_body.hpp"
+#include "solvers/elimination_order.hpp"
 #include "solvers/parallel.hpp"
 #include "solvers/stiffness_tiles.hpp"
 #include "solvers/surface_patches.hpp"

@@ -2,6 +2,7 @@
 // lambda M + mu M^T + mu tr(M) 1.
 #include "experiments/remeshing_ledger/fem_model.hpp"
 
+#include "solvers/elimination_order.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+#include "solvers/elimination_order.hpp"
 #include "solvers/factorisation.hpp"
 
 #include "topology/errors.hpp"
