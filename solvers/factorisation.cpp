@@ -1,5 +1,6 @@
 #include "solvers/factorisation.hpp"
 
+#include "solvers/large_pages.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -42,6 +43,12 @@ class WithoutOpenMp {
   Set set_ = nullptr;
   int levels_ = 0;
 };
+
+/// SuiteSparse takes its memory in large pages, from before main on: it keeps one allocator for the whole program.
+[[maybe_unused]] const bool large_pages = [] {
+  SuiteSparse_config.malloc_func = allocate_in_large_pages;
+  return true;
+}();
 
 /// CHOLMOD's workspace, started and finished with the object that owns it.
 struct CholmodCommon {
