@@ -15,14 +15,13 @@
 #include "solvers/elastic_body.hpp"
 #include "solvers/elimination_order.hpp"
 #include "solvers/parallel.hpp"
-#include "solvers/stiffness_tiles.hpp"
+#include "solvers/stiffness_matrix.hpp"
 #include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <numeric>
 #include <unordered_map>
 
 namespace spherecut::solvers {
@@ -131,7 +130,6 @@ class Galerkin final : public ElasticBody {
   void assemble(UnheldPieces unheld, bool shapes_are_kept);
   [[nodiscard]] StiffnessTiles evaluate_cells(bool shapes_are_kept);
   void order_nodes(const std::vector<StiffnessTiles::Pair>& pairs, UnheldPieces unheld);
-  void build_matrix(std::vector<StiffnessTiles::Pair> pairs);
   [[nodiscard]] bool is_dropped(int node) const { return !dropped_.empty() && dropped_[node] != 0; }
   void assemble_loads();
   /// The matrix is kept in elimination order; vectors outside are in node order.
@@ -242,7 +240,8 @@ class Galerkin final : public ElasticBody {
   std::vector<int> rank_;          // elimination rank of every node
   std::vector<CellShapes> shapes_; // of every cell
   SparseMatrix stiffness_;         // lower triangle (diagonal blocks full), in ranks
-  std::vector<double> elastic_;    // entries of stiffness_ without the penalties of the prescribed means
+  std::vector<double, InLargePages<double>>
+      elastic_; // entries of stiffness_ without the penalties of the prescribed means
   VectorX loads_;
   std::unique_ptr<OrderedCholesky> factorisation_;
 };
@@ -331,7 +330,7 @@ void Galerkin::assemble(UnheldPieces unheld, bool shapes_are_kept) {
   const StiffnessTiles tiles = evaluate_cells(shapes_are_kept);
   std::vector<StiffnessTiles::Pair> pairs = tiles.pairs();
   order_nodes(pairs, unheld);
-  build_matrix(std::move(pairs));
+  build_stiffness(std::move(pairs), rank_, dropped_, anchors_, problem_, stiffness_, elastic_);
 }
 
 /// Nodes couple that have a point of some cell in common, or a mean of the held surface. Ordering nodes instead of
@@ -361,89 +360,6 @@ void Galerkin::order_nodes(const std::vector<StiffnessTiles::Pair>& pairs, Unhel
   rank_.resize(count);
   for (int k = 0; k < count; ++k)
     rank_[order_[k]] = k;
-}
-
-void Galerkin::build_matrix(std::vector<StiffnessTiles::Pair> pairs) {
-  const int count = problem_.nodes.size();
-  std::erase_if(pairs, [&](const auto& pair) { return is_dropped(pair.column); });
-  std::vector<char> has_diagonal(count, 0);
-  for (const StiffnessTiles::Pair& pair : pairs)
-    if (pair.row == pair.column)
-      has_diagonal[pair.row] = 1;
-  for (int i = 0; i < count; ++i)
-    if (has_diagonal[i] == 0)
-      pairs.push_back({i, i, nullptr, nullptr});
-  const long blocks = std::ssize(pairs);
-  if (9 * blocks > std::numeric_limits<int>::max())
-    throw InputError(
-        fmt::format("{} nodes give {} matrix entries, more than the factorisation can index", count, 9 * blocks));
-
-  // Into ascending columns and, within each, ascending rows: by the row first, then by the column.
-  const auto sorted_by = [&](const std::vector<int>& before, const auto& key, std::vector<int>& start) {
-    start.assign(count + 1, 0);
-    for (const int p : before)
-      ++start[key(pairs[p]) + 1];
-    std::partial_sum(start.begin(), start.end(), start.begin());
-    std::vector<int> next(start.begin(), start.end() - 1), after(before.size());
-    for (const int p : before)
-      after[next[key(pairs[p])]++] = p;
-    return after;
-  };
-  std::vector<int> all(pairs.size()), start;
-  std::iota(all.begin(), all.end(), 0);
-  const auto lower_of = [&](const StiffnessTiles::Pair& pair) { return std::max(rank_[pair.row], rank_[pair.column]); };
-  const auto upper_of = [&](const StiffnessTiles::Pair& pair) { return std::min(rank_[pair.row], rank_[pair.column]); };
-  const std::vector<int> sorted = sorted_by(sorted_by(all, lower_of, start), upper_of, start);
-
-  stiffness_.resize(3 * count, 3 * count);
-  stiffness_.resizeNonZeros(9 * blocks);
-  int* outer = stiffness_.outerIndexPtr();
-  int* inner = stiffness_.innerIndexPtr();
-  double* values = stiffness_.valuePtr();
-  outer[0] = 0;
-  const double mu = problem_.material.shear_modulus(), lambda = problem_.material.lame_lambda();
-  std::vector<int> first_entry(pairs.size()); // of a pair's block
-  for (int j = 0; j < count; ++j) {
-    const int stride = 3 * (start[j + 1] - start[j]);
-    for (int b = 0; b < 3; ++b)
-      outer[3 * j + b + 1] = 9 * start[j] + stride * (b + 1);
-    for (int k = start[j]; k < start[j + 1]; ++k) {
-      const int first = first_entry[sorted[k]] = 9 * start[j] + 3 * (k - start[j]);
-      const int row = 3 * lower_of(pairs[sorted[k]]);
-      for (int b = 0; b < 3; ++b)
-        for (int a = 0; a < 3; ++a)
-          inner[first + b * stride + a] = row + a;
-    }
-  }
-  const auto stride_of = [&](const StiffnessTiles::Pair& pair) {
-    return 3 * (start[upper_of(pair) + 1] - start[upper_of(pair)]);
-  };
-  // In the order of the tiles, which lie in memory as the pairs do.
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const StiffnessTiles::Pair& pair = pairs[p];
-    Matrix3 block = Matrix3::Zero();
-    if (pair.products != nullptr)
-      block = pair.stiffness(lambda, mu);
-    else if (is_dropped(pair.row)) // the unknowns stay, alone and without load
-      block.diagonal().setConstant(problem_.material.young_modulus * problem_.nodes.spacings[pair.row]);
-    if (rank_[pair.row] < rank_[pair.column])
-      block.transposeInPlace();
-    double* to = values + first_entry[p];
-    for (int b = 0; b < 3; ++b, to += stride_of(pair))
-      for (int a = 0; a < 3; ++a)
-        to[a] = block(a, b);
-  }
-  for (const Anchor& anchor : anchors_) {
-    const int j = rank_[anchor.node], first = 9 * start[j], stride = 3 * (start[j + 1] - start[j]);
-    const double spring = problem_.material.young_modulus * problem_.nodes.spacings[anchor.node];
-    for (int b = 0; b < 3; ++b)
-      for (int a = 0; a < 3; ++a) // the diagonal block heads its column
-        values[first + stride * b + a] += spring * anchor.direction[a] * anchor.direction[b];
-  }
-  elastic_.assign(values, values + 9 * blocks);
-  for (std::size_t p = 0; p < pairs.size(); ++p)
-    for (int c = 0; c < 3 && pairs[p].held != nullptr; ++c)
-      values[first_entry[p] + c * stride_of(pairs[p]) + c] += pairs[p].held[c * tile_nodes];
 }
 
 void Galerkin::assemble_loads() {

@@ -1,6 +1,7 @@
 #include "solvers/stiffness_tiles.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 
 namespace spherecut::solvers {
@@ -54,13 +55,17 @@ void CellCluster::add(const CellShapes& cell) {
     if (local < 0) {
       local = static_cast<int>(members_.size());
       members_.push_back({place / tile_nodes});
-      gradients_.emplace_back();
+      if (gradients_.size() < members_.size())
+        gradients_.emplace_back();
     }
     Group& group = members_[local];
+    double* const of_cell = gradients_[local].at + static_cast<std::ptrdiff_t>(points_) * gradients_at_point;
+    if (group.reached >> points_ == 0) // the first of its nodes in this cell
+      std::fill_n(of_cell, cell.points * gradients_at_point, 0.0);
     const std::uint64_t reached = std::uint64_t{cell.reached[k]} << points_;
     group.reached |= reached;
     group.by_node[lane] |= reached;
-    double* to = gradients_[local].at + static_cast<std::ptrdiff_t>(points_) * gradients_at_point + lane;
+    double* to = of_cell + lane;
     const double* from = cell.gradients.data() + 3 * k * static_cast<std::size_t>(cell.stride);
     for (int q = 0; q < cell.points; ++q, ++from, to += gradients_at_point) {
       to[0] = from[0];
@@ -75,7 +80,6 @@ void CellCluster::clear() {
   for (const Group& group : members_)
     local_[group.id] = -1;
   members_.clear();
-  gradients_.clear();
   points_ = 0;
 }
 
@@ -171,7 +175,8 @@ std::vector<StiffnessTiles::Pair> StiffnessTiles::pairs() const {
         const auto& plane = column.tiles[t].plane[j];
         const HeldTile* held = column.held[t] < 0 ? nullptr : &column.held_tiles[column.held[t]];
         std::array<bool, tile_nodes> elastic{};
-        for (int p = 0; p < 9; ++p)
+        // As a rule the first products tell, and the others need not be fetched from memory.
+        for (int p = 0; p < 9 && !std::all_of(elastic.begin(), elastic.end(), std::identity()); ++p)
           for (int i = 0; i < tile_nodes; ++i)
             elastic[i] |= plane[p][i] != 0;
         for (int i = column.groups[t] == own ? j : 0; i < tile_nodes; ++i) {

@@ -40,14 +40,15 @@ class CellCluster {
     std::uint64_t reached = 0;                       // by some node
     std::array<std::uint64_t, tile_nodes> by_node{}; // bit q: the node reaches point q
   };
-  /// [point][axis][lane]; no load of four lanes crosses a cache line.
+  /// [point][axis][lane]; no load of four lanes crosses a cache line. Of a cell that no node of the group reaches,
+  /// whatever was there before.
   struct Gradients {
     alignas(64) double at[tile_points * gradients_at_point];
   };
   const NodeGroups* groups_;
   std::vector<int> local_; // of every group in members_, -1 outside
   std::vector<Group> members_;
-  std::vector<Gradients> gradients_; // of every member
+  std::vector<Gradients> gradients_; // of every member, and room that larger clusters have left
   int points_ = 0;
 };
 

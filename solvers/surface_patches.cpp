@@ -60,9 +60,10 @@ DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::v
 }
 
 /// Index of the nearest position that the cut (may be null) does not hide from x; of the nearest when it hides all.
+/// Found sooner where the position `guess` is near.
 int nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>& positions,
-                     const topology::Incision* incision, const Vector3& x) {
-  const topology::PointTree::Found nearest = tree.nearest(x);
+                     const topology::Incision* incision, const Vector3& x, int guess) {
+  const topology::PointTree::Found nearest = tree.nearest(x, guess);
   const double distance = std::sqrt(nearest.squared_distance);
   const auto hidden = [&](int k) { return incision->blocks(x, positions[k]); };
   if (incision == nullptr || distance == 0 || !incision->near(x, distance) || !hidden(nearest.index))
@@ -87,7 +88,8 @@ std::vector<int> nearest_in_sight(const topology::PointTree& tree, const std::ve
   std::vector<int> nearest(chosen.size());
   parallel_ranges(static_cast<int>(chosen.size()), 256, [&](int begin, int end) {
     for (int k = begin; k < end; ++k)
-      nearest[k] = nearest_in_sight(tree, positions, incision, points[chosen[k]].position);
+      nearest[k] =
+          nearest_in_sight(tree, positions, incision, points[chosen[k]].position, k > begin ? nearest[k - 1] : -1);
   });
   return nearest;
 }

@@ -88,6 +88,7 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
   const topology::SurfaceMesh& surface = domain.surface();
   std::vector<SurfacePoint> points;
   std::vector<Corners> pending;
+  int node = -1; // nearest to the triangle before, which is often a neighbour
   for (const Triangle& triangle : surface.triangles) {
     pending.push_back({surface.vertices[triangle[0]], surface.vertices[triangle[1]], surface.vertices[triangle[2]]});
     while (!pending.empty()) {
@@ -95,7 +96,8 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
       pending.pop_back();
       if (is_outside(t, region))
         continue;
-      const double spacing = nodes.spacings[tree.nearest((t[0] + t[1] + t[2]) / 3).index], longest = longest_edge(t);
+      node = tree.nearest((t[0] + t[1] + t[2]) / 3, node).index;
+      const double spacing = nodes.spacings[node], longest = longest_edge(t);
       if (longest > edge * spacing)
         push_quarters(t, pending);
       else if (incision != nullptr && incision->near((t[0] + t[1] + t[2]) / 3, longest))

@@ -10,11 +10,14 @@ namespace {
 constexpr int leaf_size = 8;
 }
 
-PointTree::PointTree(const std::vector<Vector3>& points) : points_(points), index_(points.size()) {
+PointTree::PointTree(const std::vector<Vector3>& points)
+    : points_(points), index_(points.size()), place_(points.size()) {
   std::iota(index_.begin(), index_.end(), 0);
   build(0, static_cast<int>(index_.size()), 0);
-  for (std::size_t k = 0; k < index_.size(); ++k)
+  for (std::size_t k = 0; k < index_.size(); ++k) {
     points_[k] = points[index_[k]];
+    place_[index_[k]] = static_cast<int>(k);
+  }
 }
 
 void PointTree::build(int begin, int end, int axis) {
@@ -55,7 +58,13 @@ void PointTree::within(int begin, int end, int axis, const Vector3& x, double sq
 }
 
 PointTree::Found PointTree::nearest(const Vector3& x) const {
+  return nearest(x, -1);
+}
+
+PointTree::Found PointTree::nearest(const Vector3& x, int guess) const {
   Found best{std::numeric_limits<double>::infinity(), -1};
+  if (guess >= 0)
+    best = {(points_[place_[guess]] - x).squaredNorm(), guess};
   nearest(0, static_cast<int>(points_.size()), 0, x, best);
   return best;
 }

@@ -1,4 +1,3 @@
-#include "solvers/elimination_order.hpp"
 #include "solvers/factorisation.hpp"
 
 #include "topology/errors.hpp"
@@ -170,33 +169,4 @@ TEST_CASE("A matrix of 3 x 3 blocks is factored as the same matrix without block
   MatrixX indefinite = symmetric;
   indefinite(40, 40) = -1;
   CHECK_THROWS_WITH(solvers::factor_ordered(lower(indefinite)), Catch::Contains("(column 40 of 210"));
-}
-
-TEST_CASE("A fill-reducing ordering is a permutation and saves fill on a grid") {
-  const int side = 24, count = side * side;
-  std::vector<int> start{0}, neighbours;
-  MatrixX laplace = MatrixX::Zero(count, count);
-  for (int i = 0; i < count; ++i) {
-    const int row = i / side, column = i % side;
-    for (int step : {-side, -1, 0, 1, side}) {
-      if ((step == -1 && column == 0) || (step == 1 && column + 1 == side) || (step == -side && row == 0) ||
-          (step == side && row + 1 == side))
-        continue;
-      neighbours.push_back(i + step);
-      laplace(i, i + step) = step == 0 ? 4.1 : -1;
-    }
-    start.push_back(static_cast<int>(neighbours.size()));
-  }
-  const std::vector<int> order = solvers::fill_reducing_ordering(start, neighbours);
-  std::vector<int> sorted = order, all(count);
-  std::sort(sorted.begin(), sorted.end());
-  std::iota(all.begin(), all.end(), 0);
-  CHECK(sorted == all);
-  std::vector<int> shuffled = all;
-  std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937_64(1));
-  const auto nonzeros_in = [&](const std::vector<int>& elimination) {
-    const MatrixX permuted = laplace(elimination, elimination);
-    return solvers::factor_ordered(lower(permuted))->nonzeros();
-  };
-  CHECK(nonzeros_in(order) < nonzeros_in(shuffled) / 2);
 }

@@ -45,6 +45,8 @@ void check_against_scan(const std::vector<Vector3>& points, const std::vector<Ve
     const PointTree::Found found = tree.nearest(x);
     CHECK(found.index == nearest); // the smallest index among equals
     CHECK(found.squared_distance == least);
+    for (int guess = -1; guess < std::ssize(points); guess += 7)
+      CHECK(tree.nearest(x, guess).index == nearest);
     for (double radius : {0.0, 0.3, 1.0, 2.0}) {
       std::vector<PointTree::Found> within;
       tree.within(x, radius, within);
