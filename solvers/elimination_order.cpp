@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <numeric>
 #include <span>
+#include <tuple>
 #include <utility>
 
 namespace spherecut::solvers {
@@ -230,7 +231,9 @@ class MinimumFill {
   struct Judged {
     double fill;
     int added, node;
-    auto operator<=>(const Judged&) const = default;
+    bool operator<(const Judged& other) const {
+      return std::tie(fill, added, node) < std::tie(other.fill, other.added, other.node);
+    }
   };
 
   int count_, words_;
