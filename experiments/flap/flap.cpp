@@ -9,6 +9,7 @@
 #include "src/cut_output.hpp"
 #include "src/tear_output.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <fstream>
@@ -91,6 +92,8 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
       {"flap_torn_cm2", 1e4 * last.tear->area, ">=", context.quick ? 0.5 : 2.0},
       {context.quick ? "flap_energy_balance_reported" : "flap_energy_balance", median(open),
        context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.05},
+      {context.quick ? "flap_energy_balance_worst_reported" : "flap_energy_balance_worst",
+       *std::max_element(open.begin(), open.end()), context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.1},
       {"flap_dissipation_share", ledger.dissipation / (ledger.surface + ledger.dissipation), ">=", 0},
       {"flap_pieces", static_cast<double>(last.cut->pieces), "<=", 1}};
   return checks;
