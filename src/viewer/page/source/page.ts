@@ -267,10 +267,12 @@ export class Page {
     this.stylus.answered(frame.poseInSolve);
     if (frame.vertices) this.seenVertices += 1;
     if (frame.vertices && moves) body.setVertices(frame.vertices);
-    if (frame.vertices || frame.scalars) this.scalars = frame.scalars;
+    // What has been switched off since this was asked for stays away.
+    const { colours, supports, slice } = this.panels;
+    if (frame.vertices || frame.scalars) this.scalars = colours.value === 'none' ? null : frame.scalars;
     this.nodes = frame.nodes ?? this.nodes;
-    this.support = frame.support ?? this.support;
-    this.slice = frame.slice ?? this.slice;
+    if (supports.checked) this.support = frame.support ?? this.support;
+    if (slice.value !== 'none') this.slice = frame.slice ?? this.slice;
     this.stages = frame.stages ?? this.stages;
     if (frame.scalars) this.colour();
     if (frame.nodes || frame.support) this.showNodes();

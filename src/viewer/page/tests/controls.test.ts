@@ -433,6 +433,31 @@ test('Slices show the level sets of organ and cut, with a scale in metres', asyn
   await until(tab, 'the scale is away', () => document.getElementById('scale')!.hidden);
 });
 
+test('A slice that comes when none is wanted any more is not shown', async () => {
+  const { tab } = opened;
+  const held = await tab.evaluate(async () => {
+    const send = WebSocket.prototype.send;
+    let kept = 0;
+    WebSocket.prototype.send = function (this: WebSocket, data): void { // the server hears of it 1.5 s late
+      if (typeof data !== 'string' || !data.includes('"slice":null')) return send.call(this, data);
+      kept += 1;
+      setTimeout(() => send.call(this, data), 1500);
+    };
+    const choose = (value: string): void => {
+      const input = document.getElementById('slice') as HTMLSelectElement;
+      input.value = value;
+      input.dispatchEvent(new Event('change', { bubbles: true }));
+    };
+    choose('organ');
+    choose('none');
+    await new Promise((done) => setTimeout(done, 2500));
+    WebSocket.prototype.send = send;
+    return kept;
+  });
+  assert.ok(held > 0);
+  assert.ok(await tab.evaluate(() => document.getElementById('scale')!.hidden));
+});
+
 test('Recording, replay and download by keyboard', async () => {
   const { tab } = opened;
   await anew(tab, () => tab.selectOption('#scenario', 'scenario.toml'));
