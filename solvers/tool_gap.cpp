@@ -54,10 +54,10 @@ Gap contact_gap(const PressingTool& tool, const Vector3& x) noexcept {
     return ball_gap(pose.point + ball->radius * pose.axis, ball->radius, tool.front, x);
   }
   const auto [distance, normal] = topology::tool_distance_and_normal(tool.shape, pose, x);
-  const Gap nearest{distance, normal};
+  Gap nearest{distance, normal};
   if (const auto* instrument = std::get_if<topology::Laparoscope>(&tool.shape);
       instrument != nullptr && along < 3 * instrument->tip_radius) {
-    const Gap tip = ball_gap(pose.point + instrument->tip_radius * pose.axis, instrument->tip_radius, tool.front, x);
+    Gap tip = ball_gap(pose.point + instrument->tip_radius * pose.axis, instrument->tip_radius, tool.front, x);
     return tip.distance <= nearest.distance ? tip : nearest;
   }
   return nearest;

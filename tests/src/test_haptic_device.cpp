@@ -173,11 +173,11 @@ TEST_CASE("A snapshot holds the symmetric part of the compliance and the candida
   CHECK(snapshot.condensed->rest[most_candidates - 2] == patch.rest[most_candidates - 2]);
   CHECK(snapshot.force == state.tool_force);
   const int rows = 3 * snapshot.count;
+  const Eigen::Map<const MatrixX> compliance(snapshot.condensed->compliance.data(), rows, rows);
   double worst = 0;
   for (int i = 0; i < rows - 3; ++i)
     for (int j = 0; j < rows - 3; ++j)
-      worst = std::max(worst, std::abs(snapshot.condensed->compliance[static_cast<std::size_t>(i + j * rows)] -
-                                       0.5 * (patch.compliance(i, j) + patch.compliance(j, i))));
+      worst = std::max(worst, std::abs(compliance(i, j) - 0.5 * (patch.compliance(i, j) + patch.compliance(j, i))));
   CHECK(worst < 1e-15);
   CHECK(snapshot.condensed->asymmetry > 0.5);
   const auto last = snapshot.condensed;
