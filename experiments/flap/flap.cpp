@@ -1,5 +1,5 @@
 // Problem:   scenarios/liver_flap.toml: a flap cut from the dome of a liver is lifted by a grasper and tears on.
-// Reference: none but the account of energies (median of three node sets); G is at most the toughness where the tear
+// Reference: none but the account of energies (the worst of three node sets); G is at most the toughness where the tear
 //            has come to rest.
 // Command:   spherecut experiment run flap --out DIR
 #include "experiments/registered.hpp"
@@ -9,7 +9,6 @@
 #include "src/cut_output.hpp"
 #include "src/tear_output.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <fstream>
@@ -90,10 +89,8 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
   const app::EnergyLedger& ledger = last.tear->ledger;
   std::vector<Check> checks{
       {"flap_torn_cm2", 1e4 * last.tear->area, ">=", context.quick ? 0.5 : 2.0},
-      {context.quick ? "flap_energy_balance_reported" : "flap_energy_balance", median(open),
+      {context.quick ? "flap_energy_balance_reported" : "flap_energy_balance", largest(open),
        context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.05},
-      {context.quick ? "flap_energy_balance_worst_reported" : "flap_energy_balance_worst",
-       *std::max_element(open.begin(), open.end()), context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.1},
       {"flap_dissipation_share", ledger.dissipation / (ledger.surface + ledger.dissipation), ">=", 0},
       {"flap_pieces", static_cast<double>(last.cut->pieces), "<=", 1}};
   return checks;
