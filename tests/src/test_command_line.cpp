@@ -496,7 +496,7 @@ TEST_CASE("A mesh in millimetres taken as metres is warned about in the summary 
 }
 
 TEST_CASE("The shipped scenarios pass the check") {
-  for (const std::string name : {"block_punch", "hemisphere_palpation", "cylinder_slide"}) {
+  for (const std::string name : {"block_punch", "hemisphere_palpation", "cylinder_slide", "liver_tear"}) {
     const ProgramResult result = run_spherecut({"check", source / "scenarios" / (name + ".toml")});
     INFO(name << ": " << result.err);
     CHECK(result.status == 0);
