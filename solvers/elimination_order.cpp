@@ -5,11 +5,11 @@
 // the clique go with it, so that there are few cliques to update; nodes that have become alike are held as one.
 #include "solvers/elimination_order.hpp"
 
+#include "solvers/cholmod_workspace.inl"
 #include "topology/errors.hpp"
 
 #include <algorithm>
 #include <bit>
-#include <cholmod.h>
 #include <cstdint>
 #include <numeric>
 #include <span>
@@ -290,20 +290,6 @@ std::vector<int> postordered(const std::vector<int>& order, std::span<const int>
   return result;
 }
 
-/// CHOLMOD's workspace for an analysis without values.
-struct Workspace {
-  cholmod_common common{};
-  Workspace() {
-    cholmod_start(&common);
-    common.print = 0;
-    common.error_handler = nullptr;
-    common.supernodal = CHOLMOD_SIMPLICIAL;
-  }
-  ~Workspace() { cholmod_finish(&common); }
-  Workspace(const Workspace&) = delete;
-  Workspace& operator=(const Workspace&) = delete;
-};
-
 } // namespace
 
 std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours) {
@@ -332,7 +318,7 @@ std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std
   pattern.itype = CHOLMOD_INT;
   pattern.xtype = CHOLMOD_PATTERN;
   pattern.sorted = pattern.packed = 1;
-  Workspace workspace;
+  CholmodWorkspace workspace(CHOLMOD_SIMPLICIAL); // there are no values
   cholmod_factor* factor = cholmod_analyze(&pattern, &workspace.common);
   if (factor == nullptr)
     throw NumericalError("ordering the node graph ran out of memory");

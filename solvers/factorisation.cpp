@@ -1,10 +1,10 @@
 #include "solvers/factorisation.hpp"
 
+#include "solvers/cholmod_workspace.inl"
 #include "solvers/large_pages.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
-#include <cholmod.h>
 #include <cmath>
 #include <cstring>
 #include <dlfcn.h>
@@ -49,20 +49,6 @@ class WithoutOpenMp {
   SuiteSparse_config.malloc_func = allocate_in_large_pages;
   return true;
 }();
-
-/// CHOLMOD's workspace, started and finished with the object that owns it.
-struct CholmodCommon {
-  cholmod_common common{};
-  CholmodCommon() {
-    cholmod_start(&common);
-    common.print = 0;
-    common.supernodal = CHOLMOD_SUPERNODAL;
-    common.error_handler = nullptr;
-  }
-  ~CholmodCommon() { cholmod_finish(&common); }
-  CholmodCommon(const CholmodCommon&) = delete;
-  CholmodCommon& operator=(const CholmodCommon&) = delete;
-};
 
 cholmod_sparse view(const SparseMatrix& matrix, int symmetry) {
   cholmod_sparse sparse{};
@@ -251,7 +237,7 @@ class CholeskyFactorisation final : public OrderedCholesky {
     return result;
   }
 
-  mutable CholmodCommon workspace_;
+  mutable CholmodWorkspace workspace_{CHOLMOD_SUPERNODAL};
   cholmod_factor* factor_ = nullptr;
   long nonzeros_ = 0;
 };
