@@ -189,11 +189,7 @@ TEST_CASE("With lips in contact and dragging flanks every motion and cut balance
 TEST_CASE("On a body the edge meets what it asks for, and the held surface carries its force", "[blade_contact]") {
   const tests::CutBlock block = tests::cut_block(8, false, 3);
   for (const Method method : {Method::galerkin, Method::collocation}) {
-    Problem problem;
-    problem.domain = block.domain;
-    problem.incision = block.incision;
-    problem.nodes = block.nodes;
-    problem.material = {1, 0.3, 0};
+    Problem problem = tests::problem_of(block, {1, 0.3, 0});
     for (int i = 0; i < problem.nodes.size(); ++i)
       if (problem.nodes.positions[i].z() < -0.5 + 1e-9)
         problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});

@@ -24,15 +24,6 @@ double side_of(const CutBlock& block, const Vector3& x) {
   return (x - block.frame.origin).dot(block.frame.normal);
 }
 
-Problem problem_of(const CutBlock& block) {
-  Problem problem;
-  problem.domain = block.domain;
-  problem.incision = block.incision;
-  problem.nodes = block.nodes;
-  problem.material = {1, 0.3, 0};
-  return problem;
-}
-
 bool at_z(const Vector3& x, double z) {
   return std::abs(x.z() - z) < 1e-9;
 }
@@ -173,7 +164,7 @@ TEST_CASE("A linear field with its tractions on the faces of the cut passes the 
   const auto [rule, bound] = GENERATE(table<SightRule, double>(
       {{SightRule::visibility, 0.6}, {SightRule::diffraction, 0.015}, {SightRule::enriched, 0.02}}));
   const CutBlock block = cut_block(8, false, 2);
-  Problem problem = problem_of(block);
+  Problem problem = problem_of(block, {1, 0.3, 0});
   Matrix3 slope;
   slope << 0.4, -0.3, 0.2, 0.5, 0.1, -0.6, -0.2, 0.7, 0.3;
   const Matrix3 stress = stress_from_gradient(problem.material, slope);
@@ -199,7 +190,7 @@ TEST_CASE("A linear field with its tractions on the faces of the cut passes the 
 TEST_CASE("A severed body: no coupling, one half moves as a rigid body and the other not at all", "[cut_galerkin]") {
   const SightRule rule = GENERATE(SightRule::visibility, SightRule::enriched);
   const CutBlock block = cut_block(6, true, 3);
-  Problem problem = problem_of(block);
+  Problem problem = problem_of(block, {1, 0.3, 0});
   const auto rigid = [](const Vector3& x) -> Vector3 {
     return Vector3(0.1, -0.2, 0.3) + Vector3(0.4, 0.1, -0.5).cross(x);
   };
@@ -246,7 +237,7 @@ TEST_CASE("A severed body: no coupling, one half moves as a rigid body and the o
 TEST_CASE("A piece that nothing holds has six free motions; it is refused by name, held softly or dropped",
           "[cut_galerkin]") {
   const CutBlock block = cut_block(5, true, 3);
-  Problem problem = problem_of(block);
+  Problem problem = problem_of(block, {1, 0.3, 0});
   hold_face(problem, -0.5, Vector3::Zero());
   // A pull on the lower half's free face and a load in balance on the upper one.
   const double bottom = 1e-3;
@@ -306,7 +297,7 @@ TEST_CASE("A piece that nothing holds has six free motions; it is refused by nam
 
 TEST_CASE("A piece held softly answers a load in balance exactly", "[cut_galerkin]") {
   const CutBlock block = cut_block(6, true, 5);
-  Problem problem = problem_of(block);
+  Problem problem = problem_of(block, {1, 0.3, 0});
   hold_face(problem, -0.5, Vector3::Zero());
   Matrix3 stress;
   stress << 1, 0.2, 0, 0.2, -0.5, 0.3, 0, 0.3, 0.4;
@@ -324,7 +315,7 @@ TEST_CASE("A piece held softly answers a load in balance exactly", "[cut_galerki
 
 TEST_CASE("An initial strain that nothing resists becomes the strain of the body, without stress", "[cut_galerkin]") {
   const CutBlock block = cut_block(6, false, 6);
-  Problem problem = problem_of(block);
+  Problem problem = problem_of(block, {1, 0.3, 0});
   Matrix3 strain;
   strain << 0.1, 0.02, 0, 0.02, -0.05, 0.03, 0, 0.03, 0.04;
   problem.loads.initial_strain = strain;

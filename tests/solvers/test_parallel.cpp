@@ -48,11 +48,7 @@ TEST_CASE("The matrix of a cut body has the same bits whatever the number of thr
   const tests::CutBlock block = tests::cut_block(7, false, 3);
   const auto matrix = [&](int threads) {
     const Threads used(threads);
-    Problem problem;
-    problem.domain = block.domain;
-    problem.incision = block.incision;
-    problem.nodes = block.nodes;
-    problem.material = {1000, 0.4, 0};
+    Problem problem = tests::problem_of(block, {1000, 0.4, 0});
     for (int i = 0; i < block.nodes.size(); ++i)
       if (block.nodes.kinds[i] != NodeKind::interior && block.nodes.positions[i].z() < -0.5 + 1e-9)
         problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});

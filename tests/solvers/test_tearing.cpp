@@ -146,11 +146,7 @@ TEST_CASE("The integral as a rule for all fields on a body gives what it gives f
       table<Method, double>({{Method::galerkin, 0.3}, {Method::collocation, 0.3}, {Method::collocation, 0.45}}));
   const tests::CutBlock block = tests::cut_block(8, false, 2);
   const tests::CutFrame& cut = block.frame;
-  Problem problem;
-  problem.domain = block.domain;
-  problem.incision = block.incision;
-  problem.nodes = block.nodes;
-  problem.material = {1000, poisson_ratio, 0};
+  Problem problem = tests::problem_of(block, {1000, poisson_ratio, 0});
   problem.loads.body_force = [](const Vector3& x) { return Vector3(3 * x.y(), 1, -2); };
   problem.loads.initial_strain = 1e-3 * cut.normal * cut.normal.transpose();
   problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -2 * n; };
@@ -199,11 +195,7 @@ TEST_CASE("The integral as a rule for all fields on a body gives what it gives f
 TEST_CASE("A cut that is pressed together and sticks is not driven on", "[tearing]") {
   const tests::CutBlock block = tests::cut_block(8, false, 2);
   const tests::CutFrame& cut = block.frame;
-  Problem problem;
-  problem.domain = block.domain;
-  problem.incision = block.incision;
-  problem.nodes = block.nodes;
-  problem.material = {1000, 0.3, 0};
+  Problem problem = tests::problem_of(block, {1000, 0.3, 0});
   const Matrix3 shear = cut.normal * cut.ahead.transpose() + cut.ahead * cut.normal.transpose();
   const Matrix3 strain = 1e-3 * (-2 * cut.normal * cut.normal.transpose() + shear); // pressed more than sheared
   for (int i = 0; i < block.nodes.size(); ++i)

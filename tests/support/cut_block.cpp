@@ -79,4 +79,13 @@ CutBlock cut_block(int divisions, bool through, std::uint64_t seed) {
   return block;
 }
 
+solvers::Problem problem_of(const CutBlock& block, const solvers::Material& material) {
+  solvers::Problem problem;
+  problem.domain = block.domain;
+  problem.incision = block.incision;
+  problem.nodes = block.nodes;
+  problem.material = material;
+  return problem;
+}
+
 } // namespace spherecut::tests

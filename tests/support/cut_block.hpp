@@ -1,7 +1,7 @@
 // A block with a plane cut that is aligned with nothing, and irregular nodes with pairs on the faces of the cut.
 #pragma once
 
-#include "solvers/nodes.hpp"
+#include "solvers/discretisation.hpp"
 
 #include <memory>
 
@@ -28,5 +28,8 @@ struct CutBlock {
 /// Cube of edge 1 m about the origin with spacing 1 / divisions: a jittered lattice, and lip pairs where the cut is.
 /// The cut ends within the block (a front), or goes through it when `through` is set.
 CutBlock cut_block(int divisions, bool through, std::uint64_t seed);
+
+/// The block with its cut and nodes, free and without loads.
+solvers::Problem problem_of(const CutBlock& block, const solvers::Material& material);
 
 } // namespace spherecut::tests
