@@ -4,22 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fmt/format.h>
 #include <fstream>
 #include <numeric>
 #include <sstream>
-#include <stdexcept>
 #include <toml++/toml.h>
 
 namespace spherecut::app {
 namespace {
 
 constexpr std::uintmax_t largest_file = 16U << 20U; // bytes; a scenario is a few kilobytes
-
-std::string join(std::string_view table, std::string_view key) {
-  return table.empty() ? std::string(key) : fmt::format("{}.{}", table, key);
-}
 
 long line_of(const toml::node& node) {
   return node.source().begin.line;
@@ -88,15 +82,6 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-bool is_child(std::string_view path, std::string_view table) {
-  const auto dot = path.rfind('.');
-  return table == (dot == std::string_view::npos ? std::string_view{} : path.substr(0, dot));
-}
-
-std::string_view leaf(std::string_view path) {
-  return path.substr(path.rfind('.') + 1);
-}
-
 class Checker {
  public:
   explicit Checker(Offences& offences) : offences_(offences) {}
@@ -104,14 +89,14 @@ class Checker {
   // `path` as in scenario_keys(), `name` as the reader of a message knows the table: "fixed[2]".
   void table(const toml::table& table, const std::string& path, const std::string& name) {
     for (const auto& [key, node] : table) {
-      const ScenarioKey* entry = find_scenario_key(join(path, key.str()));
+      const ScenarioKey* entry = find_scenario_key(joined_path(path, key.str()));
       if (entry == nullptr)
         unknown(path, name, key.str(), node);
       else
-        value(*entry, join(name, key.str()), node);
+        value(*entry, joined_path(name, key.str()), node);
     }
     for (const ScenarioKey& key : scenario_keys())
-      if (is_child(key.path, path))
+      if (table_of(key.path) == path)
         presence(key, table, path, name);
   }
 
@@ -121,16 +106,16 @@ class Checker {
     std::string_view nearest;
     std::size_t distance = 4;
     for (const ScenarioKey& entry : scenario_keys()) {
-      if (!is_child(entry.path, path))
+      if (table_of(entry.path) != path)
         continue;
-      known += (known.empty() ? "" : ", ") + std::string(leaf(entry.path));
-      if (const std::size_t d = edit_distance(key, leaf(entry.path)); d < distance) {
+      known += (known.empty() ? "" : ", ") + std::string(leaf_of(entry.path));
+      if (const std::size_t d = edit_distance(key, leaf_of(entry.path)); d < distance) {
         distance = d;
-        nearest = leaf(entry.path);
+        nearest = leaf_of(entry.path);
       }
     }
     const std::string hint = nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
-    offences_.add(line_of(node), fmt::format("unknown key '{}'{} Allowed here: {}", join(name, key),
+    offences_.add(line_of(node), fmt::format("unknown key '{}'{} Allowed here: {}", joined_path(name, key),
                                              hint.empty() ? "." : hint, known));
   }
 
@@ -269,7 +254,7 @@ class Checker {
     const auto equals = key.when.find(" = ");
     const std::string_view sibling = key.when.substr(0, equals);
     std::optional<std::string_view> value = table[sibling].value<std::string_view>();
-    const ScenarioKey* entry = find_scenario_key(join(path, sibling));
+    const ScenarioKey* entry = find_scenario_key(joined_path(path, sibling));
     if (!table.contains(sibling) && entry != nullptr && entry->fallback.size() > 2 && entry->fallback.front() == '"')
       value = entry->fallback.substr(1, entry->fallback.size() - 2); // left out: its default, within quotes
     if (!value || entry == nullptr || !in_list(entry->choices, *value))
@@ -278,13 +263,14 @@ class Checker {
   }
 
   void presence(const ScenarioKey& key, const toml::table& table, const std::string& path, const std::string& name) {
-    const std::string_view own = leaf(key.path);
+    const std::string_view own = leaf_of(key.path);
     const std::optional<bool> wanted_here = applies(key, table, path);
     const toml::node* node = table.get(own);
     if (node != nullptr && wanted_here == false)
-      offences_.add(line_of(*node), fmt::format("{} = {}: goes only with {}", join(name, own), shown(*node), key.when));
+      offences_.add(line_of(*node),
+                    fmt::format("{} = {}: goes only with {}", joined_path(name, own), shown(*node), key.when));
     if (node == nullptr && wanted_here == true && key.fallback == "required") {
-      std::string what = fmt::format("{} is missing: {}", join(name, own), wanted(key));
+      std::string what = fmt::format("{} is missing: {}", joined_path(name, own), wanted(key));
       if (!key.unit.empty())
         what += fmt::format(" in {}", unit_name(key.unit));
       if (const std::string allowed = allowed_values(key); !allowed.empty())
@@ -343,145 +329,6 @@ void Offences::throw_if_any() {
   for (const auto& [line, what] : found_)
     message += fmt::format("{}{}:{}: {}", message.empty() ? "" : "\n", file_, line, what);
   throw InputError(message);
-}
-
-namespace {
-
-Vector3 vector_of(const toml::array& array) {
-  return {array.get(0)->value<double>().value(), array.get(1)->value<double>().value(),
-          array.get(2)->value<double>().value()};
-}
-
-} // namespace
-
-struct Section::Value {
-  const toml::node* node = nullptr;
-  std::optional<toml::table> fallback{}; // owns the node when it is a fallback
-};
-
-Section::Value Section::find(std::string_view key) const {
-  Value value;
-  if (table_ != nullptr)
-    value.node = static_cast<const toml::table*>(table_)->get(key);
-  const ScenarioKey* entry = find_scenario_key(join(path_, key));
-  if (entry == nullptr)
-    throw std::logic_error(fmt::format("scenario key '{}' is not in the table of keys", join(path_, key)));
-  if (value.node == nullptr && !entry->fallback.empty() && entry->fallback != "required") {
-    value.fallback = toml::parse(fmt::format("value = {}", entry->fallback));
-    value.node = value.fallback->get("value");
-  }
-  return value;
-}
-
-Section::Value Section::require(std::string_view key) const {
-  Value value = find(key);
-  if (value.node == nullptr)
-    throw std::logic_error(fmt::format("scenario key '{}' is absent and has no default", join(path_, key)));
-  return value;
-}
-
-bool Section::has(std::string_view key) const {
-  return table_ != nullptr && static_cast<const toml::table*>(table_)->contains(key);
-}
-
-double Section::number(std::string_view key) const {
-  return require(key).node->value<double>().value();
-}
-
-std::optional<double> Section::optional_number(std::string_view key) const {
-  const Value value = find(key);
-  return value.node == nullptr ? std::nullopt : value.node->value<double>();
-}
-
-long Section::integer(std::string_view key) const {
-  return require(key).node->value<std::int64_t>().value();
-}
-
-std::optional<long> Section::optional_integer(std::string_view key) const {
-  const Value value = find(key);
-  if (value.node == nullptr)
-    return std::nullopt;
-  return value.node->value<std::int64_t>().value();
-}
-
-bool Section::boolean(std::string_view key) const {
-  return require(key).node->value<bool>().value();
-}
-
-std::string Section::text(std::string_view key) const {
-  return require(key).node->value<std::string>().value();
-}
-
-Vector3 Section::vector(std::string_view key) const {
-  const Value value = require(key);
-  return vector_of(*value.node->as_array());
-}
-
-std::vector<Vector3> Section::points(std::string_view key) const {
-  const Value value = require(key);
-  std::vector<Vector3> all;
-  for (const toml::node& point : *value.node->as_array())
-    all.push_back(vector_of(*point.as_array()));
-  return all;
-}
-
-Matrix3 Section::strain(std::string_view key) const {
-  const Value value = require(key);
-  const toml::array& array = *value.node->as_array();
-  Matrix3 tensor = vector_of(array).asDiagonal();
-  if (array.size() == 6) {
-    tensor(1, 2) = tensor(2, 1) = array.get(3)->value<double>().value();
-    tensor(0, 2) = tensor(2, 0) = array.get(4)->value<double>().value();
-    tensor(0, 1) = tensor(1, 0) = array.get(5)->value<double>().value();
-  }
-  return tensor;
-}
-
-std::array<bool, 3> Section::axes(std::string_view key) const {
-  const Value value = require(key);
-  std::array<bool, 3> held{false, false, false};
-  for (const toml::node& entry : *value.node->as_array())
-    held[static_cast<std::size_t>(entry.value<std::string_view>().value().front() - 'x')] = true;
-  return held;
-}
-
-Section Section::table(std::string_view key) const {
-  Section inner;
-  inner.document_ = document_;
-  inner.path_ = join(path_, key);
-  if (const toml::node* node = has(key) ? static_cast<const toml::table*>(table_)->get(key) : nullptr)
-    inner.table_ = node->as_table();
-  return inner;
-}
-
-std::vector<Section> Section::tables(std::string_view key) const {
-  std::vector<Section> all;
-  if (!has(key))
-    return all;
-  for (const toml::node& node : *static_cast<const toml::table*>(table_)->get(key)->as_array()) {
-    Section inner;
-    inner.document_ = document_;
-    inner.path_ = join(path_, key) + "[]";
-    inner.table_ = node.as_table();
-    all.push_back(std::move(inner));
-  }
-  return all;
-}
-
-long Section::line(std::string_view key) const {
-  if (table_ == nullptr)
-    return 0;
-  const auto* table = static_cast<const toml::table*>(table_);
-  const toml::node* node = key.empty() ? nullptr : table->get(key);
-  return line_of(node == nullptr ? *table : *node);
-}
-
-Vector3 direction(const Section& section, std::string_view name, std::string_view key, Offences& offences) {
-  const Vector3 value = section.vector(key);
-  if (value.norm() > 0)
-    return value.normalized();
-  offences.add(section.line(key), fmt::format("{} = [0, 0, 0]: has no direction; allowed: any other vector", name));
-  return Vector3::UnitZ();
 }
 
 ScenarioDocument::ScenarioDocument(const std::filesystem::path& file) : ScenarioDocument(file, read_text(file)) {}

@@ -39,17 +39,6 @@ bool is_table(const ScenarioKey& key) {
   return key.kind == table || key.kind == array_of_tables;
 }
 
-// The table that a key stands in: "tool.path[]" for "tool.path[].time", "" at top level.
-std::string_view parent_of(std::string_view path) {
-  const auto dot = path.rfind('.');
-  return dot == std::string_view::npos ? std::string_view{} : path.substr(0, dot);
-}
-
-std::string_view leaf_of(std::string_view path) {
-  const auto dot = path.rfind('.');
-  return dot == std::string_view::npos ? path : path.substr(dot + 1);
-}
-
 std::string heading(const ScenarioKey& key) {
   return key.kind == table ? fmt::format("[{}]", key.path) : fmt::format("[[{}]]", key.path);
 }
@@ -68,7 +57,7 @@ std::string scenario_help() {
   std::string out = "A scenario is a TOML file in SI units: metres, newtons, pascals, seconds, kilograms.\n";
   const auto list = [&](std::string_view parent) {
     for (const ScenarioKey& key : scenario_keys()) {
-      if (is_table(key) || parent_of(key.path) != parent)
+      if (is_table(key) || table_of(key.path) != parent)
         continue;
       out += fmt::format("  {:<18} {}", leaf_of(key.path), type_and_unit(key));
       if (const std::string allowed = allowed_values(key); !allowed.empty())
@@ -94,7 +83,7 @@ std::string scenario_reference() {
   const auto list = [&](std::string_view parent) {
     out += "| key | type, unit | allowed | default | meaning |\n|---|---|---|---|---|\n";
     for (const ScenarioKey& key : scenario_keys()) {
-      if (is_table(key) || parent_of(key.path) != parent)
+      if (is_table(key) || table_of(key.path) != parent)
         continue;
       std::string meaning(key.meaning);
       if (!key.when.empty())

@@ -445,6 +445,19 @@ const ScenarioKey* find_scenario_key(std::string_view path) {
   return nullptr;
 }
 
+std::string_view table_of(std::string_view path) {
+  const auto dot = path.rfind('.');
+  return dot == std::string_view::npos ? std::string_view{} : path.substr(0, dot);
+}
+
+std::string_view leaf_of(std::string_view path) {
+  return path.substr(path.rfind('.') + 1);
+}
+
+std::string joined_path(std::string_view table, std::string_view key) {
+  return table.empty() ? std::string(key) : fmt::format("{}.{}", table, key);
+}
+
 std::string allowed_values(const ScenarioKey& key) {
   if (key.kind == choice)
     return fmt::format("one of: {}", key.choices);

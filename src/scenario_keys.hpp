@@ -48,6 +48,13 @@ std::span<const ScenarioKey> scenario_keys();
 /// The entry of a path, or nullptr.
 const ScenarioKey* find_scenario_key(std::string_view path);
 
+/// Parts of a path: "tool.path[]" and "time" for "tool.path[].time"; the table is "" at top level.
+std::string_view table_of(std::string_view path);
+std::string_view leaf_of(std::string_view path);
+
+/// The path of a key in a table.
+std::string joined_path(std::string_view table, std::string_view key);
+
 /// "0 <= value < 0.5", "one of: block, cylinder", "three numbers"; empty when anything goes.
 std::string allowed_values(const ScenarioKey& key);
 
