@@ -144,10 +144,9 @@ class Cutting {
 
 std::vector<Check> run_cutting_force(const ExperimentContext& context) {
   const std::vector<double> spacings =
-      context.quick ? std::vector<double>{0.1, 0.1 / 1.4} : std::vector<double>{0.1, 0.1 / 1.4, 0.05};
-  // None is shorter than two of the coarsest spacings: what a cut of one spacing releases is not resolved.
+      context.quick ? std::vector<double>{0.1, 0.1 / 1.4} : std::vector<double>{0.08, 0.08 / 1.4, 0.04};
   const std::vector<double> lengths =
-      context.quick ? std::vector<double>{0.2, 0.4} : std::vector<double>{0.2, 0.3, 0.4, 0.5};
+      context.quick ? std::vector<double>{0.2, 0.4} : std::vector<double>{0.1, 0.2, 0.3, 0.4, 0.5};
   const double steady_from = context.quick ? 1.2 : 1.4, depth = context.quick ? 1.6 : 2.2, increment = 0.1;
   std::vector<Check> checks;
   app::Table ruptures({"method", "spacing", "nodes", "length_m", "force_N", "blade_m"});
