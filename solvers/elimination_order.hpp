@@ -6,9 +6,10 @@
 namespace spherecut::solvers {
 
 /// Fill-reducing ordering of a symmetric graph given in compressed rows, postordered. Returns the permutation: entry k
-/// is the vertex eliminated k-th. Graphs as dense as those of overlapping spheres get approximate minimum fill, which
-/// leaves 0.75 to 1 of the operations of minimum degree (Rothberg, Eisenstat 1998: node selection strategies for
-/// bottom-up sparse matrix ordering); others nested dissection or minimum degree, whichever CHOLMOD finds better.
+/// is the vertex eliminated k-th. Graphs as dense as those of overlapping spheres, with 50 neighbours a vertex or more
+/// in the mean, get approximate minimum fill up to 8192 vertices. That leaves 0.72 to 1.07 of the operations of minimum
+/// degree (Rothberg, Eisenstat 1998: node selection strategies for bottom-up sparse matrix ordering). Other graphs get
+/// nested dissection or minimum degree, whichever CHOLMOD finds better.
 std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours);
 
 } // namespace spherecut::solvers

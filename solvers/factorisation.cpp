@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -44,10 +45,13 @@ class WithoutOpenMp {
   int levels_ = 0;
 };
 
-/// SuiteSparse takes its memory in large pages, from before main on: it keeps one allocator for the whole program.
+/// SuiteSparse takes its memory in large pages, from before main on: it keeps one allocator for the whole program. One
+/// that the program has given it before stays.
 [[maybe_unused]] const bool large_pages = [] {
-  SuiteSparse_config.malloc_func = allocate_in_large_pages;
-  return true;
+  const bool untouched = SuiteSparse_config.malloc_func == std::malloc && SuiteSparse_config.free_func == std::free;
+  if (untouched)
+    SuiteSparse_config.malloc_func = allocate_in_large_pages;
+  return untouched;
 }();
 
 cholmod_sparse view(const SparseMatrix& matrix, int symmetry) {

@@ -111,8 +111,10 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
       }
     } else {
       FrontRules::Place& place = rules->places[f];
-      if (!std::exchange(place.asked, true))
+      if (!place.asked) {
         place.rule = rule_at(body, field.pressure.size() > 0, frame);
+        place.asked = true;
+      }
       if (place.rule)
         state.intensities = (*place.rule)(field);
       (place.rule ? states : without).push_back(state);
