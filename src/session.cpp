@@ -204,6 +204,7 @@ void Session::coarsen(double factor) {
   zone_.spacing.fine *= factor / coarseness_;
   zone_.spacing.coarse *= factor / coarseness_;
   coarseness_ = factor;
+  led_segments_.clear();
 }
 
 // A bonded contact stays with its nodes, so its zone stays too.

@@ -166,11 +166,13 @@ class Session {
   struct CutGrowth {
     std::function<topology::SurfaceMesh()> way_ahead; // where the cut is going to be next
     std::string renewed{};                            // why all nodes are made anew; empty: those beside it are
+    bool window_pays = true;                          // for later increments to be followed
     bool beside = false;                              // the body as it is stays
   };
   void build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report);
-  void take_back_cut(const solvers::Discretisation* body);
-  std::string lead_zone(const topology::Incision& incision, const topology::SurfaceMesh& way_ahead);
+  bool take_back_cut(const solvers::Discretisation* body);
+  void condense_again();
+  void lead_zone(const topology::Incision& incision, CutGrowth& growth);
   [[nodiscard]] topology::SurfaceMesh way_of_front(const topology::Incision* before,
                                                    const topology::Incision& now) const;
   [[nodiscard]] topology::SurfaceMesh way_of_blade(const StepSample& sample, const topology::RestMap& to_rest) const;
@@ -256,8 +258,9 @@ class Session {
   topology::ContactQuery query_;
   std::optional<FirstTouch> touch_;
   FineZone zone_;
-  double coarseness_ = 1;                      // of the spacings in zone_
-  std::vector<std::array<Vector3, 2>> tracks_; // of the blade, where fine nodes belong
+  double coarseness_ = 1;                            // of the spacings in zone_
+  std::vector<std::array<Vector3, 2>> tracks_;       // of the blade, where fine nodes belong
+  std::vector<std::array<Vector3, 2>> led_segments_; // of zone_ when it was last led ahead of a tear's front
   std::vector<StepSample> steps_;
   std::optional<topology::SurfaceContact> zone_contact_; // centre of the fine zone; empty: no tool touches
   std::optional<topology::SurfaceContact> first_zone_;   // the first of these

@@ -124,6 +124,7 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
                                               CutReport& report) {
   const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
   const IncisionBuilder::Mark before = incisions_->mark();
+  const BodyUpdate last = report; // by an earlier cut of the same step
   try {
     topology::SweepResult swept;
     report.triangles = 0;
@@ -159,6 +160,10 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
   }
   report.triangles = 0;
   report.refused = true;
+  report.update = last.update;
+  report.update_reason = last.update_reason;
+  report.nodes = last.nodes;
+  report.kept_nodes = last.kept_nodes;
   warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, report.reason));
   incisions_->go_back(before);
   return std::nullopt;

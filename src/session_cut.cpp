@@ -131,6 +131,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     report.reason = why;
     report.update = SystemUpdate::none;
     report.update_reason.clear();
+    report.nodes = report.kept_nodes = 0;
     warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, why));
   };
   {

@@ -7,6 +7,8 @@
 #include "topology/errors.hpp"
 
 #include <algorithm>
+#include <fmt/format.h>
+#include <stdexcept>
 #include <utility>
 
 namespace spherecut::app {
@@ -18,8 +20,8 @@ constexpr double zone_left = 0.5; // a front this far off the middle of the fine
 constexpr double moved_near = 1;  // a front this near to what is new of the cut is expected to go on
 // Of the nodes in a window that follows a tear. Processor time of an increment, updated against rebuilt, and what
 // making the window takes in place of the latter: 0.46, 0.95 and 1.7 s where it holds a quarter (1600 nodes), 0.35,
-// 0.34 and 0.55 s at 0.54 (590 nodes), 1.25, 1.4 and 2.9 s at two thirds (1380 nodes). A window lasts two to six
-// increments.
+// 0.34 and 0.55 s at 0.54 (590 nodes), 1.25, 1.4 and 2.9 s at two thirds (1380 nodes). A window serves
+// as many updates as fit into its zone: one of a spacing, three of a half, six of a quarter.
 constexpr double largest_share = 0.5;
 
 } // namespace
@@ -33,28 +35,36 @@ std::vector<std::array<Vector3, 2>> Session::fine_segments(const topology::Incis
 }
 
 // Nodes are fine about a front that tears, as far as its intensities ask for it. Where updates pay, its way ahead is in
-// the fine zone too, so that the zone lasts for some increments; elsewhere the zone goes along at every increment. Says
-// why all nodes have to be made anew for it; empty: they have not.
-std::string Session::lead_zone(const topology::Incision& incision, const topology::SurfaceMesh& way_ahead) {
+// the fine zone too, so that the zone lasts for some increments; elsewhere the zone goes along at every increment.
+void Session::lead_zone(const topology::Incision& incision, CutGrowth& growth) {
   const double fine = zone_.spacing.fine;
-  if (incision.front().empty())
-    return "no front is left";
-  const bool follows =
-      !way_ahead.triangles.empty() && model_.body != nullptr &&
-      hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty() &&
-      solvers::window_share(model_.body->problem(), scenario_.method, way_ahead) <= largest_share &&
-      can_follow(scenario_, model_, way_ahead);
-  if (!follows) {
-    zone_.spacing.segments = fine_segments(incision);
-    return too_much_of_body;
+  if (incision.front().empty()) {
+    growth.renewed = "no front is left";
+    return;
   }
-  const bool leads = model_.incision != nullptr && zone_.spacing.segments != fine_segments(*model_.incision);
+  const auto why_not = [&, way = growth.way_ahead()]() -> std::string {
+    if (std::string hindrance =
+            hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+        !hindrance.empty())
+      return hindrance;
+    if (way.triangles.empty())
+      return "no front that has moved goes on";
+    if (solvers::window_share(model_.body->problem(), scenario_.method, way) > largest_share)
+      return too_much_of_body;
+    return can_follow(scenario_, model_, way) ? "" : "too many nodes for a window by this method";
+  };
+  if (growth.renewed = why_not(); !growth.renewed.empty()) {
+    growth.window_pays = false;
+    zone_.spacing.segments = fine_segments(incision);
+    return;
+  }
+  const bool leads = !led_segments_.empty() && zone_.spacing.segments == led_segments_;
   const bool holds =
       leads && std::all_of(incision.front().begin(), incision.front().end(), [&](const topology::FrontSegment& front) {
         return solvers::distance_to_segments(front.to, zone_.spacing.segments) <= zone_left * fine;
       });
   if (holds)
-    return "";
+    return;
   zone_.spacing.segments = fine_segments(incision);
   for (std::array<Vector3, 2> ends : solvers::front_segments(incision, fine)) {
     for (Vector3& x : ends)
@@ -62,7 +72,8 @@ std::string Session::lead_zone(const topology::Incision& incision, const topolog
         x += zone_ahead * fine * front->ahead;
     zone_.spacing.segments.push_back(ends);
   }
-  return leads ? "the front has left the fine zone" : "the fine zone had nothing of the way ahead";
+  led_segments_ = zone_.spacing.segments;
+  growth.renewed = leads ? "the front has left the fine zone" : "the fine zone had nothing of the way ahead";
 }
 
 // Where the fronts that have just moved will come to while the fine zone lasts, if they go straight on.
@@ -102,7 +113,7 @@ void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& re
   const std::string unfollowed =
       growth.beside ? "the blade is resisted"
                     : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
-  const bool follows = updating_ && unfollowed.empty() && growth.renewed != too_much_of_body;
+  const bool follows = updating_ && unfollowed.empty() && growth.window_pays;
   followed_.reset();
   report.update = SystemUpdate::rebuilt;
   report.update_reason = !unfollowed.empty()                ? unfollowed
@@ -134,8 +145,8 @@ void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& re
   if (followed_) {
     try {
       build();
-    } catch (const NumericalError& error) { // no sound support: with all nodes made anew there may be
-      report.update_reason = error.what();
+    } catch (const std::runtime_error& error) { // no sound support, or no node left where the body is held: with all
+      report.update_reason = error.what();      // nodes made anew there may be
       followed_.reset();
     }
   }
@@ -156,15 +167,33 @@ void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& re
   condense(near, next, true);
 }
 
-// After a cut that was refused: incision, wound and body as they were. `body`: that of the model before.
-void Session::take_back_cut(const solvers::Discretisation* body) {
+// After a cut that was refused: incision, wound and body as they were. `body`: that of the model before. True: it is
+// another, of the same nodes, that has to be solved.
+bool Session::take_back_cut(const solvers::Discretisation* body) {
   incisions_->take_back();
-  if (body != nullptr && model_.body == nullptr) { // it had followed the cut before that was refused
-    drop_recondensing();
-    app::assemble(scenario_, organ_.domain, model_);
-  } else if (model_.body.get() != body) { // another took over before that
-    condense(std::vector<int>(model_.patch.nodes), model_, true);
+  if (model_.body.get() == body)
+    return false;
+  try {
+    if (model_.body == nullptr) { // it had followed the cut before that was refused; else another had taken over
+      drop_recondensing();
+      app::assemble(scenario_, organ_.domain, model_);
+    }
+    condense_again();
+  } catch (const std::runtime_error& error) {
+    model_.body.reset(); // the next step builds it
+    model_.state.reset();
+    throw NumericalError(
+        fmt::format("the body cannot be had again as it was before a cut that was refused: {}", error.what()));
   }
+  return true;
+}
+
+// Another body has taken over on the same nodes: contact goes on from where it is.
+void Session::condense_again() {
+  std::optional<solvers::CutContactState> state = std::move(model_.state);
+  condense(std::vector<int>(model_.patch.nodes), model_, true);
+  model_.state = std::move(state);
+  model_.front_rules = {};
 }
 
 } // namespace spherecut::app

@@ -147,9 +147,7 @@ bool Session::swap_body() {
     return false;
   model_.lips.reset();
   if (patch.nodes != model_.patch.nodes) {
-    std::optional<solvers::CutContactState> state = std::move(model_.state); // of the same nodes
-    condense(std::vector<int>(model_.patch.nodes), model_, true);
-    model_.state = std::move(state);
+    condense_again();
     return true;
   }
   model_.base = patch.base;

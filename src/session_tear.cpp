@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <stdexcept>
 #include <utility>
 
 namespace spherecut::app {
@@ -158,6 +159,7 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
     return refuse(error.what());
   }
   const auto segments = zone_.spacing.segments;
+  const auto led = led_segments_;
   const auto grasp = grasp_;
   const solvers::Discretisation* const body = model_.body.get();
   const auto before = model_.incision;
@@ -172,7 +174,7 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
       const StageTimer timer(update.seconds.level_sets);
       incisions_->update_fields();
     }
-    growth.renewed = lead_zone(*next.incision, growth.way_ahead());
+    lead_zone(*next.incision, growth);
     if (grasps() && grasped_piece_is_free()) {
       grasp_.reset();
       growth.renewed = "the piece in the grasper has come off";
@@ -195,8 +197,16 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
     refuse(error.what());
   }
   zone_.spacing.segments = segments;
+  led_segments_ = led;
   grasp_ = grasp;
-  take_back_cut(body);
+  try {
+    if (take_back_cut(body))
+      solve(sample, model_);
+  } catch (const std::runtime_error&) {
+    if (blade_force_ != nullptr)
+      blade_force_->lift(); // it knows nothing of what has been torn in this step
+    throw;
+  }
   return false;
 }
 

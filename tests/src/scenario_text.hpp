@@ -120,4 +120,44 @@ width = 0.02
 height = 0.010
 )";
 
+/// One that is less deep.
+inline const std::string shallow_notch = R"([[precut]]
+shape = "rectangle"
+centre = [0.0007, -0.008, 0.005]
+normal = [1, 0.03, 0.02]
+up = [0, 1, 0]
+width = 0.02
+height = 0.009
+)";
+
+/// A long bar whose front, across its middle, concerns a small part of its nodes.
+inline std::string long_bar(double strain, double toughness, const std::string& more) {
+  std::string text = stretched_bar(strain, toughness, more);
+  text = replaced(replaced(replaced(text, "0.04, 0.016", "0.11, 0.016"), "-0.0199", "-0.0549"), "0.0199", "0.0549");
+  return replaced(text, "coarse_spacing = 0.005", "coarse_spacing = 0.0034");
+}
+
+/// The shallow notch, which tears on in short increments.
+inline std::string growing_notch(const std::string& method) {
+  return shallow_notch + "[method]\nname = \"" + method + "\"\n[tearing]\nstep = 0.4\n";
+}
+
+inline std::string stretched(const std::string& text) {
+  return replaced(text, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]");
+}
+
+/// A bar of which the cut at one end concerns a part alone.
+inline const std::string long_block = stretched(replaced(
+    replaced(replaced(cut_block, "0.06, 0.06, 0.03]", "0.24, 0.03, 0.03]"), "0.005", "0.004"), "0.012", "0.01"));
+inline const std::string incision_at_end = R"([blade]
+edge = [[0, -0.006, 0], [0, 0.006, 0.001]]
+step = 0.2
+[[blade.path]]
+time = 0
+position = [-0.042, 0.001, 0.033]
+[[blade.path]]
+time = 1
+position = [-0.043, 0.001, 0.015]
+)";
+
 } // namespace spherecut::tests

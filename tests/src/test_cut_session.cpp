@@ -34,24 +34,6 @@ const std::string slice = blade({"[0.004, 0, 0.036]", "[0.002, 0, -0.006]"}, 0.0
 // Across the block above its base: what is above is held by nothing.
 const std::string topping = blade({"[-0.036, 0, 0.0151]", "[0.036, 0, 0.0153]"}, 0.04, "0.25");
 
-std::string stretched(const std::string& text) {
-  return replaced(text, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]");
-}
-
-// A bar of which the cut at one end concerns a part alone.
-const std::string long_block = stretched(replaced(
-    replaced(replaced(cut_block, "0.06, 0.06, 0.03]", "0.24, 0.03, 0.03]"), "0.005", "0.004"), "0.012", "0.01"));
-const std::string incision_at_end = R"([blade]
-edge = [[0, -0.006, 0], [0, 0.006, 0.001]]
-step = 0.2
-[[blade.path]]
-time = 0
-position = [-0.042, 0.001, 0.033]
-[[blade.path]]
-time = 1
-position = [-0.043, 0.001, 0.015]
-)";
-
 double total(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <fmt/format.h>
 
 using namespace spherecut;
@@ -12,26 +13,6 @@ using namespace spherecut::app;
 using namespace spherecut::tests;
 
 namespace {
-
-const std::string notch = R"([[precut]]
-shape = "rectangle"
-centre = [0.0007, -0.008, 0.005]
-normal = [1, 0.03, 0.02]
-up = [0, 1, 0]
-width = 0.02
-height = 0.009
-)";
-
-/// A long bar whose front, across its middle, concerns a small part of its nodes.
-std::string long_bar(double strain, double toughness, const std::string& more) {
-  std::string text = stretched_bar(strain, toughness, more);
-  text = replaced(replaced(replaced(text, "0.04, 0.016", "0.11, 0.016"), "-0.0199", "-0.0549"), "0.0199", "0.0549");
-  return replaced(text, "coarse_spacing = 0.005", "coarse_spacing = 0.0034");
-}
-
-std::string growing(const std::string& method) {
-  return notch + "[method]\nname = \"" + method + "\"\n[tearing]\nstep = 0.4\n";
-}
 
 /// The last increment of a tear in a step that makes one at most.
 TearIncrement increment_of(const StepResult& result) {
@@ -67,7 +48,7 @@ int count(const std::vector<TearIncrement>& increments, SystemUpdate update) {
 
 TEST_CASE("An increment of a tear that is updated gives fields and intensities of the body built from scratch") {
   const std::string method = GENERATE("galerkin", "collocation");
-  Session session(scenario_of(long_bar(0.15, 0.3, growing(method))));
+  Session session(scenario_of(long_bar(0.15, 0.3, growing_notch(method))));
   session.set_tear_gradually(true); // as in the loop in real time
   session.set_force_only(true);
   int updated = 0, rebuilt = 0;
@@ -105,7 +86,7 @@ TEST_CASE("An increment of a tear that is updated gives fields and intensities o
 
 TEST_CASE("A tear whose systems are updated goes the way of one that rebuilds them") {
   const auto torn = [](bool updating) {
-    Session session(scenario_of(long_bar(0.15, 0.3, growing("galerkin") + "most_increments = 3\n")));
+    Session session(scenario_of(long_bar(0.15, 0.3, growing_notch("galerkin") + "most_increments = 3\n")));
     session.set_updating(updating);
     return *session.step(session.steps().front()).tear;
   };
@@ -132,8 +113,8 @@ TEST_CASE("A tear that concerns most of a body rebuilds it at every increment, a
 TEST_CASE("A refused increment of a tear leaves a body that has followed the ones before as it was") {
   // Held at one end alone and opened by pressure in the notch: the last increment parts it, which is not allowed.
   const std::string right_end = "[[fixed]]\nregion = \"half_space\"\npoint = [0.0549, 0, 0]\nnormal = [-1, 0, 0]\n";
-  Session session(scenario_of(
-      replaced(long_bar(0, 0.002, notch + "pressure = 300\n[cut]\nunheld = \"refuse\"\n[tearing]\n"), right_end, "")));
+  Session session(scenario_of(replaced(
+      long_bar(0, 0.002, shallow_notch + "pressure = 300\n[cut]\nunheld = \"refuse\"\n[tearing]\n"), right_end, "")));
   session.set_tear_gradually(true);
   int updated = 0;
   bool last_updated = false;
@@ -179,6 +160,7 @@ position = [0.0009, -0.0015, 0]
   Session session(scenario_of(long_bar(0.04, 0.3, blade + "[tearing]\nstep = 0.4\nmost_increments = 4\n")));
   int updated = 0, by_blade = 0;
   double torn = 0;
+  std::string first_reason;
   for (const StepResult& result : run(session)) {
     if (result.cut->update != SystemUpdate::none) {
       ++by_blade;
@@ -186,8 +168,64 @@ position = [0.0009, -0.0015, 0]
     }
     updated += count(result.tear->increments, SystemUpdate::updated);
     torn = result.tear->area;
+    if (first_reason.empty() && result.tear->increments.size() > 1)
+      first_reason = result.tear->increments[1].body.update_reason;
   }
+  CHECK(first_reason == "the fine zone had nothing of the way ahead"); // it is about the blade's way
   CHECK(by_blade >= 1);
   CHECK(torn > 1e-5);
   CHECK(updated >= 2);
+}
+
+TEST_CASE("Where an increment takes away the last node of a fixed region all nodes are made anew, and it is made") {
+  const std::string bar = long_bar(0.15, 0.3, growing_notch("galerkin"));
+  struct Step {
+    std::vector<Vector3> carrying; // nodes of the surface
+    SystemUpdate update = SystemUpdate::none;
+  };
+  const auto nodes_of = [](const Session& session) {
+    const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+    std::vector<Vector3> carrying;
+    for (int i = 0; i < nodes.size(); ++i)
+      if (std::abs(session.organ().domain->signed_distance(nodes.positions[i])) < 1e-4)
+        carrying.push_back(nodes.positions[i]);
+    return carrying;
+  };
+  std::vector<Step> steps;
+  Session free(scenario_of(bar));
+  free.set_tear_gradually(true);
+  steps.push_back({nodes_of(free)});
+  for (int step = 0; step < 8; ++step) {
+    const SystemUpdate update = increment_of(free.step(free.steps().front())).body.update;
+    steps.push_back({nodes_of(free), update});
+  }
+  // A region that has nodes until an update takes them away.
+  const auto emptied = [&](const Vector3& centre, double radius) {
+    for (std::size_t k = 0; k < steps.size(); ++k)
+      if (std::none_of(steps[k].carrying.begin(), steps[k].carrying.end(),
+                       [&](const Vector3& x) { return (x - centre).norm() <= radius; }))
+        return steps[k].update == SystemUpdate::updated;
+    return false;
+  };
+  std::string region;
+  double farthest = 0; // m, of its middle from the cut
+  for (const double radius : {0.0003, 0.0006, 0.001, 0.0015, 0.002})
+    for (const Step& step : steps)
+      for (const Vector3& x : step.carrying) {
+        const double away = (free.incision()->closest(x, 1)->point - x).norm();
+        if (away > farthest && emptied(x, radius)) {
+          farthest = away;
+          region = fmt::format("[[fixed]]\nregion = \"sphere\"\ncentre = [{}, {}, {}]\nradius = {}\naxes = [\"z\"]\n",
+                               x.x(), x.y(), x.z(), radius);
+        }
+      }
+  REQUIRE_FALSE(region.empty());
+  Session held(scenario_of(replaced(bar, "[nodes]", region + "[nodes]")));
+  held.set_tear_gradually(true);
+  int renewed = 0;
+  for (int step = 0; step < 8; ++step) {
+    const BodyUpdate body = increment_of(held.step(held.steps().front())).body;
+    renewed += body.update_reason.find("holds no surface node") != std::string::npos ? 1 : 0;
+  }
+  CHECK(renewed >= 1);
 }

@@ -1,0 +1,183 @@
+// Increments of a cut that fail after the body has followed them. What fails is condensing the body: the program is
+// linked with app::condense wrapped (tests/CMakeLists.txt).
+#include "src/session.hpp"
+#include "tests/src/scenario_session.hpp"
+#include "tests/src/scenario_text.hpp"
+#include "topology/errors.hpp"
+
+#include <catch2/catch.hpp>
+
+namespace spherecut::app {
+
+namespace {
+int failing_condensations = 0; // of those to come, the first
+}
+
+void condense_wrapped(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) asm(
+    "__wrap__ZN9spherecut3app8condenseERKSt6vectorIiSaIiEERNS0_9BodyModelEb");
+void condense_itself(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) asm(
+    "__real__ZN9spherecut3app8condenseERKSt6vectorIiSaIiEERNS0_9BodyModelEb");
+
+void condense_wrapped(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
+  if (failing_condensations > 0) {
+    --failing_condensations;
+    throw NumericalError("not condensed");
+  }
+  condense_itself(candidates, model, for_few_presses);
+}
+
+} // namespace spherecut::app
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+using Catch::Contains;
+
+namespace {
+
+/// Everything that a refused increment must leave as it was.
+struct Before {
+  explicit Before(const Session& session)
+      : nodes(session.sprinkling().nodes.positions), coefficients(session.field().coefficients),
+        area(session.incision() == nullptr ? 0 : session.incision()->area()),
+        segments(session.zone().spacing.segments) {}
+
+  void require_in(const Session& session) const {
+    CHECK(session.sprinkling().nodes.positions == nodes);
+    REQUIRE(session.field().coefficients.size() == coefficients.size());
+    // A new body has finer cells at the front as it is now.
+    CHECK((session.field().coefficients - coefficients).norm() < 2e-3 * coefficients.norm());
+    CHECK((session.incision() == nullptr ? 0 : session.incision()->area()) == area);
+    CHECK(session.zone().spacing.segments == segments);
+    CHECK(session.wound()->pieces.size() == 1);
+  }
+
+  std::vector<Vector3> nodes;
+  VectorX coefficients;
+  double area;
+  std::vector<std::array<Vector3, 2>> segments;
+};
+
+bool can_grow(const Session& session) {
+  return dynamic_cast<const solvers::Growable*>(session.body()) != nullptr;
+}
+
+Session tearing_session(const std::string& method) {
+  Session session(scenario_of(long_bar(0.15, 0.3, growing_notch(method))));
+  session.set_tear_gradually(true);
+  return session;
+}
+
+} // namespace
+
+TEST_CASE(
+    "An increment of a tear that fails once the body has followed it leaves a body in balance, and is made then") {
+  const std::string method = GENERATE("galerkin", "collocation");
+  Session session = tearing_session(method);
+  const StepSample& sample = session.steps().front();
+  for (int step = 0; step < 2; ++step)
+    session.step(sample);
+  REQUIRE(can_grow(session));
+  const Before before(session);
+  failing_condensations = 1;
+  const StepResult refused = session.step(sample);
+  CHECK(failing_condensations == 0);
+  CHECK(refused.tear->reason == "refused: not condensed");
+  CHECK(refused.tear->increments.size() == 1);
+  CHECK_FALSE(can_grow(session)); // the one that could had followed the increment
+  CHECK(refused.residual < 1e-9);
+  before.require_in(session);
+  const StepResult next = session.step(sample);
+  REQUIRE(next.tear->increments.size() == 2);
+  CHECK(next.tear->increments.back().body.update_reason == "the body was built without a cut ahead");
+  CHECK(next.residual < 1e-9);
+  CHECK(can_grow(session));
+}
+
+TEST_CASE("Where a body cannot be had again after a refused increment the step fails, and the next one builds it") {
+  Session session = tearing_session("galerkin");
+  const StepSample& sample = session.steps().front();
+  for (int step = 0; step < 2; ++step)
+    session.step(sample);
+  const Before before(session);
+  failing_condensations = 2;
+  CHECK_THROWS_WITH(session.step(sample), Contains("refused") && Contains("not condensed"));
+  CHECK(session.body() == nullptr);
+  CHECK(session.sprinkling().nodes.positions == before.nodes);
+  CHECK(session.incision()->area() == before.area);
+  const StepResult next = session.step(sample);
+  CHECK(next.tear->increments.size() == 2);
+  CHECK(next.residual < 1e-9);
+}
+
+TEST_CASE("Increments of a tear that are refused once each leave the fine zone's way to it") {
+  Session session = tearing_session("galerkin");
+  Session undisturbed = tearing_session("galerkin");
+  const StepSample& sample = session.steps().front();
+  session.step(sample);
+  undisturbed.step(sample);
+  int left = 0;
+  for (int step = 0; step < 6; ++step) {
+    const Before before(session);
+    failing_condensations = 1;
+    CHECK(session.step(sample).tear->reason == "refused: not condensed");
+    before.require_in(session);
+    const BodyUpdate update = session.step(sample).tear->increments.back().body;
+    const BodyUpdate expected = undisturbed.step(sample).tear->increments.back().body;
+    if (expected.update == SystemUpdate::rebuilt) {
+      CHECK(update.update_reason == expected.update_reason);
+      left += expected.update_reason == "the front has left the fine zone" ? 1 : 0;
+    }
+    CHECK(session.zone().spacing.segments.size() == undisturbed.zone().spacing.segments.size());
+  }
+  CHECK(left >= 1);
+}
+
+TEST_CASE("A blade's cut that fails once the body has followed it leaves a body in balance and reports no nodes") {
+  Session session = session_of(long_block + incision_at_end);
+  std::size_t i = 0;
+  for (; i < 4; ++i)
+    session.step(session.steps()[i]);
+  REQUIRE(can_grow(session));
+  const Before before(session);
+  failing_condensations = 1;
+  const StepResult refused = session.step(session.steps()[i]);
+  CHECK(failing_condensations == 0);
+  REQUIRE(refused.cut->refused);
+  CHECK(refused.cut->update == SystemUpdate::none);
+  CHECK(refused.cut->kept_nodes == 0);
+  CHECK(refused.cut->nodes == session.sprinkling().nodes.size());
+  CHECK(refused.residual < 1e-9);
+  before.require_in(session);
+}
+
+TEST_CASE("A resisted blade's cut that is refused reports no nodes") {
+  Session session = session_of(replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
+                               R"([cut]
+front_spacing = 0.004
+[blade]
+edge = [[0, -0.04, 0], [0, 0.04, 0]]
+step = 0.25
+[[blade.path]]
+time = 0
+position = [0.004, 0, 0.031]
+[[blade.path]]
+time = 1
+position = [0.003, 0, 0.012]
+)");
+  session.prepare(session.steps().front());
+  for (const StepSample& sample : session.steps()) {
+    failing_condensations = 1;
+    const StepResult result = session.step(sample);
+    if (!result.cut->refused)
+      continue;
+    CHECK(result.cut->reason == "not condensed");
+    CHECK(result.cut->update == SystemUpdate::none);
+    CHECK(result.cut->update_reason.empty());
+    CHECK(result.cut->kept_nodes == 0);
+    CHECK(result.cut->triangles == 0);
+    failing_condensations = 0;
+    return;
+  }
+  FAIL("no cut was refused");
+}
