@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace spherecut::app {
 namespace {
@@ -272,8 +273,11 @@ void TangentModel::settle_bonds() noexcept {
 // Candidates near enough to the tool to meet it in this tick. The others were farther when last looked at than tool and
 // surface have moved since.
 void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
-  travelled_ += (tool.pose.point - pose_.point).norm() + lever * (tool.pose.axis - pose_.axis).norm();
-  const double far = margin * topology::tip_radius(tool_);
+  const double radius = topology::tip_radius(tool_);
+  travelled_ += (tool.pose.point - pose_.point).norm() + lever * (tool.pose.axis - pose_.axis).norm() +
+                (snapshot_->reach + radius) * (tool.front - front_).norm();
+  front_ = tool.front;
+  const double far = margin * radius;
   near_count_ = 0;
   for (int c = 0; c < snapshot_->count; ++c) {
     if (active_[c] == 0 && clearance_[c] - travelled_ > far)
@@ -299,7 +303,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
   ModelForce result;
   result.converged = false;
   int pivots = 0;
-  double went = 0; // m, of any candidate in this tick
+  double went = 0; // m, of any candidate in this tick, at most
   double relaxation = 1;
   double last_square = 0; // of the last step, and its product with this one, for Aitken's factor
   while (result.rounds < most_rounds) {
@@ -348,7 +352,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
           active_[c] = static_cast<char>(active_[c] == 0);
     }
     const bool stands = !frictional || rub();
-    double largest = 0;
+    double largest = 0; // of any component
     double square = 0;
     double product = 0;
     for (int c = 0; c < count; ++c) {
@@ -358,8 +362,9 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       square += now.squaredNorm();
       step_[c] = now;
     }
-    went += largest;
+    const double farthest = std::numbers::sqrt3 * largest;
     if (largest < still && complementary && stands) {
+      went += farthest;
       for (int c = 0; c < count; ++c)
         displacement_[c] = moved_[c];
       result.converged = true;
@@ -371,6 +376,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
         relaxation = std::clamp(-relaxation * (product - last_square) / turn, 0.25, 4.0);
     }
     last_square = square;
+    went += std::max(1.0, relaxation) * farthest;
     for (int c = 0; c < count; ++c)
       displacement_[c] += relaxation * step_[c];
     if (pivots >= most_pivots)

@@ -44,6 +44,7 @@ class TangentModel : public ForceModel {
   const CondensedContact* condensed_ = nullptr; // of it
   std::uint64_t condensed_number_ = 0;          // 0: none
   topology::ToolPose pose_;                     // of the last tick
+  Vector3 front_ = Vector3::Zero();             // of the tool, when candidates were last looked at
   PerCandidate<Vector3> displacement_;          // m, of the candidates
   PerCandidate<Vector3> moved_;                 // m, the same for the forces of this round
   PerCandidate<Vector3> normal_;                // of the tool

@@ -167,7 +167,18 @@ TEST_CASE("A snapshot holds the symmetric part of the compliance and the candida
   state.displacement = VectorX::Random(3 * nodes);
   state.tool_force = {0, 0, 3};
   ContactSnapshot snapshot;
+  const auto memory = [](const ContactSnapshot& s) {
+    return std::vector<const void*>{s.displacement.data(), s.forces.data(), s.along.data(), s.bond.data(),
+                                    s.active.data()};
+  };
+  const std::vector<const void*> allocated = memory(snapshot);
   fill(patch, state, {}, solvers::ContactCondition::frictionless, nullptr, snapshot);
+  CHECK(memory(snapshot) == allocated);
+  CHECK(snapshot.displacement.size() == most_candidates);
+  CHECK(snapshot.forces.size() == most_candidates);
+  CHECK(snapshot.along.size() == most_candidates);
+  CHECK(snapshot.bond.size() == most_candidates);
+  CHECK(snapshot.active.size() == most_candidates);
   REQUIRE(snapshot.count == most_candidates);
   CHECK(snapshot.condensed->rest[most_candidates - 1] == patch.rest.back()); // far, but in contact
   CHECK(snapshot.condensed->rest[most_candidates - 2] == patch.rest[most_candidates - 2]);
@@ -195,6 +206,7 @@ TEST_CASE("A snapshot holds the symmetric part of the compliance and the candida
   CHECK(alone.condensed->compliance == next.condensed->compliance);
   CHECK(alone.condensed->asymmetry == next.condensed->asymmetry);
   clear(snapshot);
+  CHECK(memory(snapshot) == allocated);
   CHECK(snapshot.count == 0);
   CHECK(snapshot.force.norm() == 0);
 }
