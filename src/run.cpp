@@ -42,12 +42,14 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     const CutReport& cut = found.cut;
     if (session.scenario().blade && found.increments == 0)
       text += fmt::format("the blade has cut nothing in all {} steps\n", found.steps);
-    text += fmt::format("cut of {:.4g} cm2 with a front of {:.3g} cm in {} increment{}; {}\n", 1e4 * cut.area,
-                        1e2 * cut.front_length, found.increments, found.increments == 1 ? "" : "s",
-                        found.largest_opening <= closed_opening
-                            ? "it stays closed"
-                            : fmt::format("opens by up to {:.3g} mm, {:.3g} ml between its faces",
-                                          1e3 * found.largest_opening, 1e6 * cut.opening_volume));
+    const std::string increments =
+        session.scenario().blade ? fmt::format(" in {} increment{}", found.increments, found.increments == 1 ? "" : "s")
+                                 : "";
+    text += fmt::format(
+        "cut of {:.4g} cm2 with a front of {:.3g} cm{}; {}\n", 1e4 * cut.area, 1e2 * cut.front_length, increments,
+        found.largest_opening <= closed_opening ? "it stays closed"
+                                                : fmt::format("opens by up to {:.3g} mm, {:.3g} ml between its faces",
+                                                              1e3 * found.largest_opening, 1e6 * cut.opening_volume));
     text += fmt::format("  {} piece{}:", cut.pieces, cut.pieces == 1 ? "" : "s");
     for (const double volume : cut.volumes)
       text += fmt::format(" {:.4g} ml", 1e6 * volume);

@@ -114,7 +114,7 @@ void RunOutput::add(const Session& session, const StepResult& step) {
       check_pieces(session, step.time);
     findings_.cut = *step.cut;
     findings_.largest_opening = std::max(findings_.largest_opening, step.cut->opening);
-    findings_.increments += step.cut->triangles > 0 ? 1 : 0;
+    findings_.increments += step.cut->update != SystemUpdate::none ? 1 : 0; // the blade's; a tear has its own
     findings_.refused_cuts += step.cut->refused ? 1 : 0;
   }
   if (step.tear) {

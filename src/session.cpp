@@ -372,6 +372,17 @@ std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pos
   return missed;
 }
 
+// Below where the surface would be without the tool, m: loads and pretension may have drawn it away.
+double Session::depth_of_press(const topology::SurfaceContact& contact) const {
+  const std::vector<Vector3>& rest = model_.patch.rest;
+  if (rest.empty())
+    return contact.depth;
+  const auto nearest = std::min_element(rest.begin(), rest.end(), [&](const Vector3& a, const Vector3& b) {
+    return (a - contact.point).squaredNorm() < (b - contact.point).squaredNorm();
+  });
+  return contact.depth + contact.normal.dot(model_.patch.base_displacement.segment<3>(3 * (nearest - rest.begin())));
+}
+
 void Session::evaluate(StepResult& result) {
   const StageTimer timer(profile_.evaluate);
   const solvers::ContactState& tool = model_.state->tool;
@@ -403,14 +414,15 @@ void Session::evaluate(StepResult& result) {
     warn("contact", fmt::format("the contact did not converge at t = {:g} s: {:.2g} m of penetration left", result.time,
                                 result.largest_penetration));
   // Where that deep a tip touches one or two nodes, its force is that of these nodes' places.
+  const double depth = touch_ ? depth_of_press(result.contact) : 0;
   if (touch_ && !scenario_.tool->grasp && result.active_nodes < few_in_contact &&
       (result.active_nodes > 0 || model_.incision == nullptr) &&
-      result.contact.depth > deep_press * topology::tip_radius(scenario_.tool->shape))
+      depth > deep_press * topology::tip_radius(scenario_.tool->shape))
     warn("coarse",
          fmt::format("the tool is {:.2g} m deep at t = {:g} s and touches {} of the surface's nodes: {:.2g} m "
                      "between nodes are too coarse for a tip of {:.2g} m; nodes.fine_spacing or nodes.count "
                      "make them finer",
-                     result.contact.depth, result.time, result.active_nodes, zone_.spacing.fine,
+                     depth, result.time, result.active_nodes, zone_.spacing.fine,
                      topology::tip_radius(scenario_.tool->shape)));
   if (!model_.state->lips.converged)
     warn("lips", fmt::format("the contact of the lips did not converge at t = {:g} s", result.time));

@@ -220,6 +220,7 @@ class Session {
   [[nodiscard]] topology::FrontGrowth join_tears(const std::vector<solvers::FrontState>& states) const;
   bool take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report, BodyUpdate& update);
   void report_cut(CutReport& report) const;
+  [[nodiscard]] double depth_of_press(const topology::SurfaceContact& contact) const;
   void evaluate(StepResult& result);
   void evaluate_nodes(StepResult& result);
   void warn(const std::string& key, const std::string& text);

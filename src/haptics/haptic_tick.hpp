@@ -29,11 +29,11 @@ struct TickResult {
 /// tick(state); any other is tick(state). From arrive() on the snapshot before may go.
 ///
 /// At a new snapshot the force goes on from where the old one would have had it, by its last two ticks: the difference
-/// is added and fades linearly within HapticSettings::hand_over. Energy behind a blade counts as stored once the hand
-/// has put it in: a solve that finds more of it is no reason to damp. When the contact leaves the candidates, the patch
-/// is taken along with the tool: the model is asked as if the tool were still at their rim. Of a grasper the force is
-/// that of the last solve; just after the hand has changed what it holds there is none. A device that does not
-/// answer brings the force to zero at the slew limit.
+/// is added and fades linearly within HapticSettings::hand_over. Energy behind a blade, and behind what a tool holds,
+/// counts as stored once the hand has put it in: a solve that finds more of it is no reason to damp. When the contact
+/// leaves the candidates, the patch is taken along with the tool: the model is asked as if the tool were still at their
+/// rim. Of a grasper the force is that of the last solve; just after the hand has changed what it holds there is none.
+/// A device that does not answer brings the force to zero at the slew limit.
 class HapticTick {
  public:
   /// `organ` follows the contact on the surface at rest; null: not followed. Tool and organ must outlive this.

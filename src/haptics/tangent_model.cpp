@@ -482,6 +482,7 @@ ModelForce TangentModel::follow(const topology::ToolPose& pose) noexcept {
   }
   result.active = chosen_count_;
   result.stored = stored;
+  result.found = true; // while the first solve is on its way, the hand drags along without a force
   result.stiffness = stiffness_along(result.force);
   pose_ = pose;
   return result;

@@ -171,6 +171,30 @@ TEST_CASE("A bonded contact goes with the tool and catches what it overtakes") {
   CHECK(force.active > 1);
 }
 
+TEST_CASE("What a hand drags along before the first solve is no energy that the controller takes from it") {
+  HapticSimulation simulation(small("galerkin", "bonded"));
+  const auto place = [](int tick) { return Vector3(4e-5 * tick, 0, 0.0297 - 4e-5 * tick); };
+  simulation.prepare(device_at(0, place(0)));
+  ContactSnapshot late;
+  for (int tick = 0; tick <= 30; ++tick)
+    simulation.solve(device_at(static_cast<std::uint64_t>(tick), place(tick)), 0, late);
+  const HapticSettings settings;
+  HapticTick core(settings, simulation.tool(), nullptr);
+  double largest = 0, damping = 0;
+  for (int tick = 0; tick < 150; ++tick) {
+    if (tick == 30)
+      core.arrive(late);
+    // On its way, then at rest but for the last digit of the sensor.
+    const Vector3 jitter(tick > 60 && tick % 8 < 2 ? settings.limits.resolution : 0, 0, 0);
+    const TickResult result =
+        core.tick(device_at(static_cast<std::uint64_t>(tick), place(std::min(tick, 60)) + jitter));
+    largest = std::max(largest, result.tissue.norm());
+    damping = std::max(damping, (result.force - result.softened * settings.limits.gain * result.tissue).norm());
+  }
+  CHECK(largest > 0.02);
+  CHECK(damping < 0.01 * largest);
+}
+
 TEST_CASE("Around a closed loop at constant contact the tangent model gives no energy, symmetric or not") {
   const auto method = GENERATE(as<std::string>(), "galerkin", "collocation");
   HapticSimulation simulation(small(method));
