@@ -191,6 +191,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN); // a run goes on when nobody reads its progress
+  std::signal(SIGXFSZ, SIG_IGN); // a file over the limit is a disk that takes no more
   app::use_one_blas_thread();
   app::keep_freed_memory();
   try {

@@ -121,14 +121,7 @@ height = 0.010
 )";
 
 /// One that is less deep.
-inline const std::string shallow_notch = R"([[precut]]
-shape = "rectangle"
-centre = [0.0007, -0.008, 0.005]
-normal = [1, 0.03, 0.02]
-up = [0, 1, 0]
-width = 0.02
-height = 0.009
-)";
+inline const std::string shallow_notch = replaced(bar_notch, "height = 0.010", "height = 0.009");
 
 /// A long bar whose front, across its middle, concerns a small part of its nodes.
 inline std::string long_bar(double strain, double toughness, const std::string& more) {
