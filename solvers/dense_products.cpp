@@ -21,18 +21,30 @@ void dgemv_(const char* trans, const int* m, const int* n, const double* alpha, 
 namespace spherecut::solvers {
 
 namespace {
-constexpr int unit = 1; // one column goes without the copies that pay for many
-} // namespace
 
-MatrixX gram(const MatrixX& a) {
-  const int n = static_cast<int>(a.cols()), k = static_cast<int>(a.rows());
+constexpr int unit = 1; // one column goes without the copies that pay for many
+
+/// `of_rows`: A A^T in place of A^T A.
+MatrixX gram(const MatrixX& a, bool of_rows) {
+  const int lda = static_cast<int>(a.rows()), n = static_cast<int>(of_rows ? a.rows() : a.cols()),
+            k = static_cast<int>(of_rows ? a.cols() : a.rows());
   MatrixX product = MatrixX::Zero(n, n);
   if (n == 0 || k == 0)
     return product;
   const double one = 1, none = 0;
-  dsyrk_("L", "T", &n, &k, &one, a.data(), &k, &none, product.data(), &n);
+  dsyrk_("L", of_rows ? "N" : "T", &n, &k, &one, a.data(), &lda, &none, product.data(), &n);
   product.triangularView<Eigen::StrictlyUpper>() = product.transpose();
   return product;
+}
+
+} // namespace
+
+MatrixX gram(const MatrixX& a) {
+  return gram(a, false);
+}
+
+MatrixX gram_of_rows(const MatrixX& a) {
+  return gram(a, true);
 }
 
 void add_product(double factor, const MatrixX& a, bool transposed, const MatrixX& b, MatrixX& c) {
@@ -59,6 +71,23 @@ void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& b)
   }
   const double one = 1;
   dtrsm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower, &lda, b.data(), &rows);
+}
+
+void triangular_solve_from_right(const double* lower, int lda, MatrixX& b) {
+  const int rows = static_cast<int>(b.rows()), columns = static_cast<int>(b.cols());
+  if (rows == 0 || columns == 0)
+    return;
+  const double one = 1;
+  dtrsm_("R", "L", "T", "N", &rows, &columns, &one, lower, &lda, b.data(), &rows);
+}
+
+void product_with_transposed(const MatrixX& a, const double* b, int ldb, int rows, MatrixX& c) {
+  const int m = static_cast<int>(a.rows()), k = static_cast<int>(a.cols());
+  c.resize(m, rows);
+  if (m == 0 || rows == 0)
+    return;
+  const double one = 1, none = 0;
+  dgemm_("N", "T", &m, &rows, &k, &one, a.data(), &m, b, &ldb, &none, c.data(), &m);
 }
 
 void triangular_product(bool transposed, const MatrixX& lower, MatrixX& b) {

@@ -2,6 +2,7 @@
 
 #include "solvers/cholmod_workspace.inl"
 #include "solvers/large_pages.hpp"
+#include "solvers/sparse_compliance.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -201,28 +202,34 @@ class CholeskyFactorisation final : public OrderedCholesky {
   MatrixX forward(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_L, right_hand_sides); }
   MatrixX backward(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_Lt, right_hand_sides); }
   MatrixX trailing(int count) const override {
-    // A supernode is a run of columns that share their rows: px points to its dense panel, pi to its row indices.
-    const int first = static_cast<int>(factor_->n) - count;
+    const SupernodalFactor lower = supernodes();
+    const int first = lower.size - count;
     MatrixX block = MatrixX::Zero(count, count);
-    const int* super = static_cast<const int*>(factor_->super);
-    const int* rows = static_cast<const int*>(factor_->pi);
-    const int* panel = static_cast<const int*>(factor_->px);
-    const int* row_index = static_cast<const int*>(factor_->s);
-    const double* value = static_cast<const double*>(factor_->x);
-    for (std::size_t s = 0; s < factor_->nsuper; ++s) {
-      const int height = rows[s + 1] - rows[s];
-      for (int column = std::max(super[s], first); column < super[s + 1]; ++column) {
-        const double* entries = value + panel[s] + static_cast<long>(column - super[s]) * height;
-        for (int k = column - super[s]; k < height; ++k)
-          block(row_index[rows[s] + k] - first, column - first) = entries[k];
+    for (int s = 0; s < lower.supernodes; ++s) {
+      const int begin = lower.first_column[s], height = lower.first_row[s + 1] - lower.first_row[s];
+      for (int column = std::max(begin, first); column < lower.first_column[s + 1]; ++column) {
+        const double* entries = lower.value + lower.panel[s] + static_cast<long>(column - begin) * height;
+        for (int k = column - begin; k < height; ++k)
+          block(lower.row[lower.first_row[s] + k] - first, column - first) = entries[k];
       }
     }
     return block;
   }
+  MatrixX compliance(const SparseMatrix& columns) const override { return sparse_compliance(supernodes(), columns); }
   MatrixX solve_transposed(const MatrixX& right_hand_sides) const override { return solve(right_hand_sides); }
   long nonzeros() const override { return nonzeros_; }
 
  private:
+  [[nodiscard]] SupernodalFactor supernodes() const {
+    const auto indices = [](const void* array) { return static_cast<const int*>(array); };
+    return {static_cast<int>(factor_->n),
+            static_cast<int>(factor_->nsuper),
+            indices(factor_->super),
+            indices(factor_->pi),
+            indices(factor_->px),
+            indices(factor_->s),
+            static_cast<const double*>(factor_->x)};
+  }
   [[nodiscard]] MatrixX solve_with(int system, const MatrixX& right_hand_sides) const {
     cholmod_dense dense{};
     dense.nrow = static_cast<std::size_t>(right_hand_sides.rows());

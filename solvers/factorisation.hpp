@@ -29,6 +29,8 @@ class OrderedCholesky : public Factorisation {
   /// L^-1 B and L^-T B.
   [[nodiscard]] virtual MatrixX forward(const MatrixX& right_hand_sides) const = 0;
   [[nodiscard]] virtual MatrixX backward(const MatrixX& right_hand_sides) const = 0;
+  /// B^T A^-1 B of sparse columns B.
+  [[nodiscard]] virtual MatrixX compliance(const SparseMatrix& columns) const = 0;
   /// The last `count` rows and columns of L, dense; zeros above the diagonal.
   [[nodiscard]] virtual MatrixX trailing(int count) const = 0;
 };

@@ -11,7 +11,6 @@
 #include "solvers/background_cells.hpp"
 #include "solvers/cell_shapes.hpp"
 #include "solvers/cut_sight.hpp"
-#include "solvers/dense_products.hpp"
 #include "solvers/elastic_body.hpp"
 #include "solvers/elimination_order.hpp"
 #include "solvers/parallel.hpp"
@@ -90,9 +89,16 @@ class Galerkin final : public ElasticBody {
 
   // B^T A^-1 B = (L^-1 B)^T (L^-1 B): half the way of a solution.
   MatrixX contact_compliance(const std::vector<int>& candidates) const override {
-    MatrixX right = unit_forces(candidates);
-    clear_dropped(right);
-    return gram(factorisation_->forward(ordered(right)));
+    SparseMatrix right(report_.unknowns, 3 * std::ssize(candidates));
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int c = 0; c < std::ssize(candidates); ++c) {
+      const DisplacementMean& mean = contact_mean(candidates[c]);
+      for (std::size_t k = 0; k < mean.nodes.size(); ++k)
+        for (int axis = 0; axis < 3 && !is_dropped(mean.nodes[k]); ++axis)
+          entries.emplace_back(3 * rank_[mean.nodes[k]] + axis, 3 * c + axis, mean.weights[k]);
+    }
+    right.setFromTriplets(entries.begin(), entries.end());
+    return factorisation_->compliance(right);
   }
 
   std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override {
@@ -180,6 +186,8 @@ class Galerkin final : public ElasticBody {
   /// The large penalties round off the elastic entries they are added to. One correction, from a residual that keeps
   /// the two apart, takes that back.
   [[nodiscard]] VectorX solve_refined(const VectorX& loads, const VectorX& prescribed) const {
+    if (loads.isZero(0) && prescribed.isZero(0)) // before a tool comes nothing moves many a body
+      return VectorX::Zero(report_.unknowns);
     VectorX coefficients = solve_ordered(loads + constraint_loads(prescribed));
     coefficients += solve_ordered(loads + holding_forces(coefficients, prescribed) - elastic_forces(coefficients));
     return coefficients;

@@ -103,6 +103,15 @@ void BM_condense_collocation(benchmark::State& state) {
   condensation(state, Method::collocation);
 }
 
+/// The compliance alone, as a body has it that the next increment of a cut changes.
+void BM_condense_galerkin_without_fields(benchmark::State& state) {
+  const Case& data = cached_case(Method::galerkin, static_cast<int>(state.range(0)));
+  const auto body = discretise(data.problem, {.method = Method::galerkin});
+  for (auto _ : state)
+    benchmark::DoNotOptimize(condense_without_fields(*body, data.candidates));
+  state.counters["candidates"] = static_cast<double>(data.candidates.size());
+}
+
 void BM_cholesky_900(benchmark::State& state) {
   const int size = 900;
   const MatrixX seed = MatrixX::Random(size, size);
@@ -121,4 +130,5 @@ BENCHMARK(BM_cholesky_900)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_rebuild_galerkin)->Arg(300)->Arg(1000)->Arg(2000)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_rebuild_collocation)->Arg(300)->Arg(1000)->Arg(2000)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_condense_galerkin)->Arg(300)->Arg(1000)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_condense_galerkin_without_fields)->Arg(300)->Arg(1000)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_condense_collocation)->Arg(300)->Arg(1000)->Unit(benchmark::kMillisecond);

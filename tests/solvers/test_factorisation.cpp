@@ -150,6 +150,15 @@ TEST_CASE("A matrix of 3 x 3 blocks is factored as the same matrix without block
   const MatrixX symmetric = blocks * blocks.transpose() + MatrixX::Identity(size, size);
   const MatrixX right = random_right(size, 4), exact = symmetric.llt().solve(right);
   const MatrixX factor = symmetric.llt().matrixL();
+  // Columns that reach little, the end alone, or everything; one of zeros; none.
+  std::vector<SparseMatrix> sparse_columns;
+  for (const int last : {0, 3, 70, 140}) {
+    SparseMatrix columns(size, last);
+    for (int c = 0; c < last; ++c)
+      for (int k = 0; k < c % 5; ++k)
+        columns.coeffRef((c * c + 37 * k) % size, c) = uniform(random);
+    sparse_columns.push_back(columns);
+  }
   // One more unknown that is coupled to nothing is no block: the same factor from the ordinary analysis.
   MatrixX longer = MatrixX::Identity(size + 1, size + 1);
   longer.topLeftCorner(size, size) = symmetric;
@@ -164,6 +173,12 @@ TEST_CASE("A matrix of 3 x 3 blocks is factored as the same matrix without block
     const auto cholesky = solvers::factor_ordered(matrix);
     CHECK(cholesky->nonzeros() + 1 == whole->nonzeros());
     CHECK((cholesky->solve(right) - exact).norm() < 1e-10 * exact.norm());
+    for (const SparseMatrix& columns : sparse_columns) {
+      const MatrixX dense(columns), compliance = cholesky->compliance(columns);
+      const MatrixX truth = dense.transpose() * symmetric.llt().solve(dense);
+      REQUIRE(compliance.rows() == columns.cols());
+      CHECK((compliance - truth).norm() <= 1e-11 * truth.norm());
+    }
     CHECK((cholesky->trailing(100) - factor.bottomRightCorner(100, 100)).norm() < 1e-10 * factor.norm());
   }
   MatrixX indefinite = symmetric;
