@@ -67,10 +67,10 @@ bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, C
       cell.reached[k] |= (std::uint32_t{inside_[k]} & ((1U << here) - 1)) << shape_kernel::points_together * b;
   }
   int count = 0;
+  bool concerned = false;
   for (std::size_t k = 0; k < inside_.size(); ++k)
     if (cell.reached[k] != 0) {
-      if (spheres_.cut() != nullptr && spheres_.cut()->concerns(cell.nodes[k]))
-        return false;
+      concerned = concerned || (spheres_.cut() != nullptr && spheres_.cut()->concerns(cell.nodes[k]));
       cell.nodes[count] = cell.nodes[k];
       cell.reached[count] = cell.reached[k];
       candidates_[count++] = candidates_[k];
@@ -78,15 +78,118 @@ bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, C
   cell.nodes.resize(count);
   cell.reached.resize(count);
   cell.gradients.resize(static_cast<std::size_t>(3 * count) * cell.stride);
+  std::uint32_t altered = 0;
+  if (concerned) {
+    spheres_.cut()->look(points, cell.nodes, cell.reached, view_);
+    altered = view_.altered;
+  }
+  const std::uint32_t all = (std::uint32_t{1} << cell.points) - 1;
+  const int first_plain = std::countr_one(altered);
   for (int b = 0; b < batches; ++b) {
+    const int first = shape_kernel::points_together * b;
+    // A point that the cut alters gives its place to one that weighs nothing, as those in the room that is left do.
+    for (int p = 0; p < shape_kernel::points_together; ++p)
+      if (const int q = first + p; altered != 0 && (q >= cell.points || (altered >> q & 1) != 0)) {
+        const Vector3& x = points[first_plain < cell.points ? first_plain : 0].position;
+        batch[b].x[p] = x.x();
+        batch[b].y[p] = x.y();
+        batch[b].z[p] = x.z();
+        batch[b].factor[p] = 0;
+      }
+    if (((all & ~altered) >> first & 0xff) == 0) {
+      for (int row = 0; row < 3 * count; ++row)
+        std::fill_n(cell.gradients.begin() + static_cast<std::ptrdiff_t>(row) * cell.stride + first,
+                    shape_kernel::points_together, 0.0);
+      continue;
+    }
     alignas(64) std::array<double, shape_kernel::points_together> condition;
-    kernel.gradients_at_points(candidates_.data(), count, batch[b], cell.stride,
-                               cell.gradients.data() + static_cast<std::ptrdiff_t>(shape_kernel::points_together) * b,
+    kernel.gradients_at_points(candidates_.data(), count, batch[b], cell.stride, cell.gradients.data() + first,
                                condition.data());
     for (const double c : condition)
       if (!(c <= spheres_.worst_condition()))
         return false;
   }
+  return altered == 0 || add_altered(points, cell);
+}
+
+bool CellEvaluator::add_altered(std::span<const QuadraturePoint> points, CellShapes& cell) {
+  const CutSight& cut = *spheres_.cut();
+  const shape_kernel::Kernel& kernel = shape_kernel::dispatched();
+  const std::size_t count = cell.nodes.size(), stride = count + SphereGrid::lanes;
+  ids_.resize(stride);
+  coordinates_.resize(4 * stride);
+  hidden_.resize(stride);
+  double* at = coordinates_.data();
+  for (std::uint32_t bits = view_.altered; bits != 0; bits &= bits - 1) {
+    const int q = std::countr_zero(bits);
+    const Vector3& x = points[q].position;
+    const std::uint32_t bit = std::uint32_t{1} << q;
+    ShapeFunctions& shape = at_point_[q];
+    bool sound = false;
+    if ((view_.on_sheet & bit) == 0) {
+      shape_kernel::Support support{0, ids_.data(), at, at + stride, at + 2 * stride, at + 3 * stride};
+      // Every node is written at the end of the list, which moves on only past those that hold the point: no branch.
+      int n = 0;
+      for (std::size_t k = 0; k < count; ++k) {
+        const shape_kernel::Sphere& sphere = candidates_[k];
+        support.ids[n] = cell.nodes[k];
+        support.dx[n] = sphere.x - x.x();
+        support.dy[n] = sphere.y - x.y();
+        support.dz[n] = sphere.z - x.z();
+        support.q[n] = sphere.q;
+        hidden_[n] = static_cast<char>(view_.hidden[k] >> q & 1);
+        n += static_cast<int>(cell.reached[k] >> q & 1);
+      }
+      support.count = n;
+      sound = cut.evaluate_seen(kernel, x, view_.points[q], hidden_, support, spheres_.worst_condition(), shape);
+    }
+    if (!sound && !solvers::evaluate(spheres_, x, shape))
+      return false;
+  }
+
+  for (std::size_t k = 0; k < count; ++k) {
+    cell.reached[k] &= ~view_.altered;
+    place_[cell.nodes[k]] = static_cast<int>(k);
+  }
+  bool within = true;
+  for (std::uint32_t bits = view_.altered; bits != 0; bits &= bits - 1) {
+    const int q = std::countr_zero(bits);
+    const ShapeFunctions& shape = at_point_[q];
+    const double root = std::sqrt(points[q].weight);
+    for (int k = 0; k < shape.size(); ++k) {
+      const int place = place_[shape.nodes[k]];
+      if (place < 0) {
+        within = false;
+        break;
+      }
+      cell.reached[place] |= std::uint32_t{1} << q;
+      double* to = cell.gradients.data() + 3 * static_cast<std::ptrdiff_t>(place) * cell.stride + q;
+      to[0] = root * shape.dx[k];
+      to[cell.stride] = root * shape.dy[k];
+      to[2 * static_cast<std::ptrdiff_t>(cell.stride)] = root * shape.dz[k];
+    }
+  }
+  for (const int node : cell.nodes)
+    place_[node] = -1;
+  if (!within)
+    return false;
+  // Nodes that no point sees have no part in the cell.
+  const std::ptrdiff_t rows = 3 * static_cast<std::ptrdiff_t>(cell.stride);
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (cell.reached[k] == 0)
+      continue;
+    if (kept != k) {
+      cell.nodes[kept] = cell.nodes[k];
+      cell.reached[kept] = cell.reached[k];
+      std::copy_n(cell.gradients.begin() + static_cast<std::ptrdiff_t>(k) * rows, rows,
+                  cell.gradients.begin() + static_cast<std::ptrdiff_t>(kept) * rows);
+    }
+    ++kept;
+  }
+  cell.nodes.resize(kept);
+  cell.reached.resize(kept);
+  cell.gradients.resize(kept * static_cast<std::size_t>(rows));
   return true;
 }
 

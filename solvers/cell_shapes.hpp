@@ -1,8 +1,7 @@
 // Shape function gradients of one background cell of the weak form, the raw material of its stiffness.
 #pragma once
 
-#include "solvers/background_cells.hpp"
-#include "solvers/shape_kernel.hpp"
+#include "solvers/cut_sight.hpp"
 
 #include <cstdint>
 #include <span>
@@ -33,8 +32,10 @@ class CellEvaluator {
   void evaluate(std::span<const QuadraturePoint> points, CellShapes& cell);
 
  private:
-  /// All points at once, where no cut is near and every support is sound; else false.
+  /// All points at once but those whose shape functions a cut alters; false where a support is not sound.
   bool evaluate_together(std::span<const QuadraturePoint> points, CellShapes& cell);
+  /// Adds the points that a cut alters; false where a support is not sound or has grown beyond the nodes of the cell.
+  bool add_altered(std::span<const QuadraturePoint> points, CellShapes& cell);
   void evaluate_each(std::span<const QuadraturePoint> points, CellShapes& cell);
 
   const Spheres& spheres_;
@@ -42,6 +43,11 @@ class CellEvaluator {
   std::vector<std::uint64_t> marked_; // a bit of every node, all 0 between calls
   std::vector<shape_kernel::Sphere> candidates_;
   std::vector<std::uint8_t> inside_;
+  CellView view_;
+  // The support of one point, and which of its nodes are hidden; room for one entry beyond the last.
+  std::vector<int> ids_;
+  std::vector<double> coordinates_;
+  std::vector<char> hidden_;
   std::array<ShapeFunctions, most_cell_points> at_point_;
 };
 

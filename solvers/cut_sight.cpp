@@ -7,9 +7,8 @@
 #include "topology/lip_lift.hpp"
 #include "topology/point_tree.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
@@ -32,19 +31,21 @@ constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nea
 constexpr double flattest = 1e-6;
 constexpr double largest_growth = 2.5; // of a sphere at a point, 1.25^4
 
-/// Everything about the support of one point, node by node.
+/// Everything about the support of one point, node by node, with room for whole registers.
 struct Scratch {
-  std::vector<double> weight;
-  std::vector<Vector3> weight_gradient;
-  std::vector<std::array<double, enriched_size>> basis; // P_j
-  ShapeFunctions other;                                 // the second of two that are blended
+  std::vector<char> hidden; // does not see the point
+  std::vector<double> room;
+  std::size_t stride = 0;
   void resize(std::size_t n) {
-    if (weight.size() >= n)
+    const std::size_t padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
+    if (stride >= padded)
       return;
-    weight.resize(n);
-    weight_gradient.resize(n);
-    basis.resize(n);
+    stride = padded;
+    room.resize((4 + enriched_size - 1) * stride);
   }
+  double* weight() { return room.data(); }
+  double* weight_gradient(int axis) { return room.data() + static_cast<std::ptrdiff_t>(1 + axis) * stride; }
+  double* basis(int i) { return room.data() + static_cast<std::ptrdiff_t>(3 + i) * stride; } // from 1 on
 };
 
 Scratch& scratch_of_this_thread() {
@@ -55,69 +56,11 @@ Scratch& scratch_of_this_thread() {
 using Clock = std::chrono::steady_clock;
 thread_local Clock::duration sight_time{};
 
-/// The moving least squares problem on the first `size` basis functions. `slope` holds the derivatives of P at x. The
-/// arrays of `out` have n entries. Returns the 1-norm condition of the moment matrix scaled to a unit diagonal.
-template <int size>
-double solve_moments(const Scratch& s, int n, const Eigen::Matrix<double, size, 3>& slope, ShapeFunctions& out) {
-  using Vector = Eigen::Matrix<double, size, 1>;
-  using Matrix = Eigen::Matrix<double, size, size>;
-  const auto row = [&](int j) { return Eigen::Map<const Vector>(s.basis[j].data()); };
-  Matrix a = Matrix::Zero();
-  for (int j = 0; j < n; ++j) {
-    const Vector p = row(j);
-    a.noalias() += (s.weight[j] * p) * p.transpose();
-  }
-  const Vector diagonal = a.diagonal();
-  if (!(diagonal.minCoeff() > 0))
-    return std::numeric_limits<double>::infinity();
-  const Eigen::Vector3d mean = a.template block<3, 1>(1, 0) / a(0, 0);
-  const Matrix3 spread = a.template block<3, 3>(1, 1) - a(0, 0) * mean * mean.transpose();
-  if (const double even = spread.trace() / 3; !(spread.determinant() > flattest * even * even * even))
-    return std::numeric_limits<double>::infinity();
-  const Vector scale = diagonal.cwiseSqrt().cwiseInverse();
-  a = scale.asDiagonal() * a * scale.asDiagonal();
-  const Eigen::LLT<Matrix> factor(a);
-  if (factor.info() != Eigen::Success)
-    return std::numeric_limits<double>::infinity();
-  const Matrix inverse = factor.solve(Matrix::Identity());
-  const double condition = a.cwiseAbs().colwise().sum().maxCoeff() * inverse.cwiseAbs().colwise().sum().maxCoeff();
-
-  // A c = P(x) = e_0 and, with the frame and the branch functions' linear parts fixed at x, A c_k = P,k - A,k c.
-  const Vector c = scale[0] * scale.cwiseProduct(inverse.col(0));
-  Eigen::Matrix<double, size, 3> right = slope;
-  for (int j = 0; j < n; ++j) {
-    const Vector p = row(j);
-    const double pc = p.dot(c);
-    out.value[j] = s.weight[j] * pc;
-    right.noalias() -= p * (pc * s.weight_gradient[j]).transpose();
-  }
-  const Eigen::Matrix<double, size, 3> c1 = scale.asDiagonal() * (inverse * (scale.asDiagonal() * right));
-  for (int j = 0; j < n; ++j) {
-    const Vector p = row(j);
-    const Vector3 gradient = p.dot(c) * s.weight_gradient[j] + s.weight[j] * (c1.transpose() * p);
-    out.dx[j] = gradient.x();
-    out.dy[j] = gradient.y();
-    out.dz[j] = gradient.z();
-  }
-  return condition;
-}
-
 void resize(ShapeFunctions& out, int n) {
   for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
     array->resize(n);
   for (std::vector<double>* array : {&out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz})
     array->clear();
-}
-
-/// out = share * out + (1 - share) * other, with the gradient of the share.
-void blend(ShapeFunctions& out, const ShapeFunctions& other, double share, const Vector3& share_gradient) {
-  for (std::size_t k = 0; k < out.value.size(); ++k) {
-    const double difference = out.value[k] - other.value[k];
-    out.value[k] = share * out.value[k] + (1 - share) * other.value[k];
-    out.dx[k] = share * out.dx[k] + (1 - share) * other.dx[k] + share_gradient.x() * difference;
-    out.dy[k] = share * out.dy[k] + (1 - share) * other.dy[k] + share_gradient.y() * difference;
-    out.dz[k] = share * out.dz[k] + (1 - share) * other.dz[k] + share_gradient.z() * difference;
-  }
 }
 
 } // namespace
@@ -258,10 +201,81 @@ Vector3 CutSight::off_the_sheet(const Vector3& x) const {
   return x;
 }
 
+void CutSight::look(std::span<const QuadraturePoint> points, std::span<const int> nodes,
+                    std::span<const std::uint32_t> reached, CellView& view) const {
+  const Clock::time_point begin = Clock::now();
+  const topology::Incision& incision = *sight_.incision;
+  Vector3 lower = points.front().position, upper = lower;
+  for (const QuadraturePoint& point : points) {
+    lower = lower.cwiseMin(point.position);
+    upper = upper.cwiseMax(point.position);
+  }
+  const Vector3 centre = 0.5 * (lower + upper), half = 0.5 * (upper - lower);
+  view.hidden.assign(nodes.size(), 0);
+  view.points.assign(points.size(), {});
+  view.altered = view.on_sheet = 0;
+  if (const double off = 0.1 * sheet_clearance * smallest_radius_; incision.near(centre, half.norm() + off))
+    for (std::size_t q = 0; q < points.size(); ++q)
+      if (off_the_sheet(points[q].position) != points[q].position)
+        view.on_sheet |= std::uint32_t{1} << q;
+
+  std::uint32_t lifted = 0; // bit q: the eye of point q is known
+  double largest_radius = 0;
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const int id = nodes[k];
+    largest_radius = std::max(largest_radius, known_radii_[id]);
+    if ((concern_[id] & touches_sheet) == 0)
+      continue;
+    const topology::Eye& eye = eyes_[id];
+    view.walls.clear();
+    incision.walls_between(centre, half, eye.at, view.walls);
+    if (view.walls.empty())
+      continue;
+    for (std::uint32_t bits = reached[k] & ~view.on_sheet; bits != 0; bits &= bits - 1) {
+      const int q = std::countr_zero(bits);
+      const std::uint32_t bit = std::uint32_t{1} << q;
+      const Vector3& x = points[q].position;
+      if (!incision.blocks(x, eye.at, view.walls))
+        continue;
+      if ((lifted & bit) == 0) {
+        double smallest_radius = std::numeric_limits<double>::infinity();
+        for (std::size_t j = 0; j < nodes.size(); ++j)
+          if ((reached[j] & bit) != 0)
+            smallest_radius = std::min(smallest_radius, known_radii_[nodes[j]]);
+        view.points[q].eye = topology::eye_at(incision, x, smallest_radius);
+        lifted |= bit;
+      }
+      if (incision.hides_blocked(view.points[q].eye, eye)) {
+        view.hidden[k] |= bit;
+        view.altered |= bit;
+      }
+    }
+  }
+  view.altered |= view.on_sheet;
+
+  if (!front_spacing_.empty()) {
+    const bool may_enrich =
+        sight_.rule == SightRule::enriched && incision.front_frame(centre, longest_reach_ + half.norm());
+    for (std::size_t q = 0; q < points.size(); ++q) {
+      const std::uint32_t bit = std::uint32_t{1} << q;
+      const bool bends = (view.altered & ~view.on_sheet & bit) != 0;
+      if ((view.on_sheet & bit) != 0 || (!may_enrich && !bends))
+        continue;
+      const Vector3& x = points[q].position;
+      std::optional<FrontFrame>& front = view.points[q].front;
+      front = incision.front_frame(x, std::max(may_enrich ? longest_reach_ : 0, bends ? largest_radius : 0));
+      if (may_enrich && front && front->distance < reach_at(x, *front).length)
+        view.altered |= bit;
+    }
+  }
+  sight_time += Clock::now() - begin;
+}
+
 bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Support& support, bool grown, bool second,
                         int spare, double worst_condition, Enrich enrich, ShapeFunctions& out) const {
   if (support.count == 0)
     return false;
+  const Clock::time_point looked = Clock::now();
   const topology::Incision& incision = *sight_.incision;
   const bool bends = sight_.rule != SightRule::visibility && !front_spacing_.empty();
   double smallest_q = support.q[0], largest_q = support.q[0];
@@ -271,16 +285,43 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
   }
   const double largest_radius = 1 / std::sqrt(smallest_q);
   const bool may_hide = incision.near(x, largest_radius);
-  const topology::Eye eye = may_hide ? topology::eye_at(incision, x, 1 / std::sqrt(largest_q)) : topology::Eye(x);
+  PointView view;
+  view.eye = may_hide ? topology::eye_at(incision, x, 1 / std::sqrt(largest_q)) : topology::Eye(x);
   const bool may_enrich = bends && sight_.rule == SightRule::enriched && enrich == Enrich::where_near && !second;
-  std::optional<FrontFrame> front;
-  const Clock::time_point looked = Clock::now();
   if (bends && (may_enrich || may_hide))
-    front = incision.front_frame(x, std::max(may_enrich ? longest_reach_ : 0, may_hide ? largest_radius : 0));
+    view.front = incision.front_frame(x, std::max(may_enrich ? longest_reach_ : 0, may_hide ? largest_radius : 0));
+  std::vector<char>& hidden = scratch_of_this_thread().hidden;
+  hidden.resize(support.count);
+  for (int k = 0; k < support.count; ++k) {
+    const int id = support.ids[k];
+    hidden[k] =
+        may_hide && (grown || (concern_[id] & touches_sheet) != 0) && incision.hides(view.eye, eyes_[id]) ? 1 : 0;
+  }
+  sight_time += Clock::now() - looked;
+  return evaluate_seen(kernel, x, view, hidden, {second, may_enrich, spare, worst_condition}, support, out);
+}
+
+bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
+                             std::span<const char> hidden, Support& support, double worst_condition,
+                             ShapeFunctions& out) const {
+  return evaluate_seen(kernel, x, view, hidden, {false, sight_.rule == SightRule::enriched, 0, worst_condition},
+                       support, out);
+}
+
+bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
+                             std::span<const char> hidden, const Wanted& wanted, Support& support,
+                             ShapeFunctions& out) const {
+  const topology::Incision& incision = *sight_.incision;
+  const std::optional<FrontFrame>& front = view.front;
+  const auto [second, may_enrich, spare, worst_condition] = wanted;
+  const Clock::time_point looked = Clock::now();
 
   // Nodes in sight and around the front move to the head of the support; the way and its direction give their weights.
   Scratch& scratch = scratch_of_this_thread();
   scratch.resize(support.count);
+  double* weight = scratch.weight();
+  const std::array<double*, 3> weight_gradient{scratch.weight_gradient(0), scratch.weight_gradient(1),
+                                               scratch.weight_gradient(2)};
   int n = 0;
   bool bent = false;
   for (int k = 0; k < support.count; ++k) {
@@ -289,11 +330,11 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
     const double q = support.q[k];
     Vector3 direction = -d; // gradient of the way, times its length
     double way = 0;         // 0: straight
-    if (may_hide && (grown || (concern_[id] & touches_sheet) != 0) && incision.hides(eye, eyes_[id])) {
+    if (hidden[k] != 0) {
       const double radius = 1 / std::sqrt(q);
       if (!front || front->distance + front_distance_[id] >= radius)
         continue;
-      const auto detour = incision.detour(eye, eyes_[id], radius);
+      const auto detour = incision.detour(view.eye, eyes_[id], radius, front->segment);
       if (!detour || detour->length >= radius)
         continue;
       way = detour->length;
@@ -303,8 +344,9 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
       bent = true;
     }
     const double s = (way > 0 ? way : d.norm()) * std::sqrt(q), t = 1 - s;
-    scratch.weight[n] = t * t * t * (1 + 3 * s);
-    scratch.weight_gradient[n] = -12 * t * t * q * direction;
+    weight[n] = t * t * t * (1 + 3 * s);
+    for (int axis = 0; axis < 3; ++axis)
+      weight_gradient[axis][n] = -12 * t * t * q * direction[axis];
     support.ids[n] = id;
     support.dx[n] = d.x();
     support.dy[n] = d.y();
@@ -330,43 +372,54 @@ bool CutSight::evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, Su
     return false;
 
   const double scale = std::sqrt(support.q[0]);
-  for (int k = 0; k < n; ++k) {
-    scratch.basis[k][0] = 1;
-    scratch.basis[k][1] = scale * support.dx[k];
-    scratch.basis[k][2] = scale * support.dy[k];
-    scratch.basis[k][3] = scale * support.dz[k];
+  const int padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
+  for (int k = n; k < padded; ++k) {
+    weight[k] = support.dx[k] = support.dy[k] = support.dz[k] = 0;
+    for (double* gradient : weight_gradient)
+      gradient[k] = 0;
   }
-  Eigen::Matrix<double, plain_size, 3> plain_slope = Eigen::Matrix<double, plain_size, 3>::Zero();
-  plain_slope.bottomRows<3>() = scale * Matrix3::Identity();
-  if (!enriched) {
-    resize(out, n);
-    out.moment_condition = solve_moments<plain_size>(scratch, n, plain_slope, out);
-  } else {
+  shape_kernel::Moments moments{};
+  moments.count = n;
+  moments.weight = weight;
+  moments.slope = scale;
+  moments.share = 1;
+  moments.flattest = flattest;
+  for (int axis = 0; axis < 3; ++axis) {
+    moments.weight_gradient[axis] = weight_gradient[axis];
+    const double* d = axis == 0 ? support.dx : axis == 1 ? support.dy : support.dz;
+    double* to = scratch.basis(1 + axis);
+    for (int k = 0; k < padded; ++k)
+      to[k] = scale * d[k];
+    moments.basis[axis] = to;
+  }
+  if (enriched) {
+    moments.enriched = true;
     const Branch here = branch_at(incision, *front, x);
     const double r = std::hypot((x - front->point).dot(front->ahead), (x - front->point).dot(front->normal));
     const bool smooth = r * scale > 0.5;
-    Eigen::Matrix<double, enriched_size, 3> slope = Eigen::Matrix<double, enriched_size, 3>::Zero();
-    slope.topRows<plain_size>() = plain_slope;
-    for (int e = 0; e < 4; ++e)
-      if (!smooth)
-        slope.row(plain_size + e) = here.gradient[e].transpose();
-    for (int k = 0; k < n; ++k) {
-      const Branch& there = branch_[support.ids[k]];
-      const Vector3 d(support.dx[k], support.dy[k], support.dz[k]);
-      for (int e = 0; e < 4; ++e)
-        scratch.basis[k][plain_size + e] = there.value[e] - here.value[e] - (smooth ? here.gradient[e].dot(d) : 0.0);
+    for (int e = 0; e < 4; ++e) {
+      double* to = scratch.basis(plain_size + e);
+      const Vector3 linear = smooth ? here.gradient[e] : Vector3::Zero();
+      for (int k = 0; k < n; ++k)
+        to[k] = branch_[support.ids[k]].value[e] - here.value[e] -
+                (linear.x() * support.dx[k] + linear.y() * support.dy[k] + linear.z() * support.dz[k]);
+      std::fill(to + n, to + padded, 0.0);
+      moments.basis[plain_size - 1 + e] = to;
+      for (int axis = 0; axis < 3 && !smooth; ++axis)
+        moments.branch_slope[e][axis] = here.gradient[e][axis];
     }
-    resize(out, n);
-    out.moment_condition = solve_moments<enriched_size>(scratch, n, slope, out);
-    if (out.moment_condition <= worst_condition && front->distance > sight_.blend * reach) {
-      ShapeFunctions& plain = scratch.other;
-      resize(plain, n);
-      solve_moments<plain_size>(scratch, n, plain_slope, plain);
+    if (front->distance > sight_.blend * reach) {
       const double width = (1 - sight_.blend) * reach, t = (reach - front->distance) / width;
       const Vector3 nearness = (front->distance / reach) * around.gradient - (x - front->point) / front->distance;
-      blend(out, plain, t * t * (3 - 2 * t), Vector3((6 * t * (1 - t) / width) * nearness));
+      moments.share = t * t * (3 - 2 * t);
+      for (int axis = 0; axis < 3; ++axis)
+        moments.share_gradient[axis] = 6 * t * (1 - t) / width * nearness[axis];
     }
   }
+  resize(out, padded);
+  out.moment_condition =
+      kernel.solve_moments(moments, {out.value.data(), out.dx.data(), out.dy.data(), out.dz.data(), {}});
+  resize(out, n);
   if (!(out.moment_condition <= worst_condition))
     return false;
   out.nodes.assign(support.ids, support.ids + n);

@@ -2,6 +2,7 @@
 // that is enriched there.
 #pragma once
 
+#include "solvers/background_cells.hpp"
 #include "solvers/shape_kernel.hpp"
 #include "solvers/sight.hpp"
 
@@ -17,6 +18,21 @@ struct Branch {
   std::array<Vector3, 4> gradient{}; // 1/sqrt(m); the turning of the frame along a curved front is left out
 };
 Branch branch_at(const topology::Incision& incision, const topology::FrontFrame& frame, const Vector3& x);
+
+/// What a point sees around it.
+struct PointView {
+  topology::Eye eye{Vector3::Zero()};        // known where nodes are hidden
+  std::optional<topology::FrontFrame> front; // nearest, where it may matter
+};
+
+/// What the points of one background cell see of the nodes around it.
+struct CellView {
+  std::vector<std::uint32_t> hidden; // per node of the cell, bit q: it does not see point q
+  std::uint32_t altered = 0;         // bit q: the cut alters the shape functions at point q
+  std::uint32_t on_sheet = 0;        // bit q: point q lies on a sheet, what it sees is not known; altered, too
+  std::vector<PointView> points;     // of those that are altered
+  std::vector<int> walls;            // memory of the search
+};
 
 /// What the spheres of a node cloud know of the cut. Immutable once built; queries are thread safe and do not allocate
 /// once warm.
@@ -45,12 +61,24 @@ class CutSight {
   /// x, or a point 1e-6 radii off the sheet on its + side where x lies on it.
   [[nodiscard]] Vector3 off_the_sheet(const Vector3& x) const;
 
+  /// Looks around from all points of a cell at once: `nodes` are those whose spheres, as known here, hold any of them,
+  /// and bit q of `reached` tells of the k-th that it holds point q. Only what may stand between a node and the box of
+  /// the points is looked at point by point.
+  void look(std::span<const QuadraturePoint> points, std::span<const int> nodes, std::span<const std::uint32_t> reached,
+            CellView& view) const;
+
   enum class Enrich { where_near, never };
   /// Shape functions at x on the nodes of `support` (all whose spheres hold x, sizes included; it is overwritten). With
   /// `grown` set the spheres are larger than the ones known here. False as shape_kernel::evaluate_support, or with
   /// fewer nodes than basis functions + `spare`.
   bool evaluate(const shape_kernel::Kernel& kernel, const Vector3& x, shape_kernel::Support& support, bool grown,
                 bool second, int spare, double worst_condition, Enrich enrich, ShapeFunctions& out) const;
+
+  /// The same with first derivatives for a point that has looked around: the k-th node of the support is hidden from it
+  /// where hidden[k] is not 0.
+  bool evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
+                     std::span<const char> hidden, shape_kernel::Support& support, double worst_condition,
+                     ShapeFunctions& out) const;
 
  private:
   enum : std::uint8_t { touches_sheet = 1, near_front = 2 };
@@ -60,6 +88,14 @@ class CutSight {
     double length = 0; // m
     Vector3 gradient = Vector3::Zero();
   };
+  struct Wanted {
+    bool second, enriched;
+    int spare;
+    double worst_condition;
+  };
+  bool evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
+                     std::span<const char> hidden, const Wanted& wanted, shape_kernel::Support& support,
+                     ShapeFunctions& out) const;
   [[nodiscard]] EnrichedReach reach_at(const Vector3& x, const topology::FrontFrame& frame) const;
 
   Sight sight_;

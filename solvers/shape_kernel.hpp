@@ -37,6 +37,21 @@ struct Points {
   alignas(64) double x[points_together], y[points_together], z[points_together], factor[points_together];
 };
 
+/// Moving least squares of one point near a cut, whose weights follow ways around its front. Arrays have room for a
+/// multiple of SphereGrid::lanes; up to there the weights and their gradients are 0 and the basis functions finite.
+struct Moments {
+  int count;
+  const double* weight;
+  const double* weight_gradient[3]; // 1/m
+  const double* basis[7];           // those after the constant: d / l, and with `enriched` b_1 .. b_4
+  bool enriched;
+  double slope;              // 1/m, of the first three along their axes
+  double branch_slope[4][3]; // 1/m, of b_1 .. b_4
+  double share;              // of the enriched shape functions, the rest are plain ones; 0 to 1
+  double share_gradient[3];  // 1/m
+  double flattest;           // least product of the principal spreads of the support over that of a ball, squares
+};
+
 struct Kernel {
   const char* name;
   int width; // doubles per register
@@ -54,6 +69,9 @@ struct Kernel {
   /// as evaluate_linear gives it. `spheres` are all that hold any of the points.
   void (*gradients_at_points)(const Sphere* spheres, int count, const Points& points, int stride, double* gradients,
                               double* condition);
+  /// Returns the 1-norm condition of the moment matrix scaled to a unit diagonal (of the enriched one where it counts);
+  /// infinite, with outputs that mean nothing, where it is singular. LinearOutput::second is not used.
+  double (*solve_moments)(const Moments& moments, const LinearOutput& output);
 };
 
 /// Runs everywhere.

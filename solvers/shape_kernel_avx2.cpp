@@ -79,13 +79,15 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
 
 #include "solvers/shape_kernel_lanes.inl"
 
+#include "solvers/shape_kernel_moments.inl"
+
 } // namespace
 
 #pragma GCC pop_options
 
 const Kernel* avx2() {
   static constexpr Kernel kernel{
-      "avx2", width, collect, evaluate<false>, evaluate<true>, find_inside, gradients_at_points};
+      "avx2", width, collect, evaluate<false>, evaluate<true>, find_inside, gradients_at_points, solve_moments};
   return &kernel;
 }
 

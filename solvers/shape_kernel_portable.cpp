@@ -50,11 +50,13 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
 
 #include "solvers/shape_kernel_lanes.inl"
 
+#include "solvers/shape_kernel_moments.inl"
+
 } // namespace
 
 const Kernel& portable() {
-  static constexpr Kernel kernel{"portable",         width, collect, evaluate<false>, evaluate<true>, find_inside,
-                                 gradients_at_points};
+  static constexpr Kernel kernel{
+      "portable", width, collect, evaluate<false>, evaluate<true>, find_inside, gradients_at_points, solve_moments};
   return kernel;
 }
 

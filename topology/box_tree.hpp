@@ -29,6 +29,10 @@ class BoxTree {
   template <class Hit>
   [[nodiscard]] bool any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const;
 
+  /// Calls visit(place) for every primitive whose box may meet a segment from a point of the box centre +- half to y.
+  template <class Visit>
+  void for_all_between(const Vector3& centre, const Vector3& half, const Vector3& y, const Visit& visit) const;
+
   /// Visits primitives in about the order of bound(boxes), lower bounds of the cost of anything in each of four boxes,
   /// and skips the boxes whose bound is above the best cost so far.
   /// `visit(place, best)` returns the cost of a primitive if it is below `best`, else `best`. Returns the least cost.
@@ -114,6 +118,49 @@ bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit)
     }
   }
   return false;
+}
+
+template <class Visit>
+void BoxTree::for_all_between(const Vector3& centre, const Vector3& half, const Vector3& y, const Visit& visit) const {
+  const Vector3 lower = y.cwiseMin(centre - half), upper = y.cwiseMax(centre + half);
+  if (empty() || (lower.array() > bounds_.upper.array()).any() || (upper.array() < bounds_.lower.array()).any())
+    return;
+  // Separating axes of a box and the hull of the box of points (centre c, half extent h) and y: as of a segment, whose
+  // projections are longer by those of the box of points; along the cross products the whole hull projects as that box.
+  const Eigen::Vector3f c = (centre - origin_).cast<float>(), h = half.cast<float>(), end = (y - origin_).cast<float>();
+  const Eigen::Vector3f m = (0.5 * (lower + upper) - origin_).cast<float>(),
+                        reach = (0.5 * (upper - lower)).cast<float>();
+  const Eigen::Vector3f e = (0.5 * (y - centre)).cast<float>(), turned = e.cwiseAbs();
+  const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
+  const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
+  std::array<int, stack_size> stack;
+  int height = 0;
+  stack[height++] = 0;
+  while (height > 0) {
+    const Node& node = nodes_[stack[--height]];
+    const auto& n = node.across;
+    const Four at_end = n[0] * end[0] + n[1] * end[1] + n[2] * end[2] - node.height;
+    const Four at_centre = n[0] * c[0] + n[1] * c[1] + n[2] * c[2] - node.height;
+    const Four spread = n[0].abs() * h[0] + n[1].abs() * h[1] + n[2].abs() * h[2];
+    Four apart = at_end.min(at_centre - spread).max(-at_end.max(at_centre + spread)) - node.thickness - 2 * margin;
+    const auto& [middle, extent] = node.boxes;
+    apart = apart.max((middle[0] - m[0]).abs() - extent[0] - (reach[0] + margin));
+    apart = apart.max((middle[1] - m[1]).abs() - extent[1] - (reach[1] + margin));
+    apart = apart.max((middle[2] - m[2]).abs() - extent[2] - (reach[2] + margin));
+    const Four u = middle[0] - c[0], v = middle[1] - c[1], w = middle[2] - c[2];
+    const Four a = extent[0] + h[0], b = extent[1] + h[1], d = extent[2] + h[2];
+    apart = apart.max((v * e[2] - w * e[1]).abs() - b * turned[2] - d * turned[1] - cross_margin);
+    apart = apart.max((w * e[0] - u * e[2]).abs() - d * turned[0] - a * turned[2] - cross_margin);
+    apart = apart.max((u * e[1] - v * e[0]).abs() - a * turned[1] - b * turned[0] - cross_margin);
+    for (int child = 0; child < node.children; ++child) {
+      if (apart[child] > 0)
+        continue;
+      if (node.count[child] == 0)
+        stack[height++] = node.first[child];
+      for (int place = node.first[child]; place < node.first[child] + node.count[child]; ++place)
+        visit(place);
+    }
+  }
 }
 
 template <class Bound, class Visit>

@@ -51,6 +51,13 @@ struct Wall {
     return u >= -slack && v >= -slack && u + v <= 1 + slack;
   }
 
+  /// Whether y and the box centre +- half lie on one side of the plane, further off than heights count as on it.
+  [[nodiscard]] bool is_beside(const Vector3& centre, const Vector3& half, const Vector3& y, double flat) const {
+    const double at_y = normal.dot(y) - height, at_centre = normal.dot(centre) - height;
+    const double spread = normal.cwiseAbs().dot(half);
+    return std::min(at_y, at_centre - spread) > 2 * flat || std::max(at_y, at_centre + spread) < -2 * flat;
+  }
+
   [[nodiscard]] bool meets_in_plane(const Vector3& p, const Vector3& q, double slack) const {
     const double u_p = along_u.dot(p) - u_offset, v_p = along_v.dot(p) - v_offset;
     const double u_q = along_u.dot(q) - u_offset, v_q = along_v.dot(q) - v_offset;
@@ -143,7 +150,9 @@ struct Incision::Data {
     for (const FrontPiece& piece : pieces) {
       const auto& [from, to, sheet] = piece.segment;
       front.push_back(piece.segment);
-      front_length += (to - from).norm();
+      const double length = (to - from).norm();
+      front_lines.push_back({(to - from) / length, length});
+      front_length += length;
       boxes.push_back({from.cwiseMin(to), from.cwiseMax(to)});
     }
     front_tree = BoxTree(boxes);
@@ -189,6 +198,11 @@ struct Incision::Data {
   std::vector<BorderFlags> border_flags;
   std::vector<FrontPiece> pieces;
   std::vector<FrontSegment> front;
+  struct Line {
+    Vector3 direction; // unit
+    double length;     // m
+  };
+  std::vector<Line> front_lines; // of the segments
   BoxTree front_tree;
   double front_length = 0; // m
   mutable std::once_flag area_known;
@@ -225,6 +239,27 @@ double Incision::area() const {
 
 bool Incision::blocks(const Vector3& a, const Vector3& b) const {
   return data_->blocks(a, b);
+}
+
+void Incision::walls_between(const Vector3& centre, const Vector3& half, const Vector3& y,
+                             std::vector<int>& walls) const {
+  const Data& data = *data_;
+  const Vector3 from = centre - data.tree.origin(), to = y - data.tree.origin();
+  data.tree.for_all_between(centre, half, y, [&](int place) {
+    if (!data.walls[place].is_beside(from, half, to, data.flat))
+      walls.push_back(place);
+  });
+}
+
+bool Incision::blocks(const Vector3& a, const Vector3& b, std::span<int> walls) const {
+  const Data& data = *data_;
+  const Vector3 p = a - data.tree.origin(), q = b - data.tree.origin();
+  for (int& place : walls)
+    if (data.walls[place].meets(p, q, data.flat)) {
+      std::swap(place, walls.front()); // mostly it blocks the next segment, too
+      return true;
+    }
+  return false;
 }
 
 bool Incision::near(const Vector3& x, double radius) const {
@@ -317,13 +352,15 @@ FrontFrame Incision::front_frame_at(int segment, double share) const {
 }
 
 bool Incision::hides(const Eye& x, const Eye& y) const {
-  if (!data_->blocks(x.at, y.at))
-    return false;
+  return data_->blocks(x.at, y.at) && hides_blocked(x, y);
+}
+
+bool Incision::hides_blocked(const Eye& x, const Eye& y) const {
   // Only points at a face can be hidden by its bulge.
   return (!x.on_face() && !y.on_face()) || data_->blocks(x.lifted, y.lifted);
 }
 
-std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach) const {
+std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach, int first) const {
   const Data& data = *data_;
   // A cut made in small steps is rough: from a point on its face the front hides behind bumps much lower than the
   // sheet is wide. Lifted off the face it looks at a place a little ahead of the front, where both sides meet; by so
@@ -345,16 +382,17 @@ std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach)
   const auto shortest = [&](const auto& accept) {
     Detour detour;
     bool found = false;
-    const double beyond = std::nextafter(reach, std::numeric_limits<double>::infinity());
-    detour.length = data.front_tree.least(beyond, bound, [&](int place, double best) {
-      const int segment = data.front_tree.order()[place];
+    const auto look_at = [&](int segment, double best) {
       const auto& [from, to, sheet] = data.front[segment];
       // Unfolded about the segment's line x and y lie on either side of it; the way crosses it on a straight line.
-      const double length = (to - from).norm();
-      const Vector3 direction = (to - from) / length;
+      const auto& [direction, length] = data.front_lines[segment];
       const Vector3 to_x = x.at - from, to_y = y.at - from;
       const double along_x = direction.dot(to_x), along_y = direction.dot(to_y);
       const double off_x = (to_x - along_x * direction).norm(), off_y = (to_y - along_y * direction).norm();
+      // No way over the whole line is shorter than that.
+      const double sum = off_x + off_y, shift = along_x - along_y;
+      if ((sum * sum + shift * shift) * (1 - 1e-12) > best * best)
+        return best;
       const double crossing = off_x + off_y > 0 ? (along_x * off_y + along_y * off_x) / (off_x + off_y) : along_x;
       const double share = std::clamp(crossing / length, 0.0, 1.0);
       const Vector3 over = from + share * (to - from);
@@ -364,7 +402,11 @@ std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach)
       detour.over = over;
       found = true;
       return way;
-    });
+    };
+    const double beyond = std::nextafter(reach, std::numeric_limits<double>::infinity());
+    detour.length =
+        data.front_tree.least(first >= 0 ? look_at(first, beyond) : beyond, bound,
+                              [&](int place, double best) { return look_at(data.front_tree.order()[place], best); });
     return found ? std::optional(detour) : std::nullopt;
   };
   // Mostly the shortest way of all is clear: then no other need be looked at.

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 
 namespace spherecut::topology {
 
@@ -73,6 +74,14 @@ class Incision {
   /// Whether the closed segment from a to b meets a sheet (touching counts).
   [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b) const;
 
+  /// Appends to `walls` the triangles that may meet a segment from some point of the box centre +- half, m, to y, as
+  /// numbers for the next query. When there are none no such segment is blocked.
+  void walls_between(const Vector3& centre, const Vector3& half, const Vector3& y, std::vector<int>& walls) const;
+
+  /// What blocks(a, b) says, for a in a box whose walls before b are given; changes their order, the one that blocks
+  /// comes first.
+  [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b, std::span<int> walls) const;
+
   /// False when no sheet comes nearer to x than `radius` m: then no sight line inside that ball is blocked. May be true
   /// without need. A few nanoseconds far from the sheets.
   [[nodiscard]] bool near(const Vector3& x, double radius) const;
@@ -90,9 +99,13 @@ class Incision {
   /// Whether the sheets hide two eyes from each other.
   [[nodiscard]] bool hides(const Eye& x, const Eye& y) const;
 
+  /// The same for eyes the straight segment between which is known to be blocked.
+  [[nodiscard]] bool hides_blocked(const Eye& x, const Eye& y) const;
+
   /// Shortest detour around the front no longer than `reach` m, both of whose legs are clear; nullopt when there is
-  /// none. Meant for x and y that do not see each other.
-  [[nodiscard]] std::optional<Detour> detour(const Eye& x, const Eye& y, double reach) const;
+  /// none. Meant for x and y that do not see each other. The search is short when it begins at the `first` segment of
+  /// the front and that lies near the way; of ways as short the one over it counts.
+  [[nodiscard]] std::optional<Detour> detour(const Eye& x, const Eye& y, double reach, int first = -1) const;
 
  private:
   struct Data;

@@ -133,6 +133,37 @@ TEST_CASE("Sight lines are blocked where a search through all triangles says so"
   CHECK(open > 1000);
 }
 
+TEST_CASE("From a box of points the walls before a point block as the whole sheets do", "[incision]") {
+  Random random(31);
+  const auto box = unit_box();
+  int blocked = 0, free = 0, clear = 0;
+  for (int scene = 0; scene < 10; ++scene) {
+    const Incision incision({wavy(random), wavy(random)}, box);
+    std::vector<int> walls;
+    for (int trial = 0; trial < 300; ++trial) {
+      const Vector3 centre = in_box(random, Vector3::Constant(-0.5), Vector3::Constant(1.5));
+      const Vector3 half = in_box(random, Vector3::Zero(), Vector3::Constant(trial % 2 == 0 ? 0.2 : 0.02));
+      Vector3 y = centre + in_box(random, Vector3::Constant(-0.6), Vector3::Constant(0.6));
+      if (const auto face = incision.closest(y, 1); face && trial % 3 == 0) // as a node of a lip, on either face
+        y = face->point + (trial % 2 == 0 ? 1e-5 : -1e-5) * face->normal;
+      walls.clear();
+      incision.walls_between(centre, half, y, walls);
+      clear += walls.empty() ? 1 : 0;
+      for (int k = 0; k < 24; ++k) {
+        Vector3 x = in_box(random, centre - half, centre + half);
+        if (k < 8) // a corner
+          x = centre + half.cwiseProduct(Vector3((k & 1) != 0 ? 1 : -1, (k & 2) != 0 ? 1 : -1, (k & 4) != 0 ? 1 : -1));
+        const bool expected = incision.blocks(x, y);
+        REQUIRE(incision.blocks(x, y, walls) == expected);
+        (expected ? blocked : free) += 1;
+      }
+    }
+  }
+  CHECK(blocked > 3000);
+  CHECK(free > 3000);
+  CHECK(clear > 300);
+}
+
 TEST_CASE("No sight line slips between triangles through an edge or a vertex they share", "[incision]") {
   Random random(2);
   const SurfaceMesh sheet = wavy(random);
