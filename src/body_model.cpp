@@ -15,7 +15,7 @@ constexpr double largest_share = 0.8;  // of the nodes in a window that is worth
 // The same where the body follows its blade in increments longer than this many fine spacings: a window serves fewer
 // of them. 1000 nodes, half of them in the window, 0.3 spacings an increment, two seconds of cut: 42 ms of processor
 // time a step with windows, 35 ms rebuilt.
-constexpr double long_advance = 0.2, largest_share_of_long = 0.33;
+constexpr double long_advance = 0.2, largest_share_of_long = 0.25;
 // Nodes of a body of `collocation` that is followed: the dense L U of its window costs more than the sparse one of the
 // whole body beyond. A run of liver_cut.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with windows
 // and takes 27 s without; steps of 0.1 mm at 1000 nodes a third of the rebuild's time with them.
