@@ -44,7 +44,7 @@ class CellEvaluator {
   std::vector<shape_kernel::Sphere> candidates_;
   std::vector<std::uint8_t> inside_;
   CellView view_;
-  // The support of one point, and which of its nodes are hidden; room for one entry beyond the last.
+  // The support of one point, and which of its nodes are hidden; room for a register beyond the last.
   std::vector<int> ids_;
   std::vector<double> coordinates_;
   std::vector<char> hidden_;

@@ -75,7 +75,7 @@ class CutSight {
                 bool second, int spare, double worst_condition, Enrich enrich, ShapeFunctions& out) const;
 
   /// The same with first derivatives for a point that has looked around: the k-th node of the support is hidden from it
-  /// where hidden[k] is not 0.
+  /// where hidden[k] is not 0. The support has room for SphereGrid::lanes entries beyond the last.
   bool evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
                      std::span<const char> hidden, shape_kernel::Support& support, double worst_condition,
                      ShapeFunctions& out) const;

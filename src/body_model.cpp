@@ -12,9 +12,9 @@ namespace {
 constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
 constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
 constexpr double largest_share = 0.8;  // of the nodes in a window that is worth its while
-// The same where the body follows its blade in increments longer than this many fine spacings: a window serves fewer
-// of them. 1000 nodes, half of them in the window, 0.3 spacings an increment, two seconds of cut: 42 ms of processor
-// time a step with windows, 35 ms rebuilt.
+// The same where blade.advance is above so many fine spacings: a window serves fewer increments. 1000 nodes, 0.27 to
+// 0.55 of them in the window, 0.3 spacings an increment: 50 to 65 ms of processor time a step with windows, 24 to 27
+// rebuilt.
 constexpr double long_advance = 0.2, largest_share_of_long = 0.25;
 // Nodes of a body of `collocation` that is followed: the dense L U of its window costs more than the sparse one of the
 // whole body beyond. A run of liver_cut.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with windows

@@ -33,7 +33,12 @@ solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMes
   const auto grow = [&](bool only_update) {
     return app::follow_cut(scenario_, organ_.domain, *followed_, way_ahead, model_, next, only_update);
   };
-  solvers::BodyGrowth growth = grow(recondensing_ != nullptr);
+  // Where motion is put off a body that leaves its window is only given another one if that pays.
+  const auto pays = [&](const topology::SurfaceMesh& way) {
+    return way.triangles.empty() || can_follow(scenario_, model_, way);
+  };
+  const bool renews = !follows || !scenario_.blade || scenario_.blade->advance == 0 || pays(way_ahead());
+  solvers::BodyGrowth growth = grow(recondensing_ != nullptr || !renews);
   bool taken = false;
   if (next.body == nullptr && recondensing_ != nullptr && (growth.update.declined || !follows)) {
     solvers::ContactPatch unused;

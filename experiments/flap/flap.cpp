@@ -1,7 +1,6 @@
 // Problem:   scenarios/liver_flap.toml: a flap cut from the dome of a liver is lifted by a grasper and tears on.
 // Reference: none but the account of energies (median and worst of five node sets); G is at most the toughness where
-// the tear
-//            has come to rest.
+//            the tear has come to rest.
 // Command:   spherecut experiment run flap --out DIR
 #include "experiments/registered.hpp"
 #include "experiments/support/statistics.hpp"
@@ -81,8 +80,7 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
   }
   const app::StepResult last = lift(scenario, context);
   std::vector<double> open{open_share(last.tear->ledger)};
-  for (int seed = 2; seed <= node_sets && !context.quick;
-       ++seed) { // what the account leaves open scatters with the nodes
+  for (int seed = 2; seed <= node_sets && !context.quick; ++seed) {
     scenario.nodes.random_seed = static_cast<std::uint64_t>(seed);
     app::Session session(scenario, context.say);
     app::StepResult end;

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <thread>
 
@@ -289,6 +290,30 @@ TEST_CASE("A run whose systems are updated tells of about the same wound as one 
     CHECK(a[i].cut->pieces == b[i].cut->pieces);
     CHECK(a[i].cut->opening == Approx(b[i].cut->opening).epsilon(0.1).margin(2e-6));
   }
+}
+
+TEST_CASE("A body that follows its blade in long increments is built anew, one in short increments is updated") {
+  int too_much = 0;
+  const auto updates = [&](const std::string& advance) {
+    Session session =
+        session_of(long_block + replaced(incision_at_end, "step = 0.2", "step = 0.1\nadvance = " + advance));
+    std::map<SystemUpdate, int> count;
+    too_much = 0;
+    for (const StepResult& result : run(session)) {
+      CHECK_FALSE(result.cut->refused);
+      if (result.cut->triangles > 0)
+        ++count[result.cut->update];
+      too_much += result.cut->update_reason == too_much_of_body ? 1 : 0;
+    }
+    return count;
+  };
+  std::map<SystemUpdate, int> in_short = updates("0.1");
+  CHECK(in_short[SystemUpdate::updated] >= 2);
+  CHECK(too_much == 0);
+  std::map<SystemUpdate, int> in_long = updates("0.3");
+  CHECK(in_long[SystemUpdate::rebuilt] >= 2);
+  CHECK(in_long[SystemUpdate::updated] + in_long[SystemUpdate::condensed_anew] == 0);
+  CHECK(too_much >= 1); // the last has no way ahead
 }
 
 TEST_CASE("A refused cut leaves a body that has followed the blade as it was, and the next motion makes up for it") {
