@@ -1,6 +1,6 @@
 // Problem:   scenarios/liver_flap.toml: a flap cut from the dome of a liver is lifted by a grasper and tears on.
-// Reference: none but the account of energies (median and worst of five node sets); G is at most the toughness where
-//            the tear has come to rest.
+// Reference: none but the account of energies (the worst of three node sets); G is at most the toughness where the tear
+//            has come to rest.
 // Command:   spherecut experiment run flap --out DIR
 #include "experiments/registered.hpp"
 #include "experiments/support/statistics.hpp"
@@ -16,10 +16,6 @@
 namespace spherecut::experiments {
 
 namespace {
-
-/// Nodes that are exchanged change the stored energy by as much as they err, up or down at every increment: what stays
-/// open of one set is one sample of that.
-constexpr int node_sets = 5;
 
 /// Share of what is spent that the account leaves open at the end.
 double open_share(const app::EnergyLedger& ledger) {
@@ -80,7 +76,7 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
   }
   const app::StepResult last = lift(scenario, context);
   std::vector<double> open{open_share(last.tear->ledger)};
-  for (int seed = 2; seed <= node_sets && !context.quick; ++seed) {
+  for (int seed = 2; seed <= 3 && !context.quick; ++seed) { // what the account leaves open scatters with the nodes
     scenario.nodes.random_seed = static_cast<std::uint64_t>(seed);
     app::Session session(scenario, context.say);
     app::StepResult end;
@@ -93,10 +89,8 @@ std::vector<Check> run_flap(const ExperimentContext& context) {
   const app::EnergyLedger& ledger = last.tear->ledger;
   std::vector<Check> checks{
       {"flap_torn_cm2", 1e4 * last.tear->area, ">=", context.quick ? 0.5 : 2.0},
-      {context.quick ? "flap_energy_balance_reported" : "flap_energy_balance", median(open),
+      {context.quick ? "flap_energy_balance_reported" : "flap_energy_balance", largest(open),
        context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.05},
-      {context.quick ? "flap_energy_balance_worst_reported" : "flap_energy_balance_worst", largest(open),
-       context.quick ? ">=" : "<=", context.quick ? 0.0 : 0.10},
       {"flap_dissipation_share", ledger.dissipation / (ledger.surface + ledger.dissipation), ">=", 0},
       {"flap_pieces", static_cast<double>(last.cut->pieces), "<=", 1}};
   return checks;

@@ -70,34 +70,23 @@ void require_sound(const Session& session) {
 } // namespace
 
 TEST_CASE("A grasper that pulls tears a cut on along a weak plane, and the account of energies closes") {
-  // What nodes that are exchanged leave open of the account is a sample, drawn by rounding: 2.6 mm nodes gave 0.5 to
-  // 4.6 % on ten sets, and 0.5 to 5.04 % with another order of sums. Hence the median, and the worst at twice its
-  // bound.
-  std::vector<double> open;
-  for (const char* seed : {"1", "2", "3"}) {
-    CAPTURE(seed);
-    Session session(scenario_of(
-        replaced(peel, "fine_spacing = 0.0032", std::string("random_seed = ") + seed + "\nfine_spacing = 0.0026")));
-    const std::vector<StepResult> steps = run(session);
-    REQUIRE(steps.size() == 3);
-    CHECK(steps.front().tear->area == 0);
-    const TearReport& last = *steps.back().tear;
-    CHECK(last.area > 2e-5);
-    CHECK(session.incision()->area() == Approx(0.02 * 0.016 + last.area).epsilon(1e-3));
-    CHECK_FALSE(last.severed);
-    CHECK(last.ledger.tool > 0);
-    CHECK(last.ledger.surface == Approx(0.4 * last.area).epsilon(0.05)); // it stays in the weak plane
-    CHECK(last.ledger.dissipation >= 0);
-    open.push_back(balance(last.ledger));
-    CHECK(last.increments.back().release <= 1.05 * last.increments.back().toughness);
-    for (const topology::FrontSegment& segment : session.incision()->front())
-      CHECK(std::abs(segment.from.z() - 0.0181) < 0.001);
-    CHECK(steps.back().force.z() < 0); // the organ pulls the tool down
-    require_sound(session);
-  }
-  std::sort(open.begin(), open.end());
-  CHECK(open[1] < 0.05);
-  CHECK(open.back() < 0.10);
+  Session session(scenario_of(peel));
+  const std::vector<StepResult> steps = run(session);
+  REQUIRE(steps.size() == 3);
+  CHECK(steps.front().tear->area == 0);
+  const TearReport& last = *steps.back().tear;
+  CHECK(last.area > 2e-5);
+  CHECK(session.incision()->area() == Approx(0.02 * 0.016 + last.area).epsilon(1e-3));
+  CHECK_FALSE(last.severed);
+  CHECK(last.ledger.tool > 0);
+  CHECK(last.ledger.surface == Approx(0.4 * last.area).epsilon(0.05)); // it stays in the weak plane
+  CHECK(last.ledger.dissipation >= 0);
+  CHECK(balance(last.ledger) < 0.05); // measured 0.02
+  CHECK(last.increments.back().release <= 1.05 * last.increments.back().toughness);
+  for (const topology::FrontSegment& segment : session.incision()->front())
+    CHECK(std::abs(segment.from.z() - 0.0181) < 0.001);
+  CHECK(steps.back().force.z() < 0); // the organ pulls the tool down
+  require_sound(session);
 }
 
 TEST_CASE("A notch in a stretched bar runs away, parts the bar, and says so") {
