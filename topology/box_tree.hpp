@@ -69,6 +69,10 @@ class BoxTree {
   static constexpr int stack_size = 96; // three postponed children a level, 32 levels hold any number of primitives
 
   BoxTree(const std::vector<BoundingBox>& boxes, const std::vector<std::array<Vector3, 3>>& triangles, double margin);
+  /// Calls hit(place) for the primitives of every box from which apart_from(node) says nothing is apart (0 or less, of
+  /// four boxes) until it returns true; whether it did.
+  template <class Apart, class Hit>
+  bool any_met(const Apart& apart_from, const Hit& hit) const;
   int build(const std::vector<BoundingBox>& boxes, const std::vector<std::array<Vector3, 3>>& triangles,
             const std::vector<Vector3>& centres, int first, int last);
   void add_slab(const std::vector<std::array<Vector3, 3>>& triangles, int first, int last, int child, Node& node) const;
@@ -82,31 +86,14 @@ class BoxTree {
   float rounding_ = 0; // m, by which every half extent is enlarged
 };
 
-template <class Hit>
-bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const {
-  if (empty() || (a.cwiseMin(b).array() > bounds_.upper.array()).any() ||
-      (a.cwiseMax(b).array() < bounds_.lower.array()).any())
-    return false;
-  // Separating axes of a segment (middle m, half vector e) and a box: three of the box, three cross products.
-  const Eigen::Vector3f m = (0.5 * (a + b) - origin_).cast<float>(), e = (0.5 * (b - a)).cast<float>();
-  const Eigen::Vector3f reach = e.cwiseAbs();
-  const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
-  const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
+template <class Apart, class Hit>
+bool BoxTree::any_met(const Apart& apart_from, const Hit& hit) const {
   std::array<int, stack_size> stack;
   int height = 0;
   stack[height++] = 0;
   while (height > 0) {
     const Node& node = nodes_[stack[--height]];
-    const auto& [centre, half] = node.boxes;
-    const Four x = centre[0] - m[0], y = centre[1] - m[1], z = centre[2] - m[2];
-    const auto& n = node.across;
-    Four apart = (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] - node.height).abs() -
-                 (n[0] * e[0] + n[1] * e[1] + n[2] * e[2]).abs() - node.thickness - 2 * margin;
-    apart = apart.max((x.abs() - half[0] - (reach[0] + margin)).max(y.abs() - half[1] - (reach[1] + margin)));
-    apart = apart.max(z.abs() - half[2] - (reach[2] + margin));
-    apart = apart.max((y * e[2] - z * e[1]).abs() - half[1] * reach[2] - half[2] * reach[1] - cross_margin);
-    apart = apart.max((z * e[0] - x * e[2]).abs() - half[2] * reach[0] - half[0] * reach[2] - cross_margin);
-    apart = apart.max((x * e[1] - y * e[0]).abs() - half[0] * reach[1] - half[1] * reach[0] - cross_margin);
+    const Four apart = apart_from(node);
     for (int child = 0; child < node.children; ++child) {
       if (apart[child] > 0)
         continue;
@@ -118,6 +105,32 @@ bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit)
     }
   }
   return false;
+}
+
+template <class Hit>
+bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const {
+  if (empty() || (a.cwiseMin(b).array() > bounds_.upper.array()).any() ||
+      (a.cwiseMax(b).array() < bounds_.lower.array()).any())
+    return false;
+  // Separating axes of a segment (middle m, half vector e) and a box: three of the box, three cross products.
+  const Eigen::Vector3f m = (0.5 * (a + b) - origin_).cast<float>(), e = (0.5 * (b - a)).cast<float>();
+  const Eigen::Vector3f reach = e.cwiseAbs();
+  const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
+  const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
+  const auto apart_from = [&](const Node& node) -> Four {
+    const auto& [centre, half] = node.boxes;
+    const Four x = centre[0] - m[0], y = centre[1] - m[1], z = centre[2] - m[2];
+    const auto& n = node.across;
+    Four apart = (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] - node.height).abs() -
+                 (n[0] * e[0] + n[1] * e[1] + n[2] * e[2]).abs() - node.thickness - 2 * margin;
+    apart = apart.max((x.abs() - half[0] - (reach[0] + margin)).max(y.abs() - half[1] - (reach[1] + margin)));
+    apart = apart.max(z.abs() - half[2] - (reach[2] + margin));
+    apart = apart.max((y * e[2] - z * e[1]).abs() - half[1] * reach[2] - half[2] * reach[1] - cross_margin);
+    apart = apart.max((z * e[0] - x * e[2]).abs() - half[2] * reach[0] - half[0] * reach[2] - cross_margin);
+    apart = apart.max((x * e[1] - y * e[0]).abs() - half[0] * reach[1] - half[1] * reach[0] - cross_margin);
+    return apart;
+  };
+  return any_met(apart_from, hit);
 }
 
 template <class Visit>
@@ -133,11 +146,7 @@ void BoxTree::for_all_between(const Vector3& centre, const Vector3& half, const 
   const Eigen::Vector3f e = (0.5 * (y - centre)).cast<float>(), turned = e.cwiseAbs();
   const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
   const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
-  std::array<int, stack_size> stack;
-  int height = 0;
-  stack[height++] = 0;
-  while (height > 0) {
-    const Node& node = nodes_[stack[--height]];
+  const auto apart_from = [&](const Node& node) -> Four {
     const auto& n = node.across;
     const Four at_end = n[0] * end[0] + n[1] * end[1] + n[2] * end[2] - node.height;
     const Four at_centre = n[0] * c[0] + n[1] * c[1] + n[2] * c[2] - node.height;
@@ -152,15 +161,12 @@ void BoxTree::for_all_between(const Vector3& centre, const Vector3& half, const 
     apart = apart.max((v * e[2] - w * e[1]).abs() - b * turned[2] - d * turned[1] - cross_margin);
     apart = apart.max((w * e[0] - u * e[2]).abs() - d * turned[0] - a * turned[2] - cross_margin);
     apart = apart.max((u * e[1] - v * e[0]).abs() - a * turned[1] - b * turned[0] - cross_margin);
-    for (int child = 0; child < node.children; ++child) {
-      if (apart[child] > 0)
-        continue;
-      if (node.count[child] == 0)
-        stack[height++] = node.first[child];
-      for (int place = node.first[child]; place < node.first[child] + node.count[child]; ++place)
-        visit(place);
-    }
-  }
+    return apart;
+  };
+  any_met(apart_from, [&](int place) {
+    visit(place);
+    return false;
+  });
 }
 
 template <class Bound, class Visit>
