@@ -49,6 +49,7 @@ struct CellBuilder {
   std::vector<double> vertices;
   std::vector<int> face_vertices, neighbours;
   std::vector<double> vertex_phi;
+  voro::voronoicell_neighbor cell; // kept: a new one asks for many blocks of memory
 
   void build(int i, CellComplex& cells, std::vector<Vector3>& closure);
 
@@ -57,7 +58,7 @@ struct CellBuilder {
   /// ahead of the front is an ordinary face.
   void add_lip(int i, int j, const std::vector<Vector3>& polygon, const Vector3& outward, CellComplex& cells,
                std::vector<Vector3>& closure) const;
-  bool cut(int i, voro::voronoicell_neighbor& cell);
+  bool cut(int i);
   [[nodiscard]] bool hidden(int i, int j) const {
     if (incision == nullptr)
       return false;
@@ -66,7 +67,7 @@ struct CellBuilder {
   }
 };
 
-bool CellBuilder::cut(int i, voro::voronoicell_neighbor& cell) {
+bool CellBuilder::cut(int i) {
   const Vector3& x = nodes[i];
   const double h = spacings[i];
   cell.init(-cell_reach, cell_reach, -cell_reach, cell_reach, -cell_reach, cell_reach);
@@ -191,8 +192,7 @@ void CellBuilder::add_lip(int i, int j, const std::vector<Vector3>& polygon, con
 }
 
 void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure) {
-  voro::voronoicell_neighbor cell;
-  if (!cut(i, cell))
+  if (!cut(i))
     return;
   const Vector3& x = nodes[i];
   const double h = spacings[i];
@@ -407,7 +407,7 @@ void build_cells(const std::vector<Vector3>& places, const std::vector<double>& 
   const PointTree tree(nodes);
   const std::size_t known = cells.boundary.size();
   const bool curved = count > 0 && std::isfinite(domain.curved_distance(nodes.front()));
-  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, wanted, curved, {}, {}, {}, {}, {}};
+  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, wanted, curved, {}, {}, {}, {}, {}, {}};
   for (int i = 0; i < count; ++i)
     if (wanted[i] != 0)
       builder.build(i, cells, closure);
