@@ -74,11 +74,12 @@ const DisplacementMean& GrowingCut::State::mean(int node) const {
   const auto candidate = std::find(options.contact.begin(), options.contact.end(), node);
   if (candidate != options.contact.end())
     return contact[static_cast<std::size_t>(candidate - options.contact.begin())];
-  if (shares == nullptr)
-    shares = std::make_unique<Shares>(problem, removed);
   auto known = means.find(node);
-  if (known == means.end())
+  if (known == means.end()) {
+    if (shares == nullptr)
+      shares = std::make_unique<Shares>(problem, removed);
     known = means.emplace(node, shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region)).first;
+  }
   return known->second;
 }
 
@@ -403,6 +404,10 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
         if (DisplacementMean weighed = reweighed(mean, *fresh_spheres); !equal_to_rounding(mean, weighed))
           mean = std::move(weighed);
   }
+  std::vector<int> stale; // nodes whose means were asked for and change
+  for (const auto& [node, mean] : s.means)
+    if (removed[node] != 0 || is_near(mean) || is_reshaped(mean, node))
+      stale.push_back(node);
   const std::vector<HeldChange> exchanged_means = held_changes(s.problem.prescribed, s.held, next.prescribed, held);
   for (const HeldChange& one : exchanged_means)
     for (const DisplacementMean* mean :
@@ -474,7 +479,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.removed = std::move(removed);
   s.spheres = std::move(fresh_spheres);
   s.shares = std::move(shares);
-  s.means.clear();
+  for (const int node : stale)
+    s.means.erase(node);
   s.find_loads();
   report.boxes = static_cast<int>(exchanged.size());
   report.cells_seconds = cell_watch.seconds();

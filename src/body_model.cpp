@@ -212,6 +212,7 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
                                                                     : too_much_of_body;
   model.window_way = {};
   model.added_nodes = 0;
+  model.window_seen.reset();
   if (model.not_following[0] != '\0') {
     model.body = solvers::discretise(std::move(problem), options);
     return;
@@ -293,6 +294,7 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
   after.pairs = solvers::lip_pairs(after.sprinkling.nodes);
   after.window_way = std::move(way);
   after.added_nodes = growth.update.condensed_anew ? 0 : before.added_nodes + change.added.size();
+  after.window_seen = growth.update.condensed_anew ? std::nullopt : before.window_seen;
   after.body = std::move(before.body);
   return growth;
 }

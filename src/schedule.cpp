@@ -107,6 +107,13 @@ std::optional<topology::BladePose> blade_pose(const BladeSettings& blade, double
                              orientation(a.rotation).slerp(t, orientation(b.rotation))};
 }
 
+double edge_travel(const std::vector<Vector3>& edge, const topology::BladePose& a, const topology::BladePose& b) {
+  double largest = 0;
+  for (const Vector3& x : edge)
+    largest = std::max(largest, (b.orientation * x + b.position - a.orientation * x - a.position).norm());
+  return largest;
+}
+
 double blade_travel(const BladeSettings& blade) {
   double travel = 0;
   for (std::size_t i = 1; i < blade.path.size(); ++i)

@@ -16,6 +16,9 @@ struct StepSample {
 /// Pose of a blade on its path, between two poses evenly moved and turned; empty outside its times.
 std::optional<topology::BladePose> blade_pose(const BladeSettings& blade, double time);
 
+/// Farthest way of a point of the edge between two poses, m.
+double edge_travel(const std::vector<Vector3>& edge, const topology::BladePose& a, const topology::BladePose& b);
+
 /// Largest way of a point of the edge from one pose of the path to the next, summed, m.
 double blade_travel(const BladeSettings& blade);
 

@@ -15,14 +15,6 @@ constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
 constexpr double same_place = 1e-6;       // of the fine spacing: nearer to its path a blade is on it
 
-/// Farthest way of a point of the edge between two poses, m.
-double travel(const std::vector<Vector3>& edge, const topology::BladePose& a, const topology::BladePose& b) {
-  double largest = 0;
-  for (const Vector3& x : edge)
-    largest = std::max(largest, (b.orientation * x + b.position - a.orientation * x - a.position).norm());
-  return largest;
-}
-
 } // namespace
 
 // Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
@@ -58,11 +50,11 @@ Session::blade_ahead(const StepSample& sample, const std::optional<topology::Bla
   const topology::BladePose& here = *sample.blade;
   std::vector<topology::BladePose> poses;
   const auto scripted = blade_pose(*scenario_.blade, sample.time);
-  if (scripted && travel(edge, *scripted, here) < same_place * fine) {
+  if (scripted && edge_travel(edge, *scripted, here) < same_place * fine) {
     double way = 0;
     for (const StepSample& step : steps_)
       if (step.blade && step.time > sample.time && way < length) {
-        way += travel(edge, poses.empty() ? here : poses.back(), *step.blade);
+        way += edge_travel(edge, poses.empty() ? here : poses.back(), *step.blade);
         poses.push_back(*step.blade);
       }
   } else if (last) {
@@ -106,7 +98,7 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
   if (!sample.blade)
     return false;
   if (scenario_.blade->advance > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
-    put_off_ += travel(scenario_.blade->edge, *last_blade_, *sample.blade);
+    put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
     topology::RestMap to_rest;
     if (model_.state)
       to_rest = [this](const Vector3& x) { return rest_position(x); };

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double background_spacings = 5; // fine spacings ahead of the blade for which it is condensed beside the steps
 constexpr double drifted = 1e-8;          // residual of an updated body from which it is condensed anew
+constexpr double looked_after = 0.25;     // fine spacings that the blade goes before its way ahead is looked at again
 
 /// Whether every corner of `way` is within `reach` m of one of `window`.
 bool covers(const topology::SurfaceMesh& window, const topology::SurfaceMesh& way, double reach) {
@@ -69,9 +70,14 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
     if (result.cut->update == SystemUpdate::none)
       return;
     result.residual = residual(model_);
+    const bool is_seen = model_.window_seen &&
+                         edge_travel(scenario_.blade->edge, *model_.window_seen, *sample.blade) < looked_after * fine;
     if (2 * model_.added_nodes < growth_room && result.residual < drifted &&
-        covers(model_.window_way, way_of(way_spacings * fine), fine))
+        (is_seen || covers(model_.window_way, way_of(way_spacings * fine), fine))) {
+      if (!is_seen)
+        model_.window_seen = *sample.blade;
       return;
+    }
   } else {
     entry = way_into_body(sample);
     if (result.cut->triangles > 0 || std::string_view(model_.not_following) == too_much_of_body ||
@@ -131,6 +137,7 @@ bool Session::take_recondensed(BodyModel& into, solvers::ContactPatch& patch) {
   into.not_following = "";
   into.window_way = std::move(recondensing_way_);
   into.added_nodes = 0;
+  into.window_seen.reset();
   patch = std::move(made.patch);
   return true;
 }
