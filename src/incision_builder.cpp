@@ -32,14 +32,15 @@ topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
 IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double edge)
     : domain_(std::move(domain)), wound_(std::make_unique<topology::IncrementalWound>(domain_->surface())),
       fields_(std::make_unique<topology::CutFields>(edge)) {
-  for (const PrecutSettings& precut : scenario.precuts) {
+  for (std::size_t k = 0; k < scenario.precuts.size(); ++k) {
+    const PrecutSettings& precut = scenario.precuts[k];
     try { // one at a time, so that an unusable sheet is told with its line
       add_own(sheet_of(precut, edge));
       incision_ = std::make_shared<const topology::Incision>(own_, domain_, revision_);
       wound_->grow(own_);
     } catch (const InputError& error) {
       throw InputError(
-          fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, own_.size(), error.what()));
+          fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, k + 1, error.what()));
     }
   }
   options_.edge = edge;

@@ -3,6 +3,7 @@
 #include "experiments/experiment.hpp"
 #include "solvers/parallel.hpp"
 #include "src/haptics/run_haptics.hpp"
+#include "src/interrupt.hpp"
 #include "src/process_settings.hpp"
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
@@ -51,11 +52,21 @@ void list_experiments(bool names_only) {
 }
 
 int run_experiment(const std::string& name, const std::string& out, bool quick) {
-  const auto say = [](const std::string& line) {
+  struct Interrupted {};
+  const app::InterruptWatch watch;
+  const auto say = [&](const std::string& line) {
+    if (watch.interrupted())
+      throw Interrupted();
     fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  const auto checks = experiments::run_experiment(name, out, quick, say);
+  std::vector<experiments::Check> checks;
+  try {
+    checks = experiments::run_experiment(name, out, quick, say);
+  } catch (const Interrupted&) {
+    fmt::print("interrupted: nothing was checked; {} has what was written before, without summary.json\n", out);
+    return status_interrupted;
+  }
   std::size_t width = 5;
   for (const experiments::Check& check : checks)
     width = std::max(width, check.name.size());

@@ -67,7 +67,7 @@ FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain) {
   }
   if (zone.spacing.fine <= 0) {
     zone.spacing.fine = derived_front_spacing(scenario, extent);
-    if (!std::isfinite(zone.spacing.fine)) // tears start anywhere
+    if (!std::isfinite(zone.spacing.fine) || zone.spacing.fine <= 0) // tears start anywhere; a sheet without area
       zone.spacing.fine = extent / across_organ;
     origin = "the spacing derived from the cuts";
   }

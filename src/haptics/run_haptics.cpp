@@ -120,10 +120,14 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
     findings.bridge = bridge->counters();
   std::vector<SolvedForce> solved;
   if (command.solved_stride > 0 && (scenario.tool || simulation.session().blade() != nullptr) && !report.stopped) {
-    say("solving off line for the error of the force model");
+    say("solving off line for the error of the force model (--solved-every 0 leaves that out)");
     HapticSimulation again(scenario);
-    solved = solve_recorded(again, records.ticks, static_cast<std::uint64_t>(command.solved_stride));
-    findings.error = model_error(records.ticks, solved);
+    const auto stride = static_cast<std::uint64_t>(command.solved_stride);
+    solved = solve_recorded(again, records.ticks, stride, [&] { return watch.interrupted(); });
+    if (watch.interrupted())
+      solved.clear();
+    else
+      findings.error = model_error(records.ticks, solved);
   }
   write_haptics(command.out, records, findings, solved);
   say(text_of(findings));
@@ -131,7 +135,11 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
     say("warning: " + remark);
   say(fmt::format("results in {}: haptic_ticks.csv haptic_solves.csv haptic_deadlines.csv haptic.json {}",
                   command.out.string(), recording_name));
-  return report.stopped ? RunEnd::interrupted : RunEnd::complete;
+  if (report.stopped)
+    say("interrupted: what there is up to then is kept");
+  else if (watch.interrupted())
+    say("interrupted: the session is complete, the error of the force model is not known");
+  return report.stopped || watch.interrupted() ? RunEnd::interrupted : RunEnd::complete;
 }
 
 } // namespace spherecut::app

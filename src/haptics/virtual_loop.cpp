@@ -155,10 +155,10 @@ LoopRecords run_virtual(const HapticSettings& settings, HapticSimulation& simula
 }
 
 std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std::vector<TickRecord>& ticks,
-                                        std::uint64_t stride) {
+                                        std::uint64_t stride, const std::function<bool()>& stop) {
   std::vector<SolvedForce> forces;
   ContactSnapshot snapshot;
-  for (std::size_t i = 0; i < ticks.size(); i += stride) {
+  for (std::size_t i = 0; i < ticks.size() && !(stop && stop()); i += stride) {
     if (i == 0)
       simulation.prepare(ticks[0].device);
     simulation.solve(ticks[i].device, 0, snapshot);

@@ -4,6 +4,8 @@
 #include "src/haptics/loop_records.hpp"
 #include "src/haptics/simulation.hpp"
 
+#include <functional>
+
 namespace spherecut::app {
 
 /// Solves that begin every `period` ticks, at the pose of that tick, and are taken over `latency` ticks later.
@@ -37,7 +39,8 @@ struct SolvedForce {
   bool resprinkled = false;
   int cut_triangles = 0, active = 0;
 };
+/// Ends early, with what it has, once `stop` (may be null) says so.
 std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std::vector<TickRecord>& ticks,
-                                        std::uint64_t stride);
+                                        std::uint64_t stride, const std::function<bool()>& stop = nullptr);
 
 } // namespace spherecut::app

@@ -465,6 +465,46 @@ TEST_CASE("A haptic session interrupted while it prepares says that nothing was 
   CHECK(findings["ticks"] == 0);
 }
 
+namespace {
+
+/// The command, sent SIGINT once what it prints holds `line`.
+ProgramResult interrupted_after(const std::string& line, const std::vector<std::string>& arguments,
+                                const TemporaryFolder& folder) {
+  const std::string said = "'" + (folder.path() / "said").string() + "'";
+  return run_shell(
+      spherecut_command(arguments) + " >" + said + " & run=$!; until grep -q '" + line + "' " + said +
+      " 2>/dev/null; do kill -0 $run || break; sleep 0.02; done; kill -INT $run; wait $run; status=$?; cat " + said +
+      "; exit $status");
+}
+
+} // namespace
+
+TEST_CASE("An interrupted experiment says so and exits with 130") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  const ProgramResult result =
+      interrupted_after("yardstick", {"experiment", "run", "solve_rate", "--out", out.string()}, folder);
+  INFO(result.out << result.err);
+  CHECK(result.status == 130);
+  CHECK_THAT(result.out, Contains("interrupted: nothing was checked") && Contains(out.string()));
+  CHECK(!std::filesystem::exists(out / "summary.json"));
+}
+
+TEST_CASE("A haptic session interrupted while it is solved again off line keeps its ticks") {
+  const TemporaryFolder folder;
+  const auto scenario = write_file(folder.path() / "case.toml", small_scenario);
+  const auto out = folder.path() / "out";
+  const ProgramResult result = interrupted_after(
+      "solving off line",
+      {"haptics", scenario.string(), "--virtual", "--duration", "60", "--solved-every", "1", "--out", out.string()},
+      folder);
+  INFO(result.out << result.err);
+  CHECK(result.status == 130);
+  CHECK_THAT(result.out, Contains("interrupted: the session is complete"));
+  CHECK(lines_in(read_file(out / "haptic_ticks.csv")) == 60'001);
+  CHECK(!nlohmann::json::parse(read_file(out / "haptic.json")).dump().empty());
+}
+
 TEST_CASE("A cut that is not open is said to be closed, without digits below the accuracy") {
   const TemporaryFolder folder;
   const auto out = folder.path() / "out";

@@ -230,6 +230,12 @@ TEST_CASE("A blade starts from the tissue as it is deformed: the cut at rest is 
 TEST_CASE("Precuts that cannot be made are refused with file and line") {
   CHECK_THROWS_WITH(session_of(cut_block + replaced(disc_precut, "0.016]", "0.3]")),
                     Contains("case.toml:15") && Contains("precut[1]") && Contains("outside"));
+  const std::string flat =
+      "[[precut]]\nshape = \"polygon\"\npoints = [[0, 0, 0.01], [0.01, 0, 0.01], [0.02, 0, 0.01]]\n";
+  CHECK_THROWS_WITH(session_of(cut_block + disc_precut + flat), Contains("case.toml:20") && Contains("precut[2]"));
+  CHECK_THROWS_WITH(
+      session_of(replaced(replaced(cut_block, "fine_spacing = 0.005", ""), "coarse_spacing = 0.012", "") + flat),
+      Contains("precut[1]") && Contains("enclose no area"));
   const TemporaryFolder folder;
   topology::SurfaceMesh fin; // three triangles on one edge
   fin.vertices = {{0, 0, 0.01}, {0, 0, 0.02}, {0.01, 0, 0.015}, {-0.01, 0.001, 0.015}, {0, 0.01, 0.015}};
