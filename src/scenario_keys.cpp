@@ -319,7 +319,8 @@ constexpr std::array keys = {
         "blade.advance", number, "", "0.0",
         "Fine spacings that the edge goes before wound and body follow its cut; 0: they do in every step. What is "
         "put off is cut by the way that the edge took, at the latest when it leaves the body or the run ends. "
-        "Not with material.toughness.",
+        "It tells where steps are shorter than that: in real time, or with a small blade.step. Not with "
+        "material.toughness.",
         from(0, 1)},
     ScenarioKey{"blade.path", array_of_tables, "", "required",
                 "Poses of the blade, between which it moves evenly; at least two. It cuts whatever its edge sweeps."},

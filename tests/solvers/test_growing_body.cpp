@@ -55,6 +55,13 @@ TEST_CASE("A body that has followed its cut is in balance and equals the body bu
           0.005 * ordinary->at(inside, expected).displacement.norm());
     CHECK((body.nodal_displacements(field) - ordinary->nodal_displacements(field)).norm() <
           1e-12 * body.nodal_displacements(field).norm());
+    // Means over the shares of lips, those that earlier increments have left among them.
+    std::vector<int> lips;
+    for (int i = 0; i < scene.nodes.size(); ++i)
+      if (scene.nodes.kinds[i] == NodeKind::lip)
+        lips.push_back(i);
+    const MatrixX means = ordinary->contact_displacements(lips, {field});
+    CHECK((body.contact_displacements(lips, {field}) - means).norm() < 1e-12 * means.norm());
 
     // Forces on a lip, a surface node of the window or far from it.
     for (const int node :
