@@ -39,6 +39,7 @@ void summarise(const ContactPatch& patch, ContactState& state) {
   state.active_nodes = 0;
   state.contact_radius = 0;
   double weight = 0;
+  Vector3 middle = Vector3::Zero(); // of nodes that are held without a force
   for (int c = 0; c < size_of(patch); ++c) {
     state.tool_force -= state.nodal_forces[c];
     if (!state.active[c])
@@ -47,9 +48,12 @@ void summarise(const ContactPatch& patch, ContactState& state) {
     const double force = state.nodal_forces[c].norm();
     weight += force;
     state.centre += force * patch.rest[c];
+    middle += patch.rest[c];
   }
   if (weight > 0)
     state.centre /= weight;
+  else if (state.active_nodes > 0)
+    state.centre = middle / state.active_nodes;
   for (int c = 0; c < size_of(patch); ++c)
     if (state.active[c])
       state.contact_radius =

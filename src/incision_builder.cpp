@@ -27,6 +27,21 @@ topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
   return topology::read_sheet(file.file, file.scale);
 }
 
+/// Part of a sheet's area that lies on the cut so far, 0 to 1.
+double share_on(const topology::Incision& cut, const topology::SurfaceMesh& sheet, double edge) {
+  constexpr double near = 1e-3, same_way = 0.999; // edges; a cosine
+  double whole = 0, on = 0;
+  for (const Triangle& triangle : sheet.triangles) {
+    const Vector3 &a = sheet.vertices[triangle[0]], &b = sheet.vertices[triangle[1]], &c = sheet.vertices[triangle[2]];
+    const Vector3 area = 0.5 * (b - a).cross(c - a);
+    whole += area.norm();
+    const auto face = cut.closest((a + b + c) / 3, near * edge);
+    if (face && std::abs(face->normal.dot(area)) > same_way * area.norm())
+      on += area.norm();
+  }
+  return whole > 0 ? on / whole : 0;
+}
+
 } // namespace
 
 IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double edge)
@@ -35,12 +50,17 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
   for (std::size_t k = 0; k < scenario.precuts.size(); ++k) {
     const PrecutSettings& precut = scenario.precuts[k];
     try { // one at a time, so that an unusable sheet is told with its line
-      add_own(sheet_of(precut, edge));
+      topology::SurfaceMesh sheet = sheet_of(precut, edge);
+      if (const double share = incision_ ? share_on(*incision_, sheet, edge) : 0; share > 0)
+        throw InputError(
+            fmt::format("{:.0f} % of its area lie on the precuts before it; allowed: none, sheets may only "
+                        "cross",
+                        std::max(1.0, 100 * share)));
+      add_own(std::move(sheet));
       incision_ = std::make_shared<const topology::Incision>(own_, domain_, revision_);
       wound_->grow(own_);
     } catch (const InputError& error) {
-      throw InputError(
-          fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, k + 1, error.what()));
+      throw InputError(fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, k + 1, error.what()));
     }
   }
   options_.edge = edge;

@@ -4,6 +4,7 @@
 #include "src/tear_reader.hpp"
 #include "topology/errors.hpp"
 
+#include <algorithm>
 #include <fmt/format.h>
 
 namespace spherecut::app {
@@ -296,6 +297,13 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   if (scenario.fixed.empty())
     offences.add(root.line("fixed"),
                  "fixed = []: nothing is fixed, the organ would float; allowed: one region or more");
+  for (std::size_t axis = 0; axis < 3 && !scenario.fixed.empty(); ++axis)
+    if (std::none_of(scenario.fixed.begin(), scenario.fixed.end(),
+                     [&](const FixedRegion& region) { return region.components[axis]; }))
+      offences.add(scenario.fixed.front().line,
+                   fmt::format("fixed[].axes: no region holds {}, the organ would float along it; allowed: every axis "
+                               "in one region at least",
+                               "xyz"[axis]));
   scenario.nodes = nodes(root.table("nodes"), offences);
   const Section method = root.table("method");
   scenario.method.method = solvers::method_from_string(method.text("name"));

@@ -217,6 +217,14 @@ TEST_CASE("Prescribed displacements of the patch are met and give the condensed 
     for (std::size_t c = 0; c < values.size(); ++c)
       CHECK((state.nodal_forces[c] - forces.segment<3>(3 * static_cast<Eigen::Index>(c))).norm() <
             1e-9 * forces.norm());
+    // Held where it is, without a force, the patch is its own middle and as wide as it is.
+    const ContactState still = solvers::prescribe(patch, std::vector<Vector3>(values.size(), Vector3::Zero()));
+    Vector3 middle = Vector3::Zero();
+    for (const Vector3& x : patch.rest)
+      middle += x / static_cast<double>(patch.rest.size());
+    CHECK(still.tool_force.norm() == 0);
+    CHECK((still.centre - middle).norm() < 1e-12);
+    CHECK(still.contact_radius == Approx(state.contact_radius).epsilon(0.5));
     values.pop_back();
     CHECK_THROWS_AS(solvers::prescribe(patch, values), InputError);
   }

@@ -228,6 +228,11 @@ TEST_CASE("A blade starts from the tissue as it is deformed: the cut at rest is 
 }
 
 TEST_CASE("Precuts that cannot be made are refused with file and line") {
+  CHECK_THROWS_WITH(session_of(cut_block + disc_precut + disc_precut),
+                    Contains("case.toml:20") && Contains("precut[2]: 100 % of its area lie on"));
+  CHECK_THROWS_WITH(session_of(cut_block + disc_precut + replaced(disc_precut, "[0, 0, 0.016]", "[0.008, 0, 0.016]")),
+                    Contains("precut[2]") && Contains("of its area lie on the precuts before it"));
+  CHECK_NOTHROW(session_of(cut_block + disc_precut + replaced(disc_precut, "[0, 0, 1]", "[1, 0, 0]")));
   CHECK_THROWS_WITH(session_of(cut_block + replaced(disc_precut, "0.016]", "0.3]")),
                     Contains("case.toml:15") && Contains("precut[1]") && Contains("outside"));
   const std::string flat =

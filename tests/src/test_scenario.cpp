@@ -146,6 +146,8 @@ TEST_CASE("Nothing fixed is refused by the reader") {
                              "upper = [1, 1, 0.001]\n";
   CHECK_THAT(complaint_after(region, ""), Contains("fixed is missing") && Contains("At least one region"));
   CHECK_THAT(complaint("fixed = []\n" + replaced(small_scenario, region, "")), Contains("nothing is fixed"));
+  CHECK_THAT(complaint(replaced(small_scenario, "[[fixed]]\n", "[[fixed]]\naxes = [\"z\"]\n")),
+             Contains("no region holds x") && Contains("no region holds y") && !Contains("no region holds z"));
 }
 
 TEST_CASE("Paths need two poses and rising times") {
