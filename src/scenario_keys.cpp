@@ -106,7 +106,8 @@ constexpr std::array keys = {
                 {},
                 "",
                 "region = half_space"},
-    ScenarioKey{"fixed[].axes", axes, "", "[\"x\", \"y\", \"z\"]", "Components of the displacement that are held."},
+    ScenarioKey{"fixed[].axes", axes, "", "[\"x\", \"y\", \"z\"]",
+                "Components of the displacement that are held; each axis in one region at least."},
 
     ScenarioKey{"nodes", table, "", "", "Sprinkling of the organ with nodes; left out: all defaults."},
     ScenarioKey{
