@@ -481,11 +481,11 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.shares = std::move(shares);
   for (const int node : stale)
     s.means.erase(node);
-  s.find_loads();
   report.boxes = static_cast<int>(exchanged.size());
-  report.cells_seconds = cell_watch.seconds();
 
   try {
+    s.find_loads();
+    report.cells_seconds = cell_watch.seconds();
     const Stopwatch factor_watch;
     std::vector<Vector3> places = changes.faces;
     places.insert(places.end(), changes.front.begin(), changes.front.end());

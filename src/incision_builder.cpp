@@ -27,7 +27,9 @@ topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
   return topology::read_sheet(file.file, file.scale);
 }
 
-/// Part of a sheet's area that lies on the cut so far, 0 to 1.
+constexpr double least_share = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
+
+/// Part of a sheet's area that lies on the cut so far, 0 to 1, triangle by triangle.
 double share_on(const topology::Incision& cut, const topology::SurfaceMesh& sheet, double edge) {
   constexpr double near = 1e-3, same_way = 0.999; // edges; a cosine
   double whole = 0, on = 0;
@@ -51,11 +53,11 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
     const PrecutSettings& precut = scenario.precuts[k];
     try { // one at a time, so that an unusable sheet is told with its line
       topology::SurfaceMesh sheet = sheet_of(precut, edge);
-      if (const double share = incision_ ? share_on(*incision_, sheet, edge) : 0; share > 0)
+      if (const double share = incision_ ? share_on(*incision_, sheet, edge) : 0; share > least_share)
         throw InputError(
-            fmt::format("{:.0f} % of its area lie on the precuts before it; allowed: none, sheets may only "
+            fmt::format("{:.3g} % of its area lie on the precuts before it; allowed: none, sheets may only "
                         "cross",
-                        std::max(1.0, 100 * share)));
+                        100 * share));
       add_own(std::move(sheet));
       incision_ = std::make_shared<const topology::Incision>(own_, domain_, revision_);
       wound_->grow(own_);

@@ -224,7 +224,7 @@ constexpr std::array keys = {
 
     ScenarioKey{"precut", array_of_tables, "", "",
                 "Cuts that are there from the start, as many as needed: sheets without thickness, inside the organ or "
-                "reaching out of it. Left out: none."},
+                "reaching out of it. They may cross one another, not lie on one another. Left out: none."},
     ScenarioKey{"precut[].shape", choice, "", "required", "Kind of sheet.", {}, "disc, rectangle, polygon, file"},
     ScenarioKey{"precut[].centre", vector, "m", "required", "Centre.", {}, "", "shape = disc, rectangle"},
     ScenarioKey{"precut[].normal",

@@ -72,9 +72,10 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
     result.residual = residual(model_);
     const bool is_seen = model_.window_seen &&
                          edge_travel(scenario_.blade->edge, *model_.window_seen, *sample.blade) < looked_after * fine;
+    const topology::SurfaceMesh way = is_seen ? topology::SurfaceMesh{} : way_of(way_spacings * fine);
     if (2 * model_.added_nodes < growth_room && result.residual < drifted &&
-        (is_seen || covers(model_.window_way, way_of(way_spacings * fine), fine))) {
-      if (!is_seen)
+        (is_seen || covers(model_.window_way, way, fine))) {
+      if (!way.vertices.empty())
         model_.window_seen = *sample.blade;
       return;
     }

@@ -199,7 +199,7 @@ std::vector<Check> run_solve_rate(const ExperimentContext& context) {
         checks.push_back(
             {name + (judged ? "_per_second" : "_per_second_reported"), 1 / rate.seconds, ">=", judged ? asked : 0.0});
         if (difference && !context.quick && nodes >= 300)
-          checks.push_back({name + "_force", *difference, "<=", 0.02});
+          checks.push_back({name + "_force", *difference, "<=", 0.005});
         else if (difference)
           checks.push_back({name + "_force_reported", *difference, "<=", 1.0});
       }

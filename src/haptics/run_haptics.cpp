@@ -119,12 +119,14 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   if (bridge != nullptr)
     findings.bridge = bridge->counters();
   std::vector<SolvedForce> solved;
+  bool is_cut_short = false; // the session is complete, what follows it is not
   if (command.solved_stride > 0 && (scenario.tool || simulation.session().blade() != nullptr) && !report.stopped) {
     say("solving off line for the error of the force model (--solved-every 0 leaves that out)");
     HapticSimulation again(scenario);
     const auto stride = static_cast<std::uint64_t>(command.solved_stride);
     solved = solve_recorded(again, records.ticks, stride, [&] { return watch.interrupted(); });
-    if (watch.interrupted())
+    is_cut_short = watch.interrupted();
+    if (is_cut_short)
       solved.clear();
     else
       findings.error = model_error(records.ticks, solved);
@@ -137,9 +139,9 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
                   command.out.string(), recording_name));
   if (report.stopped)
     say("interrupted: what there is up to then is kept");
-  else if (watch.interrupted())
+  else if (is_cut_short)
     say("interrupted: the session is complete, the error of the force model is not known");
-  return report.stopped || watch.interrupted() ? RunEnd::interrupted : RunEnd::complete;
+  return report.stopped || is_cut_short ? RunEnd::interrupted : RunEnd::complete;
 }
 
 } // namespace spherecut::app
