@@ -217,5 +217,7 @@ int main(int argc, char** argv) {
     return complain("out of memory; use fewer nodes or a coarser mesh", status_numerical);
   } catch (const std::exception& error) {
     return complain(fmt::format("unexpected: {}", error.what()), status_numerical);
+  } catch (...) {
+    return complain("unexpected: an exception without a text", status_numerical);
   }
 }
