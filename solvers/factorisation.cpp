@@ -419,22 +419,14 @@ std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const 
 
 double one_norm(const SparseMatrix& matrix, bool lower_triangle_of_symmetric) {
   VectorX sums = VectorX::Zero(matrix.cols());
-  const int *start = matrix.outerIndexPtr(), *length = matrix.innerNonZeroPtr(), *row = matrix.innerIndexPtr();
-  const double* value = matrix.valuePtr();
-  for (int column = 0; column < matrix.outerSize(); ++column) {
-    int k = start[column];
-    const int end = length != nullptr ? k + length[column] : start[column + 1];
-    while (lower_triangle_of_symmetric && k < end && row[k] < column)
-      ++k;
-    double sum = 0;
-    for (; k < end; ++k) {
-      const double size = std::abs(value[k]);
-      sum += size;
-      if (lower_triangle_of_symmetric && row[k] != column)
-        sums[row[k]] += size;
+  for (int column = 0; column < matrix.outerSize(); ++column)
+    for (SparseMatrix::InnerIterator entry(matrix, column); entry; ++entry) {
+      if (lower_triangle_of_symmetric && entry.row() < column)
+        continue;
+      sums[column] += std::abs(entry.value());
+      if (lower_triangle_of_symmetric && entry.row() != column)
+        sums[entry.row()] += std::abs(entry.value());
     }
-    sums[column] += sum;
-  }
   return sums.size() == 0 ? 0 : sums.maxCoeff();
 }
 

@@ -29,17 +29,27 @@ topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
 
 constexpr double least_share = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
 
-/// Part of a sheet's area that lies on the cut so far, 0 to 1, triangle by triangle.
+/// Part of a sheet's area that lies on the cut so far, 0 to 1, looked at every `edge` m.
 double share_on(const topology::Incision& cut, const topology::SurfaceMesh& sheet, double edge) {
   constexpr double near = 1e-3, same_way = 0.999; // edges; a cosine
   double whole = 0, on = 0;
   for (const Triangle& triangle : sheet.triangles) {
-    const Vector3 &a = sheet.vertices[triangle[0]], &b = sheet.vertices[triangle[1]], &c = sheet.vertices[triangle[2]];
-    const Vector3 area = 0.5 * (b - a).cross(c - a);
-    whole += area.norm();
-    const auto face = cut.closest((a + b + c) / 3, near * edge);
-    if (face && std::abs(face->normal.dot(area)) > same_way * area.norm())
-      on += area.norm();
+    const Vector3 &a = sheet.vertices[triangle[0]], ab = sheet.vertices[triangle[1]] - a,
+                  ac = sheet.vertices[triangle[2]] - a;
+    const Vector3 normal = ab.cross(ac).normalized();
+    const int parts = static_cast<int>(std::ceil(std::max({ab.norm(), ac.norm(), (ac - ab).norm()}) / edge));
+    const double area = 0.5 * ab.cross(ac).norm() / (parts * parts);
+    const auto look = [&](double u, double v) {
+      const auto face = cut.closest(a + u / parts * ab + v / parts * ac, near * edge);
+      whole += area;
+      on += face && std::abs(face->normal.dot(normal)) > same_way ? area : 0;
+    };
+    for (int i = 0; i < parts; ++i)
+      for (int k = 0; i + k < parts; ++k) {
+        look(i + 1.0 / 3, k + 1.0 / 3);
+        if (i + k + 1 < parts) // the one that stands on its head
+          look(i + 2.0 / 3, k + 2.0 / 3);
+      }
   }
   return whole > 0 ? on / whole : 0;
 }

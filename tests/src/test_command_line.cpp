@@ -502,7 +502,10 @@ TEST_CASE("A haptic session interrupted while it is solved again off line keeps 
   CHECK(result.status == 130);
   CHECK_THAT(result.out, Contains("interrupted: the session is complete"));
   CHECK(lines_in(read_file(out / "haptic_ticks.csv")) == 60'001);
-  CHECK(!nlohmann::json::parse(read_file(out / "haptic.json")).dump().empty());
+  const auto findings = nlohmann::json::parse(read_file(out / "haptic.json"));
+  CHECK(findings["ticks"] == 60'000);
+  CHECK(findings["interrupted"] == false);
+  CHECK(findings["model_error_N"]["ticks"] == 0);
 }
 
 TEST_CASE("A cut that is not open is said to be closed, without digits below the accuracy") {

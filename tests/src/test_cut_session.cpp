@@ -237,11 +237,19 @@ TEST_CASE("Precuts that cannot be made are refused with file and line") {
                     Contains("case.toml:15") && Contains("precut[1]") && Contains("outside"));
   const std::string flat =
       "[[precut]]\nshape = \"polygon\"\npoints = [[0, 0, 0.01], [0.01, 0, 0.01], [0.02, 0, 0.01]]\n";
-  CHECK_THROWS_WITH(session_of(cut_block + disc_precut + flat), Contains("case.toml:20") && Contains("precut[2]"));
+  CHECK_THROWS_WITH(session_of(cut_block + disc_precut + flat), Contains("case.toml:20: precut[2]"));
   CHECK_THROWS_WITH(
       session_of(replaced(replaced(cut_block, "fine_spacing = 0.005", ""), "coarse_spacing = 0.012", "") + flat),
       Contains("precut[1]") && Contains("enclose no area"));
   const TemporaryFolder folder;
+  topology::SurfaceMesh plate; // two large triangles, a corner of which lies on the disc
+  plate.vertices = {{0.006, 0, 0.016}, {0.026, 0, 0.016}, {0.026, 0.02, 0.016}, {0.006, 0.02, 0.016}};
+  plate.triangles = {{0, 1, 2}, {0, 2, 3}};
+  topology::write_surface(folder.path() / "plate.obj", plate);
+  const auto overlapping = write_file(folder.path() / "overlapping.toml",
+                                      cut_block + disc_precut + "[[precut]]\nshape = \"file\"\nfile = \"plate.obj\"\n");
+  CHECK_THROWS_WITH(Session(read_scenario(overlapping)),
+                    Contains("precut[2]") && Contains("of its area lie on the precuts before it"));
   topology::SurfaceMesh fin; // three triangles on one edge
   fin.vertices = {{0, 0, 0.01}, {0, 0, 0.02}, {0.01, 0, 0.015}, {-0.01, 0.001, 0.015}, {0, 0.01, 0.015}};
   fin.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
