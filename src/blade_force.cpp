@@ -1,5 +1,6 @@
 #include "src/blade_force.hpp"
 
+#include "src/schedule.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -22,11 +23,6 @@ constexpr double open_reach = 0.3;      // node spacings from a sheet: a place t
 
 Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
   return pose.orientation * point + pose.position;
-}
-
-topology::BladePose between(const topology::BladePose& from, const topology::BladePose& to, double share) {
-  return {from.time + share * (to.time - from.time), from.position + share * (to.position - from.position),
-          from.orientation.slerp(share, to.orientation)};
 }
 
 /// Negative inside the body; outside where there is no telling.
@@ -174,9 +170,9 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
     double out = 0, in = 1;
     for (int k = 0; k < entry_steps; ++k) {
       const double middle = 0.5 * (out + in);
-      (outside(between(way_[leg], way_[leg + 1], middle)) ? out : in) = middle;
+      (outside(pose_between(way_[leg], way_[leg + 1], middle)) ? out : in) = middle;
     }
-    met = between(way_[leg], way_[leg + 1], in);
+    met = pose_between(way_[leg], way_[leg + 1], in);
   }
   const Vector3 along = met.orientation * part.along;
   const Vector3 motion = placed(way_[leg + 1], part.point) - placed(way_[leg], part.point);
@@ -297,7 +293,7 @@ std::vector<topology::BladePose> BladeForce::poses_up_to(std::size_t front, doub
   while (leg > front && remaining > 0) {
     const double length = travel(leg - 1, leg);
     if (remaining < (1 - 1e-6) * length) {
-      const topology::BladePose stop = between(way_[leg - 1], way_[leg], 1 - remaining / length);
+      const topology::BladePose stop = pose_between(way_[leg - 1], way_[leg], 1 - remaining / length);
       way_.insert(way_.begin() + static_cast<std::ptrdiff_t>(leg), stop);
       break;
     }
@@ -391,7 +387,7 @@ bool BladeForce::advance(const BodyModel& now) {
     ledger_.move(meeting_.patch, *state_, next, slide * reached / stroke_parts);
     state_ = next;
   }
-  at_ = share ? between(from, target, *share) : target;
+  at_ = share ? pose_between(from, target, *share) : target;
   return share.has_value();
 }
 

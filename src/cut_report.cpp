@@ -34,6 +34,25 @@ std::string_view to_string(SystemUpdate update) {
   return "";
 }
 
+void CutReport::add(const CutReport& later) {
+  triangles += later.triangles;
+  if (later.refused || !refused)
+    reason = later.reason.empty() ? reason : later.reason;
+  refused = refused || later.refused;
+  if (later.update != SystemUpdate::none) {
+    update = later.update;
+    update_reason = later.update_reason;
+    nodes = later.nodes;
+    kept_nodes = later.kept_nodes;
+  }
+  seconds.topology += later.seconds.topology;
+  seconds.level_sets += later.seconds.level_sets;
+  seconds.visibility += later.seconds.visibility;
+  seconds.sprinkling += later.seconds.sprinkling;
+  seconds.assembly += later.seconds.assembly;
+  seconds.solve += later.seconds.solve;
+}
+
 double opening_volume(const topology::Wound& wound, const BodyModel& model) {
   std::vector<std::optional<Vector3>> displacement(wound.surface.vertices.size());
   const auto moved = [&](int vertex) {

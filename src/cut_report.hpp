@@ -24,6 +24,9 @@ struct CutReport : BodyUpdate {
   bool lips_converged = true;
   std::uint64_t surface_hash = 0; // of the wound at rest
   BladeReport blade;              // where the tissue has a toughness
+
+  /// With a later cut of the same step: triangles, refusals, stages, and how the body followed.
+  void add(const CutReport& later);
 };
 
 /// Volume between the faces of the cut, m3: the integral of the opening over the sheets, each face displaced as the

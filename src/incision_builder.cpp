@@ -1,5 +1,6 @@
 #include "src/incision_builder.hpp"
 
+#include "src/schedule.hpp"
 #include "topology/cut_sheets.hpp"
 #include "topology/errors.hpp"
 
@@ -27,6 +28,7 @@ topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
   return topology::read_sheet(file.file, file.scale);
 }
 
+constexpr double straight = 2e-3;    // edges: a way is, where no pose put off is farther from it
 constexpr double least_share = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
 
 /// Part of a sheet's area that lies on the cut so far, 0 to 1, looked at every `edge` m.
@@ -129,17 +131,21 @@ topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, 
   before_ = mark();
   before_.missed.push_back(pose);
   try {
-    if (!missed_.empty() && is_outside(missed_.back(), to_rest)) {
-      sweep_->lift();
-      sweep_->move_to(missed_.back(), to_rest);
-      missed_.clear();
+    if (!missed_.empty() && is_outside(missed_.back(), to_rest))
+      place(topology::BladePose(missed_.back()), to_rest);
+    std::vector<topology::BladePose> way = missed_;
+    way.push_back(pose);
+    if (at_)
+      way = without_straight(blade_->edge, *at_, way, straight * options_.edge);
+    topology::SweepResult last;
+    int triangles = 0;
+    for (const topology::BladePose& next : way) {
+      last = sweep_->move_to(next, to_rest);
+      triangles += last.triangles;
     }
-    topology::SweepResult swept;
-    for (const topology::BladePose& missed : missed_)
-      swept.triangles += sweep_->move_to(missed, to_rest).triangles;
-    topology::SweepResult last = sweep_->move_to(pose, to_rest);
+    at_ = pose;
     missed_.clear();
-    last.triangles += swept.triangles;
+    last.triangles = triangles;
     if (last.triangles == 0)
       return last;
     find_swept();
@@ -155,6 +161,7 @@ bool IncisionBuilder::put_off(const topology::BladePose& pose, const topology::R
   if (is_outside(pose, to_rest))
     return false;
   missed_.push_back(pose);
+  before_.missed.push_back(pose); // taking the last motion back leaves it
   return true;
 }
 
@@ -167,6 +174,7 @@ void IncisionBuilder::place(const topology::BladePose& pose, const topology::Res
   missed_.clear();
   sweep_->lift();
   sweep_->move_to(pose, to_rest);
+  at_ = pose;
 }
 
 void IncisionBuilder::tear(const std::vector<topology::SurfaceMesh>& grown) {
@@ -210,6 +218,7 @@ void IncisionBuilder::take_back() {
   order_ = before_.order;
   swept_ = before_.swept;
   sweep_ = before_.sweep;
+  at_ = before_.at;
   missed_ = before_.missed;
   if (!grew)
     return;

@@ -20,8 +20,8 @@ class IncisionBuilder {
 
   /// Moves the blade and lets incision and wound grow; the first call only places it. Throws InputError and
   /// NumericalError; everything is then as it was. A motion that was not made, or taken back, is made up for by the
-  /// next one: that starts where the blade last cut and passes all poses since. When the blade has been out of the body
-  /// in between it starts there.
+  /// next one: that starts where the blade last cut and passes all poses since, but for those on a straight way, which
+  /// would give but narrower triangles. When the blade has been out of the body in between it starts there.
   topology::SweepResult move_to(const topology::BladePose& pose, const topology::RestMap& to_rest);
 
   /// Keeps a pose for the next motion, which passes it on its way; false, and not kept, when the edge is out of the
@@ -44,9 +44,10 @@ class IncisionBuilder {
     int swept = 0;
     std::shared_ptr<const topology::Incision> incision;
     std::optional<topology::BladeSweep> sweep;
+    std::optional<topology::BladePose> at;
     std::vector<topology::BladePose> missed;
   };
-  [[nodiscard]] Mark mark() const { return {sheets(), own_, order_, swept_, incision_, sweep_, missed_}; }
+  [[nodiscard]] Mark mark() const { return {sheets(), own_, order_, swept_, incision_, sweep_, at_, missed_}; }
   void go_back(const Mark& mark);
 
   /// Brings the level sets to the incision. Throws InputError when they need too much memory.
@@ -78,7 +79,8 @@ class IncisionBuilder {
   std::unique_ptr<topology::CutFields> fields_;
   std::shared_ptr<const topology::Incision> incision_;
   int revision_ = 0;
-  std::vector<topology::BladePose> missed_; // since the place of sweep_
+  std::optional<topology::BladePose> at_;   // of sweep_
+  std::vector<topology::BladePose> missed_; // since then
   Mark before_;                             // before the last motion; missed: and the pose of that motion
 };
 

@@ -103,8 +103,10 @@ std::optional<topology::BladePose> blade_pose(const BladeSettings& blade, double
   const BladePoint& a = blade.path[i - 1];
   const BladePoint& b = blade.path[i];
   const double t = std::clamp((time - a.time) / (b.time - a.time), 0.0, 1.0);
-  return topology::BladePose{time, a.position + t * (b.position - a.position),
-                             orientation(a.rotation).slerp(t, orientation(b.rotation))};
+  topology::BladePose pose =
+      pose_between({a.time, a.position, orientation(a.rotation)}, {b.time, b.position, orientation(b.rotation)}, t);
+  pose.time = time;
+  return pose;
 }
 
 double edge_travel(const std::vector<Vector3>& edge, const topology::BladePose& a, const topology::BladePose& b) {
@@ -112,6 +114,45 @@ double edge_travel(const std::vector<Vector3>& edge, const topology::BladePose& 
   for (const Vector3& x : edge)
     largest = std::max(largest, (b.orientation * x + b.position - a.orientation * x - a.position).norm());
   return largest;
+}
+
+topology::BladePose pose_between(const topology::BladePose& from, const topology::BladePose& to, double share) {
+  return {from.time + share * (to.time - from.time), from.position + share * (to.position - from.position),
+          from.orientation.slerp(share, to.orientation)};
+}
+
+std::vector<topology::BladePose> without_straight(const std::vector<Vector3>& edge, const topology::BladePose& from,
+                                                  const std::vector<topology::BladePose>& way, double tolerance) {
+  constexpr std::ptrdiff_t most_left_out = 64; // in a row: a long way costs no more than its length
+  const auto is_straight = [&](const topology::BladePose& a, const topology::BladePose& b,
+                               const topology::BladePose& x) {
+    if (!x.position.allFinite() || !x.orientation.coeffs().allFinite()) // no sweep can take it
+      return false;
+    const auto place = [](const topology::BladePose& pose, const Vector3& point) -> Vector3 {
+      return pose.orientation * point + pose.position;
+    };
+    double share = 0, longest = 0;
+    for (const Vector3& point : edge) {
+      const Vector3 start = place(a, point), along = place(b, point) - start;
+      if (along.squaredNorm() > longest) {
+        longest = along.squaredNorm();
+        share = std::clamp((place(x, point) - start).dot(along) / longest, 0.0, 1.0);
+      }
+    }
+    return edge_travel(edge, pose_between(a, b, share), x) <= tolerance;
+  };
+  std::vector<topology::BladePose> kept;
+  const topology::BladePose* last = &from;
+  for (auto first = way.begin(); first != way.end();) {
+    auto next = first; // the farthest that can follow `last`
+    while (next + 1 != way.end() && next - first < most_left_out &&
+           std::all_of(first, next + 1, [&](const topology::BladePose& x) { return is_straight(*last, next[1], x); }))
+      ++next;
+    kept.push_back(*next);
+    last = &*next;
+    first = next + 1;
+  }
+  return kept;
 }
 
 double blade_travel(const BladeSettings& blade) {

@@ -19,6 +19,14 @@ std::optional<topology::BladePose> blade_pose(const BladeSettings& blade, double
 /// Farthest way of a point of the edge between two poses, m.
 double edge_travel(const std::vector<Vector3>& edge, const topology::BladePose& a, const topology::BladePose& b);
 
+/// On the straight way from one pose to the other; `share` 0 to 1.
+topology::BladePose pose_between(const topology::BladePose& from, const topology::BladePose& to, double share);
+
+/// The poses of a way that begins at `from`, without those past which it goes straight on: the edge then passes within
+/// `tolerance` m of where it was at each of them. The last one stays.
+std::vector<topology::BladePose> without_straight(const std::vector<Vector3>& edge, const topology::BladePose& from,
+                                                  const std::vector<topology::BladePose>& way, double tolerance);
+
 /// Largest way of a point of the edge from one pose of the path to the next, summed, m.
 double blade_travel(const BladeSettings& blade);
 

@@ -20,6 +20,7 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
+constexpr double same_place = 1e-6;         // of the fine spacing: a blade that has gone less is at rest
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
@@ -133,18 +134,26 @@ StepResult Session::step(const StepSample& sample) {
     last_contact_ = result.contact;
   }
   if (cuts())
-    result.cut.emplace();
+    result.cut = std::exchange(aside_cut_, std::nullopt).value_or(CutReport{});
   const auto kept = std::exchange(kept_grip_, std::nullopt);
   grip_memory_ = model_.state ? remembered_grip() : kept;
   if (without_blade_) {
     model_.field = std::move(*without_blade_);
     without_blade_.reset();
   }
-  if (sample.blade)
+  if (sample.blade && !cuts_aside())
     drop_following();
   const bool released = handle_grasper(sample);
   const std::optional<topology::BladePose> last_blade = last_blade_;
-  const bool solved = incisions_ != nullptr && blade_force_ == nullptr && move_blade(sample, *result.cut);
+  blade_moves_ = sample.blade && last_blade &&
+                 edge_travel(scenario_.blade->edge, *last_blade, *sample.blade) > same_place * zone_.spacing.fine;
+  bool solved = false;
+  if (result.cut && result.cut->update == SystemUpdate::taken_over) { // the blade is carried to rest with its field
+    solve(sample, model_);
+    solved = true;
+  }
+  if (incisions_ != nullptr && blade_force_ == nullptr)
+    solved = move_blade(sample, *result.cut) || solved;
   if (sample.blade)
     last_blade_ = sample.blade;
   // Without any load the organ keeps its rest shape until the tool is on it.
@@ -159,10 +168,16 @@ StepResult Session::step(const StepSample& sample) {
       solve(sample, model_);
     if (touch_) {
       const topology::SurfaceContact centre = centre_of(result.contact, result.pose);
-      if (must_follow(centre) && following_aside_ && recondensing_ == nullptr)
-        follow_aside(sample, centre);
-      else if (must_follow(centre))
-        follow(sample, centre, result);
+      const bool waits = cuts_aside() && !leaves_zone(centre); // nodes are made at one place at a time
+      if (must_follow(centre) && !waits) {
+        if (following_aside_ && recondensing_ == nullptr && !sample.blade) {
+          follow_aside(sample, centre);
+        } else {
+          if (cuts_aside())
+            wait_for_cut(sample, *result.cut);
+          follow(sample, centre, result);
+        }
+      }
     }
     Loading loading{.releases = released};
     if (blade_force_ != nullptr && sample.blade)
@@ -213,6 +228,10 @@ bool Session::must_follow(const topology::SurfaceContact& contact) const {
     return false;
   const double away = (contact.point - zone_contact_->point).norm();
   return away > scenario_.contact.follow_fraction * zone_.spacing.radius;
+}
+
+bool Session::leaves_zone(const topology::SurfaceContact& contact) const {
+  return (contact.point - zone_contact_->point).norm() > zone_.spacing.radius;
 }
 
 // Centres of the fine zone lie on a lattice about the first one, as far apart as the contact may leave a centre. So the
@@ -334,7 +353,8 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
     if (model.patch.nodes.empty())
       return;
     // A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
-    if (force_only_ && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
+    // While it moves the next body is on its way.
+    if (force_only_ && !blade_moves_ && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
         ++model.presses > few_presses)
       solvers::extend_responses(*model.body, candidates_a_press, model.patch);
     const std::vector<int> missed = penetrated_outside_patch(*pose, model);

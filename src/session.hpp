@@ -48,6 +48,10 @@ struct SessionProfile {
 /// Fine spacings ahead of the blade for which a body is condensed: in the step that needs it.
 inline constexpr double way_spacings = 3;
 
+/// Fine spacings that a blade goes at least before a body is made that follows its cut beside the steps, and how many
+/// times as far as that or blade.advance before the steps wait for it.
+inline constexpr double aside_advance = 0.3, most_advances = 3;
+
 class Session {
  public:
   /// Builds and checks organ, motion, precuts and fixed regions; sprinkles when something touches or cuts the organ.
@@ -106,9 +110,11 @@ class Session {
   /// it becomes, depends on the steps alone.
   void set_recondensing(bool on);
 
-  /// On: nodes that follow a tool are sprinkled, and their body assembled and condensed, on a thread of their own. It
-  /// takes over at swap_body(), or, after waiting for it, once the contact has left the fine zone that it would
-  /// replace. When it begins, and what it becomes, depends on the steps alone.
+  /// On: nodes that follow a tool are sprinkled, and their body assembled and condensed, on a thread of their own, and
+  /// so are those that follow the cut of a blade that nothing resists, once it has gone blade.advance, or
+  /// aside_advance. It takes over at swap_body(), or, after waiting for it, once the contact has left the fine zone
+  /// that it would replace, or the blade has gone most_advances times as far; until then cut and wound are those of the
+  /// body. When it begins, and what it becomes, depends on the steps alone.
   void set_following_aside(bool on);
 
   /// Whether such a body is under way; and whether it is there and has followed all that was cut meanwhile.
@@ -148,6 +154,7 @@ class Session {
   [[nodiscard]] topology::SurfaceContact centre_of(const topology::SurfaceContact& contact,
                                                    const topology::ToolPose& pose) const;
   [[nodiscard]] bool must_follow(const topology::SurfaceContact& contact) const;
+  [[nodiscard]] bool leaves_zone(const topology::SurfaceContact& contact) const;
   [[nodiscard]] std::optional<solvers::GripMemory> remembered_grip() const;
   [[nodiscard]] topology::SurfaceContact next_zone(const topology::SurfaceContact& contact) const;
   void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
@@ -162,6 +169,7 @@ class Session {
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
   bool move_blade(const StepSample& sample, CutReport& report);
   bool cut(const StepSample& sample, CutReport& report);
+  void refuse_cut(double time, const char* why, CutReport& report);
   /// An increment of the cut, for a body to follow.
   struct CutGrowth {
     std::function<topology::SurfaceMesh()> way_ahead; // where the cut is going to be next
@@ -187,7 +195,14 @@ class Session {
   void drop_recondensing();
   void follow_aside(const StepSample& sample, const topology::SurfaceContact& centre);
   void begin_following(const topology::SurfaceContact& centre);
+  [[nodiscard]] bool follows_cuts_aside() const;
+  [[nodiscard]] double advance() const;
+  [[nodiscard]] bool may_cut_aside(const StepSample& sample) const;
+  [[nodiscard]] bool cuts_aside() const { return following_ && !following_->centre; }
+  void begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report);
   void take_following();
+  void take_cut();
+  void wait_for_cut(const StepSample& sample, CutReport& report);
   void drop_following();
   [[nodiscard]] Vector3 rest_position(const Vector3& x) const { return rest_position(x, model_); }
   [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
@@ -225,10 +240,16 @@ class Session {
   void evaluate_nodes(StepResult& result);
   void warn(const std::string& key, const std::string& text);
 
-  /// A body on nodes that follow the tool, made on a thread of its own.
+  /// A body that follows the tool or a cut, made on a thread of its own.
+  struct MadeAside {
+    BodyModel model;
+    BodyUpdate report;
+  };
   struct Following {
-    topology::SurfaceContact centre; // of its fine zone
-    std::future<BodyModel> made;
+    std::optional<topology::SurfaceContact> centre; // of its fine zone; empty: it follows a cut
+    double time = 0;                                // s, of the step that made the cut
+    int triangles = 0;                              // of the cut
+    std::future<MadeAside> made;
   };
   /// Tissue in a grasper's jaws.
   struct Grasp {
@@ -269,11 +290,12 @@ class Session {
   BodyModel model_;
   std::unique_ptr<BladeForce> blade_force_;     // null: nothing resists the blade
   std::optional<IncisionBuilder::Mark> mark_;   // the cut without the blade's proposal
-  std::optional<topology::Wound> shown_wound_;  // the same as a surface; empty: there is no proposal
+  std::optional<topology::Wound> shown_wound_;  // of the body while the cut is ahead of it; empty: that of the cut
   std::optional<solvers::Field> without_blade_; // field of model_ without blade; empty: that is model_.field
   std::optional<topology::SurfaceContact> last_contact_;
   double put_off_ = 0;                            // m the edge has gone since the body last followed its cut
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
+  bool blade_moves_ = false;                      // since that step
   bool blade_lifted_ = false;                     // its next pose places it
   bool hand_led_ = false;                         // the blade goes where it likes, not along the scenario's path
   std::vector<solvers::PointState> node_states_;
@@ -296,7 +318,8 @@ class Session {
   bool followed_aside_ = false; // its body has taken over since the last step
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;
-  std::future<BodyModel> unwanted_;    // one that nobody will take
+  std::optional<CutReport> aside_cut_; // whose body has taken over since the last step, or which was refused
+  std::future<MadeAside> unwanted_;    // one that nobody will take
   std::optional<Following> following_; // empty: none; its thread uses the above
 };
 

@@ -86,27 +86,53 @@ void Session::lift_blade() {
 // Moves the blade, or keeps its motion for later: until it has gone blade.advance, the body need not follow. What is
 // left is cut when the blade leaves the body, is lifted or gone, or the run ends.
 bool Session::move_blade(const StepSample& sample, CutReport& report) {
-  if (put_off_ > 0 && (!sample.blade || blade_lifted_)) { // a lifted blade is placed anew in the step after this one
+  bool solved = false;
+  const auto wait = [&] {
+    if (!cuts_aside())
+      return;
+    wait_for_cut(sample, report);
+    solved = true;
+  };
+  const auto make_cut = [&](const StepSample& at) {
+    wait();
+    put_off_ = 0;
+    CutReport made;
+    solved = cut(at, made) || solved;
+    report.add(made);
+  };
+  const bool leads_on = sample.blade && !blade_lifted_;
+  if (!leads_on)
+    wait();
+  if (put_off_ > 0 && !leads_on) { // a lifted blade is placed anew in the step after this one
     StepSample left = sample;
     left.blade = std::exchange(last_blade_, std::nullopt);
-    put_off_ = 0;
     const bool lifted = std::exchange(blade_lifted_, false);
-    const bool solved = cut(left, report);
+    make_cut(left);
     blade_lifted_ = lifted;
     return solved;
   }
   if (!sample.blade)
-    return false;
-  if (scenario_.blade->advance > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
+    return solved;
+  if (advance() > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
     put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
     topology::RestMap to_rest;
     if (model_.state)
       to_rest = [this](const Vector3& x) { return rest_position(x); };
-    if (put_off_ < scenario_.blade->advance * zone_.spacing.fine && incisions_->put_off(*sample.blade, to_rest))
-      return false;
+    if (put_off_ < (cuts_aside() ? most_advances : 1) * advance() && incisions_->put_off(*sample.blade, to_rest))
+      return solved;
   }
-  put_off_ = 0;
-  return cut(sample, report);
+  make_cut(sample);
+  return solved;
+}
+
+void Session::refuse_cut(double time, const char* why, CutReport& report) {
+  report.triangles = 0;
+  report.refused = true;
+  report.reason = why;
+  report.update = SystemUpdate::none;
+  report.update_reason.clear();
+  report.nodes = report.kept_nodes = 0;
+  warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", time, why));
 }
 
 // Moves the blade; true when that cut something and the body with the new cut is built and solved. A refusal leaves
@@ -117,26 +143,22 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     to_rest = [this](const Vector3& x) { return rest_position(x); };
   topology::SweepResult swept;
   const solvers::Discretisation* const body = model_.body.get();
-  const auto refuse = [&](const char* why) {
-    report.triangles = 0;
-    report.refused = true;
-    report.reason = why;
-    report.update = SystemUpdate::none;
-    report.update_reason.clear();
-    report.nodes = report.kept_nodes = 0;
-    warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, why));
-  };
+  const bool aside = may_cut_aside(sample);
+  std::optional<topology::Wound> wound_before;
   {
     const StageTimer timer(report.seconds.topology);
     try {
-      if (std::exchange(blade_lifted_, false))
+      if (std::exchange(blade_lifted_, false)) {
         incisions_->place(*sample.blade, to_rest);
-      else
+      } else {
+        if (aside)
+          wound_before = incisions_->wound();
         swept = incisions_->move_to(*sample.blade, to_rest);
+      }
     } catch (const InputError& error) {
-      refuse(error.what());
+      refuse_cut(sample.time, error.what(), report);
     } catch (const NumericalError& error) {
-      refuse(error.what());
+      refuse_cut(sample.time, error.what(), report);
     }
   }
   report.triangles = swept.triangles;
@@ -157,6 +179,11 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();
     }
+    if (aside) {
+      begin_cutting(next.incision, sample.time, report);
+      shown_wound_ = std::move(wound_before);
+      return false;
+    }
     build_cut({.way_ahead = [&] { return way_of_blade(sample, to_rest); }}, next, report);
     {
       const StageTimer timer(report.seconds.solve);
@@ -168,9 +195,9 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     lead_recondensing(sample, to_rest);
     return true;
   } catch (const InputError& error) {
-    refuse(error.what());
+    refuse_cut(sample.time, error.what(), report);
   } catch (const NumericalError& error) {
-    refuse(error.what());
+    refuse_cut(sample.time, error.what(), report);
   }
   take_back_cut(body);
   return false;

@@ -1,15 +1,33 @@
-// Nodes that follow the tool, with their body, made beside the steps: the body as it is goes on meanwhile.
+// A body that follows the tool or a cut that was put off, made beside the steps: the body as it is goes on meanwhile.
+#include "solvers/cut_sight.hpp"
 #include "src/session.hpp"
+#include "src/stage_timer.hpp"
 
+#include <algorithm>
 #include <fmt/format.h>
+#include <stdexcept>
 #include <utility>
 
+#include <sys/resource.h>
+
 namespace spherecut::app {
+namespace {
+
+constexpr int aside_niceness = 5; // above that of the steps: where they share a core the steps go first
+
+void yield_to_steps() {
+  static_cast<void>(setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + aside_niceness)); // this thread's
+}
+
+} // namespace
 
 void Session::set_following_aside(bool on) {
   following_aside_ = on;
-  if (!on)
-    drop_following();
+  if (on)
+    return;
+  if (cuts_aside())
+    take_cut();
+  drop_following();
 }
 
 // The contact has come so far from the middle of the fine zone that this must follow.
@@ -18,7 +36,7 @@ void Session::follow_aside(const StepSample& sample, const topology::SurfaceCont
     begin_following(next_zone(centre));
     return;
   }
-  if ((centre.point - zone_contact_->point).norm() <= zone_.spacing.radius)
+  if (!leaves_zone(centre))
     return;
   take_following();
   solve(sample, model_);
@@ -33,33 +51,144 @@ void Session::begin_following(const topology::SurfaceContact& centre) {
   auto make = [&scenario = scenario_, domain = organ_.domain, how = std::move(options),
                previous = model_.sprinkling.nodes, coarseness = coarseness_, centre, reach = zone_.candidate_radius,
                before = std::move(unwanted_)]() mutable {
+    yield_to_steps();
     if (before.valid())
       before.wait(); // so that one computes at a time
-    BodyModel made;
-    made.incision = how.incision;
-    made.sprinkling = resprinkle_held(scenario, *domain, how, previous);
-    made.coarseness = coarseness;
-    const std::vector<int> near = touchable_nodes(scenario, *domain, made.sprinkling.nodes, centre, reach);
-    app::assemble(scenario, domain, made, {}, near);
-    app::condense(near, made);
+    MadeAside made;
+    BodyModel& model = made.model;
+    model.incision = how.incision;
+    model.sprinkling = resprinkle_held(scenario, *domain, how, previous);
+    model.coarseness = coarseness;
+    const std::vector<int> near = touchable_nodes(scenario, *domain, model.sprinkling.nodes, centre, reach);
+    app::assemble(scenario, domain, model, {}, near);
+    app::condense(near, model);
     return made;
   };
-  following_ = Following{centre, std::async(std::launch::async, std::move(make))};
+  following_ = Following{centre, 0, 0, std::async(std::launch::async, std::move(make))};
+}
+
+// Where nothing but the blade, which may be ahead of its body, changes the tissue.
+bool Session::follows_cuts_aside() const {
+  return following_aside_ && scenario_.blade && blade_force_ == nullptr && !tears() &&
+         !(scenario_.tool && scenario_.tool->grasp);
+}
+
+// m that the blade goes before its body follows.
+double Session::advance() const {
+  const double spacings = scenario_.blade->advance;
+  return (follows_cuts_aside() ? std::max(spacings, aside_advance) : spacings) * zone_.spacing.fine;
+}
+
+bool Session::may_cut_aside(const StepSample& sample) const {
+  return follows_cuts_aside() && model_.state && sample.time != steps_.back().time;
+}
+
+// On the nodes that a step would have made, rebuilt: no window pays that serves one increment.
+void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report) {
+  BodyModel next;
+  next.incision = std::move(incision);
+  const bool touches = tool_in_reach();
+  auto make = [&scenario = scenario_, domain = organ_.domain, how = sprinkle_options(next),
+               incision_before = model_.incision, sprinkling = model_.sprinkling,
+               same_spacing = model_.coarseness == coarseness_, coarseness = coarseness_,
+               centre = touches ? zone_contact_ : std::nullopt, reach = zone_.candidate_radius,
+               waits_for = std::move(unwanted_)]() mutable {
+    yield_to_steps();
+    if (waits_for.valid())
+      waits_for.wait();
+    MadeAside made;
+    BodyModel& model = made.model;
+    BodyUpdate& update = made.report;
+    model.incision = how.incision;
+    model.coarseness = coarseness;
+    BodyModel before;
+    before.incision = std::move(incision_before);
+    before.sprinkling = std::move(sprinkling);
+    std::vector<int> near;
+    const double seen = solvers::sight_seconds();
+    const auto build = [&](const auto& sprinkle) {
+      {
+        const StageTimer timer(update.seconds.sprinkling);
+        sprinkle();
+      }
+      const StageTimer timer(update.seconds.assembly);
+      near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
+      app::assemble(scenario, domain, model, {}, near);
+    };
+    update.update_reason = "the spacing has changed";
+    if (same_spacing)
+      try {
+        build([&] { exchange_nodes(*domain, how, before, model.sprinkling); });
+        update.update_reason = "the cut was put off";
+      } catch (const std::runtime_error& error) { // with all nodes made anew it may go
+        update.update_reason = error.what();
+        model.body.reset();
+      }
+    if (model.body == nullptr)
+      build([&] { model.sprinkling = resprinkle_held(scenario, *domain, how, before.sprinkling.nodes); });
+    update.seconds.visibility = solvers::sight_seconds() - seen;
+    update.seconds.solve = model.body->report().factor_seconds;
+    update.seconds.assembly -= update.seconds.visibility + update.seconds.solve;
+    update.nodes = model.sprinkling.nodes.size();
+    const std::vector<int>& from = model.sprinkling.kept_from;
+    update.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+    const StageTimer timer(update.seconds.solve);
+    app::condense(near, model, true);
+    return made;
+  };
+  following_ = Following{std::nullopt, time, std::exchange(report.triangles, 0),
+                         std::async(std::launch::async, std::move(make))};
 }
 
 // Waits for it where need be. A failure leaves the body as it is.
 void Session::take_following() {
-  Following following = std::move(*following_);
+  if (cuts_aside()) {
+    take_cut();
+    return;
+  }
+  const topology::SurfaceContact centre = following_->centre.value();
+  std::future<MadeAside> made = std::move(following_->made);
   following_.reset();
-  BodyModel next = following.made.get();
+  BodyModel next = made.get().model;
   drop_recondensing();
   without_blade_.reset();
   kept_grip_ = remembered_grip();
-  zone_contact_ = following.centre;
-  zone_.spacing.centres = {following.centre.point};
+  zone_contact_ = centre;
+  zone_.spacing.centres = {centre.point};
   model_ = std::move(next);
   followed_aside_ = true;
   say_(fmt::format("the fine zone has followed the tool: {} nodes", model_.sprinkling.nodes.size()));
+}
+
+// The next step tells of it. Where its body could not be made the cut is refused.
+void Session::take_cut() {
+  Following following = std::move(*following_);
+  following_.reset();
+  shown_wound_.reset();
+  CutReport& report = aside_cut_.emplace();
+  try {
+    MadeAside made = following.made.get();
+    static_cast<BodyUpdate&>(report) = std::move(made.report);
+    report.update = SystemUpdate::taken_over;
+    report.triangles = following.triangles;
+    profile_.sprinkle += report.seconds.sprinkling;
+    profile_.discretise += report.seconds.assembly + report.seconds.visibility;
+    profile_.condense += report.seconds.solve;
+    drop_recondensing();
+    kept_grip_ = remembered_grip();
+    model_ = std::move(made.model);
+  } catch (const std::runtime_error& error) {
+    incisions_->take_back();
+    refuse_cut(following.time, error.what(), report);
+  }
+}
+
+// The body has to be at its cut before this step goes on.
+void Session::wait_for_cut(const StepSample& sample, CutReport& report) {
+  take_cut();
+  grip_memory_ = std::exchange(kept_grip_, std::nullopt);
+  solve(sample, model_);
+  report.add(*std::exchange(aside_cut_, std::nullopt));
 }
 
 void Session::drop_following() {

@@ -60,6 +60,8 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
                            StepResult& result) {
   if (recondensing_ != nullptr || model_.coarseness != coarseness_ || !result.cut || tears())
     return;
+  if (follows_cuts_aside()) // rebuilt: they need no window
+    return;
   const double fine = zone_.spacing.fine;
   const auto to_rest = [this](const Vector3& x) { return rest_position(x); };
   const auto way_of = [&](double length) {
@@ -151,7 +153,7 @@ bool Session::recondensed() const {
 bool Session::swap_body() {
   if (following_) {
     take_following();
-    return true;
+    return !(aside_cut_ && aside_cut_->refused);
   }
   if (recondensing_ == nullptr)
     return false;

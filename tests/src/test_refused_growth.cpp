@@ -181,3 +181,40 @@ position = [0.003, 0, 0.012]
   }
   FAIL("no cut was refused");
 }
+
+TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the next one makes up for it") {
+  const std::string text = cut_block + replaced(incision_at_end, "step = 0.2", "step = 0.05\nadvance = 0.3");
+  const Scenario scenario = scenario_of(replaced(replaced(text, "-0.042", "-0.012"), "-0.043", "-0.013"));
+  Session plain(scenario), session(scenario);
+  session.set_following_aside(true);
+  std::size_t i = 0;
+  const auto go_until_it_cuts = [&] {
+    while (i + 1 < session.steps().size() && !session.recondensing())
+      session.step(session.steps()[i++]);
+    REQUIRE(session.recondensing());
+  };
+  go_until_it_cuts();
+  REQUIRE(session.swap_body());
+  CHECK(session.step(session.steps()[i++]).cut->triangles > 0);
+  const Before before(session);
+  const std::size_t triangles = session.wound()->surface.triangles.size();
+  failing_condensations = 1;
+  go_until_it_cuts();
+  CHECK_FALSE(session.swap_body());
+  CHECK(failing_condensations == 0);
+  CHECK_FALSE(session.recondensing());
+  CHECK(session.sprinkling().nodes.positions == before.nodes);
+  CHECK(session.wound()->surface.triangles.size() == triangles);
+  const StepResult refused = session.step(session.steps()[i++]);
+  CHECK(refused.cut->refused);
+  CHECK(refused.cut->triangles == 0);
+  CHECK_THAT(refused.cut->reason, Contains("not condensed"));
+  CHECK(refused.cut->area == before.area);
+  StepResult last, as_plain;
+  for (; i < session.steps().size(); ++i)
+    last = session.step(session.steps()[i]);
+  for (const StepSample& sample : plain.steps())
+    as_plain = plain.step(sample);
+  CHECK(last.cut->area > before.area);
+  CHECK(last.cut->area == Approx(as_plain.cut->area).epsilon(1e-3));
+}

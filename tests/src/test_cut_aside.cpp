@@ -1,0 +1,237 @@
+// A body that follows a cut which was put off beside the steps, taken over at a definite step.
+#include "src/haptics/virtual_loop.hpp"
+#include "tests/src/scenario_session.hpp"
+#include "tests/src/scenario_text.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+
+namespace {
+
+// A ball that holds a block down, and a blade that comes down beside it.
+const std::string press = R"([tool]
+shape = "sphere_tip"
+radius = 0.01
+step = 0.05
+[[tool.path]]
+time = 0
+position = [0.015, 0, 0.0305]
+[[tool.path]]
+time = 0.2
+position = [0.015, 0, 0.0285]
+[[tool.path]]
+time = 1
+position = [0.015, 0.001, 0.0285]
+)";
+
+std::string blade_through(const std::vector<std::string>& positions) {
+  std::string text = "[blade]\nedge = [[0, -0.009, 0], [0, 0.009, 0.001]]\nstep = 0.05\nadvance = 0.4\n";
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    text += fmt::format("[[blade.path]]\ntime = {}\nposition = {}\n",
+                        static_cast<double>(i) / static_cast<double>(positions.size() - 1), positions[i]);
+  return text;
+}
+
+const std::string pressed_and_cut =
+    cut_block + press + blade_through({"[-0.02, 0.001, 0.034]", "[-0.022, 0, 0.012]"}) + "[output]\nfigures = false\n";
+
+// In on a way that turns, out again, and in beside it.
+const std::string in_and_out =
+    cut_block + blade_through({"[-0.004, 0, 0.034]", "[-0.004, 0, 0.022]", "[0.002, 0.001, 0.020]", "[0.003, 0, 0.036]",
+                               "[0.012, 0, 0.036]", "[0.012, 0, 0.021]"});
+
+} // namespace
+
+TEST_CASE("A body made beside the steps is the one that a step would have made, and gives the same force") {
+  const auto [method, is_pressed] =
+      GENERATE(std::pair("galerkin", true), std::pair("galerkin", false), std::pair("collocation", true));
+  const Scenario scenario =
+      scenario_of((is_pressed ? pressed_and_cut : in_and_out) + "[method]\nname = \"" + std::string(method) + "\"\n");
+  Session waits(scenario), goes_on(scenario);
+  waits.set_updating(false);
+  goes_on.set_following_aside(true);
+  int followed = 0;
+  double area = 0;
+  for (const StepSample& sample : waits.steps()) {
+    const bool cuts = waits.step(sample).cut->triangles > 0;
+    const int nodes = goes_on.sprinkling().nodes.size();
+    const bool is_built = goes_on.body() != nullptr;
+    const StepResult before = goes_on.step(sample);
+    const bool is_last = sample.time == waits.steps().back().time; // what is left at the end is not put off
+    REQUIRE(goes_on.recondensing() == (cuts && is_built && !is_last));
+    if (!goes_on.recondensing()) {
+      area = before.cut->area;
+      continue;
+    }
+    ++followed;
+    CHECK(before.cut->triangles == 0); // body, cut and wound as they were have gone on
+    CHECK(before.cut->area == area);
+    CHECK(goes_on.sprinkling().nodes.size() == nodes);
+    REQUIRE(goes_on.swap_body());
+    CHECK_FALSE(goes_on.recondensing());
+    StepSample again = sample;
+    again.time += 1e-6;
+    again.blade->time = again.time;
+    const StepResult here = waits.step(again), there = goes_on.step(again);
+    if (!is_pressed) // else rounding of the blade's places at rest may decide for another node
+      CHECK(goes_on.sprinkling().nodes.positions == waits.sprinkling().nodes.positions);
+    CHECK(std::abs(there.nodes - here.nodes) <= 4);
+    CHECK(there.cut->triangles > 0);
+    CHECK(there.cut->update == SystemUpdate::taken_over);
+    CHECK(there.cut->nodes == there.nodes);
+    CHECK(there.cut->area >= area);
+    CHECK(there.cut->area == Approx(here.cut->area).epsilon(is_pressed ? 1e-4 : 1e-12));
+    area = there.cut->area;
+    if (!is_pressed)
+      continue;
+    CHECK(here.force.norm() > 0.05);
+    CHECK((there.force - here.force).norm() <= (followed == 1 ? 1e-6 : 1e-4) * here.force.norm());
+  }
+  CHECK(followed >= 4);
+}
+
+TEST_CASE("A blade that is too far ahead waits for its body, and when a thread runs does not change a bit") {
+  const Scenario scenario = scenario_of(pressed_and_cut);
+  const auto run = [&](std::chrono::milliseconds pause, int& followed, double& area) {
+    Session session(scenario);
+    session.set_following_aside(true);
+    std::vector<VectorX> fields;
+    for (const StepSample& sample : session.steps()) {
+      const StepResult result = session.step(sample);
+      CHECK_FALSE(result.cut->refused);
+      followed += result.cut->update == SystemUpdate::taken_over ? 1 : 0;
+      area = result.cut->area;
+      fields.push_back(session.field().coefficients);
+      std::this_thread::sleep_for(pause);
+    }
+    CHECK_FALSE(session.recondensing());
+    return fields;
+  };
+  int quick = 0, slow = 0;
+  double quick_area = 0, slow_area = 0;
+  const std::vector<VectorX> a = run(std::chrono::milliseconds(0), quick, quick_area);
+  const std::vector<VectorX> b = run(std::chrono::milliseconds(60), slow, slow_area);
+  CHECK(quick >= 2);
+  CHECK(slow == quick);
+  CHECK(a == b);
+  Session plain(scenario);
+  double area = 0;
+  for (const StepSample& sample : plain.steps())
+    area = plain.step(sample).cut->area;
+  CHECK(quick_area == Approx(area).epsilon(2e-3)); // at its end the blade is where it was
+}
+
+TEST_CASE("A blade that leaves the tissue or is lifted while its body is under way has cut what it went through") {
+  const Scenario scenario = scenario_of(in_and_out);
+  const int swaps = GENERATE(0, 2, 5); // steps from the beginning of a body to where it takes over; 0: when waited for
+  Session plain(scenario), aside(scenario);
+  aside.set_following_aside(true);
+  int under_way = 0, followed = 0;
+  StepResult here, there;
+  for (const StepSample& sample : plain.steps()) {
+    here = plain.step(sample);
+    there = aside.step(sample);
+    CHECK_FALSE(there.cut->refused);
+    followed += there.cut->update == SystemUpdate::taken_over ? 1 : 0;
+    CHECK(there.cut->area <= here.cut->area * (1 + 1e-3));
+    under_way = aside.recondensing() ? under_way + 1 : 0;
+    if (swaps > 0 && under_way >= swaps)
+      CHECK(aside.swap_body());
+  }
+  CHECK(followed >= 2);
+  CHECK(there.cut->area == Approx(here.cut->area).epsilon(1e-3)); // the body is at rest, poses are the same there
+  CHECK(there.cut->front_length == Approx(here.cut->front_length).epsilon(1e-3));
+  CHECK(there.cut->sheets == here.cut->sheets);
+}
+
+TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the cut that was under way") {
+  const bool lifts = GENERATE(true, false);
+  const Scenario scenario = scenario_of(in_and_out);
+  Session session(scenario);
+  session.set_following_aside(true);
+  std::size_t i = 0;
+  while (i < session.steps().size() && !session.recondensing())
+    session.step(session.steps()[i++]);
+  REQUIRE(session.recondensing());
+  const double before = session.incision() == nullptr ? 0 : session.incision()->area();
+  if (lifts)
+    session.lift_blade();
+  else
+    session.set_following_aside(false);
+  const StepResult result = session.step(session.steps()[i]);
+  CHECK_FALSE(session.recondensing());
+  CHECK(result.cut->triangles > 0);
+  CHECK(result.cut->area > before);
+  CHECK(session.incision()->area() == result.cut->area);
+}
+
+TEST_CASE("A blade whose cuts are followed in every step is followed beside them too, every third of a spacing") {
+  Session session(scenario_of(replaced(pressed_and_cut, "advance = 0.4", "advance = 0")));
+  session.set_following_aside(true);
+  int followed = 0, in_the_step = 0;
+  for (const StepSample& sample : session.steps()) {
+    const StepResult result = session.step(sample);
+    followed += result.cut->update == SystemUpdate::taken_over ? 1 : 0;
+    in_the_step += result.cut->triangles > 0 && result.cut->update != SystemUpdate::taken_over ? 1 : 0;
+    if (session.recondensing())
+      CHECK(session.swap_body());
+  }
+  CHECK(followed >= 6);
+  CHECK(in_the_step <= 1); // what was left at the end
+}
+
+TEST_CASE("While the blade moves fields of the contact are not made for a body that will soon be another") {
+  Session session(scenario_of(replaced(pressed_and_cut, "advance = 0.4", "advance = 1")));
+  session.set_force_only(true);
+  StepSample sample = *std::find_if(session.steps().begin(), session.steps().end(), [&](const StepSample& s) {
+    session.step(s);
+    return session.incision() != nullptr;
+  });
+  const auto press_on = [&](double way) {
+    for (int i = 0; i < few_presses + 5; ++i) {
+      sample.time += 1e-5;
+      sample.blade->time = sample.time;
+      sample.blade->position.z() -= way;
+      session.step(sample);
+    }
+    return session.model().patch.responses.size();
+  };
+  CHECK(press_on(1e-6) == 0);
+  CHECK(press_on(0) > 0);
+}
+
+TEST_CASE("In the loop a body that followed its cut aside takes over at the recorded solve, with the same bits") {
+  const Scenario scenario = scenario_of(pressed_and_cut);
+  HapticSettings settings;
+  const auto loop = [&] {
+    std::vector<SolveEvent> events = regular_solves(1000, 40, 20);
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      events[i].aside = true;
+      events[i].swaps = i % 3 == 2;
+    }
+    HapticSimulation simulation(scenario);
+    ScriptedPath device(simulation.path(), settings.rate);
+    return run_virtual(settings, simulation, device, events, 1000);
+  };
+  const LoopRecords first = loop(), second = loop();
+  REQUIRE(first.solves.size() == second.solves.size());
+  REQUIRE(first.ticks.size() == second.ticks.size());
+  int followed = 0;
+  for (std::size_t i = 0; i < first.solves.size(); ++i) {
+    CHECK_FALSE(first.solves[i].failed);
+    CHECK(first.solves[i].topology == second.solves[i].topology);
+    CHECK(first.solves[i].cut_area == second.solves[i].cut_area);
+    followed += first.solves[i].update == "taken over" ? 1 : 0;
+  }
+  CHECK(followed >= 3);
+  bool same = true;
+  for (std::size_t i = 0; i < first.ticks.size(); ++i)
+    same = same && first.ticks[i].force == second.ticks[i].force;
+  CHECK(same);
+}
