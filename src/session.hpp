@@ -48,9 +48,8 @@ struct SessionProfile {
 /// Fine spacings ahead of the blade for which a body is condensed: in the step that needs it.
 inline constexpr double way_spacings = 3;
 
-/// Fine spacings that a blade goes at least before a body is made that follows its cut beside the steps, and how many
-/// times as far as that or blade.advance before the steps wait for it.
-inline constexpr double aside_advance = 0.3, most_advances = 3;
+/// Times blade.advance that a blade goes on before the steps wait for a body that is made beside them.
+inline constexpr double most_advances = 3;
 
 class Session {
  public:
@@ -111,10 +110,10 @@ class Session {
   void set_recondensing(bool on);
 
   /// On: nodes that follow a tool are sprinkled, and their body assembled and condensed, on a thread of their own, and
-  /// so are those that follow the cut of a blade that nothing resists, once it has gone blade.advance, or
-  /// aside_advance. It takes over at swap_body(), or, after waiting for it, once the contact has left the fine zone
-  /// that it would replace, or the blade has gone most_advances times as far; until then cut and wound are those of the
-  /// body. When it begins, and what it becomes, depends on the steps alone.
+  /// so are those that follow a cut which was put off (blade.advance). It takes over at swap_body(), or, after waiting
+  /// for it, once the contact has left the fine zone that it would replace, or the blade has gone most_advances times
+  /// blade.advance since; until then cut and wound are those of the body. When it begins, and what it becomes, depends
+  /// on the steps alone.
   void set_following_aside(bool on);
 
   /// Whether such a body is under way; and whether it is there and has followed all that was cut meanwhile.
@@ -196,7 +195,6 @@ class Session {
   void follow_aside(const StepSample& sample, const topology::SurfaceContact& centre);
   void begin_following(const topology::SurfaceContact& centre);
   [[nodiscard]] bool follows_cuts_aside() const;
-  [[nodiscard]] double advance() const;
   [[nodiscard]] bool may_cut_aside(const StepSample& sample) const;
   [[nodiscard]] bool cuts_aside() const { return following_ && !following_->centre; }
   void begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report);

@@ -113,12 +113,13 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
   }
   if (!sample.blade)
     return solved;
-  if (advance() > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
+  const double advance = scenario_.blade->advance * zone_.spacing.fine;
+  if (advance > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
     put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
     topology::RestMap to_rest;
     if (model_.state)
       to_rest = [this](const Vector3& x) { return rest_position(x); };
-    if (put_off_ < (cuts_aside() ? most_advances : 1) * advance() && incisions_->put_off(*sample.blade, to_rest))
+    if (put_off_ < (cuts_aside() ? most_advances : 1) * advance && incisions_->put_off(*sample.blade, to_rest))
       return solved;
   }
   make_cut(sample);

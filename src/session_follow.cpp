@@ -69,14 +69,8 @@ void Session::begin_following(const topology::SurfaceContact& centre) {
 
 // Where nothing but the blade, which may be ahead of its body, changes the tissue.
 bool Session::follows_cuts_aside() const {
-  return following_aside_ && scenario_.blade && blade_force_ == nullptr && !tears() &&
+  return following_aside_ && scenario_.blade && scenario_.blade->advance > 0 && !tears() &&
          !(scenario_.tool && scenario_.tool->grasp);
-}
-
-// m that the blade goes before its body follows.
-double Session::advance() const {
-  const double spacings = scenario_.blade->advance;
-  return (follows_cuts_aside() ? std::max(spacings, aside_advance) : spacings) * zone_.spacing.fine;
 }
 
 bool Session::may_cut_aside(const StepSample& sample) const {

@@ -171,21 +171,6 @@ TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the c
   CHECK(session.incision()->area() == result.cut->area);
 }
 
-TEST_CASE("A blade whose cuts are followed in every step is followed beside them too, every third of a spacing") {
-  Session session(scenario_of(replaced(pressed_and_cut, "advance = 0.4", "advance = 0")));
-  session.set_following_aside(true);
-  int followed = 0, in_the_step = 0;
-  for (const StepSample& sample : session.steps()) {
-    const StepResult result = session.step(sample);
-    followed += result.cut->update == SystemUpdate::taken_over ? 1 : 0;
-    in_the_step += result.cut->triangles > 0 && result.cut->update != SystemUpdate::taken_over ? 1 : 0;
-    if (session.recondensing())
-      CHECK(session.swap_body());
-  }
-  CHECK(followed >= 6);
-  CHECK(in_the_step <= 1); // what was left at the end
-}
-
 TEST_CASE("While the blade moves fields of the contact are not made for a body that will soon be another") {
   Session session(scenario_of(replaced(pressed_and_cut, "advance = 0.4", "advance = 1")));
   session.set_force_only(true);
