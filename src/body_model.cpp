@@ -196,7 +196,7 @@ bool window_pays(const Scenario& scenario, const solvers::Problem& problem, cons
   const solvers::DiscretisationOptions method = method_of(scenario);
   if (method.method == solvers::Method::collocation && problem.nodes.size() > largest_followed_balance)
     return false;
-  const bool goes_far = scenario.blade && scenario.blade->advance > long_advance;
+  const bool goes_far = scenario.blade && scenario.blade->advance.value_or(0) > long_advance;
   return solvers::window_share(problem, method, way) <= (goes_far ? largest_share_of_long : largest_share);
 }
 

@@ -97,7 +97,7 @@ BladeSettings blade(const Section& section, Offences& offences) {
   blade.friction = section.number("friction");
   blade.flank = section.number("flank");
   blade.step = section.optional_number("step").value_or(0);
-  blade.advance = section.number("advance");
+  blade.advance = section.optional_number("advance");
   blade.path = blade_path(section, offences);
   const double duration = blade.path.empty() ? 0 : blade.path.back().time - blade.path.front().time;
   if (duration > 0 && blade.step > 0 &&

@@ -48,15 +48,15 @@ struct BladePoint {
 };
 
 struct BladeSettings {
-  std::vector<Vector3> edge;    // m, in the blade's frame, from end to end
-  double edge_radius = 0;       // m
-  double sharpness = 1;         // share of the edge's work that makes new surface
-  double friction = 0;          // Pa, shear of the flanks
-  double flank = 0;             // m behind the edge as far as they touch
-  double step = 0;              // s, 0: derived
-  double advance = 0;           // fine spacings the blade goes before the body follows its cut
-  std::vector<BladePoint> path; // in order of time
-  int line = 0;                 // of the scenario file
+  std::vector<Vector3> edge;     // m, in the blade's frame, from end to end
+  double edge_radius = 0;        // m
+  double sharpness = 1;          // share of the edge's work that makes new surface
+  double friction = 0;           // Pa, shear of the flanks
+  double flank = 0;              // m behind the edge as far as they touch
+  double step = 0;               // s, 0: derived
+  std::optional<double> advance; // fine spacings the blade goes before the body follows its cut; empty: derived
+  std::vector<BladePoint> path;  // in order of time
+  int line = 0;                  // of the scenario file
 };
 
 } // namespace spherecut::app

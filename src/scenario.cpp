@@ -242,12 +242,12 @@ void check_blade_force(const Scenario& scenario, const Section& root, Offences& 
                    fmt::format("blade.{} is given, but nothing resists the blade: material.toughness is left out; "
                                "allowed: both or neither",
                                key));
-  if (resists && blade.advance > 0)
+  if (resists && blade.advance.value_or(0) > 0)
     offences.add(
         section.line("advance"),
         fmt::format("blade.advance = {:g} with material.toughness = {:g} J/m2: a resisted blade cuts as far as "
                     "its work goes; allowed: one of them",
-                    blade.advance, scenario.toughness));
+                    *blade.advance, scenario.toughness));
   if (blade.friction > 0 && blade.flank == 0)
     offences.add(section.line("friction"), fmt::format("blade.friction = {:g} Pa on flanks of no extent; allowed: with "
                                                        "blade.flank above 0 m",

@@ -20,7 +20,8 @@ constexpr double stretched_rotation = 10;   // degrees, beyond which linear elas
 constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
-constexpr double same_place = 1e-6;         // of the fine spacing: a blade that has gone less is at rest
+constexpr double same_place = 1e-6;         // of the fine spacing: a blade that has gone less has not moved
+constexpr double rest = 0.1;                // s without motion after which it is at rest
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
@@ -145,8 +146,10 @@ StepResult Session::step(const StepSample& sample) {
     drop_following();
   const bool released = handle_grasper(sample);
   const std::optional<topology::BladePose> last_blade = last_blade_;
-  blade_moves_ = sample.blade && last_blade &&
-                 edge_travel(scenario_.blade->edge, *last_blade, *sample.blade) > same_place * zone_.spacing.fine;
+  if (sample.blade &&
+      (!last_blade || edge_travel(scenario_.blade->edge, *last_blade, *sample.blade) > same_place * zone_.spacing.fine))
+    blade_moved_ = sample.time;
+  blade_rests_ = !sample.blade || sample.time - blade_moved_ >= rest;
   bool solved = false;
   if (result.cut && result.cut->update == SystemUpdate::taken_over) { // the blade is carried to rest with its field
     solve(sample, model_);
@@ -354,7 +357,7 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
       return;
     // A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
     // While it moves the next body is on its way.
-    if (force_only_ && !blade_moves_ && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
+    if (force_only_ && blade_rests_ && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
         ++model.presses > few_presses)
       solvers::extend_responses(*model.body, candidates_a_press, model.patch);
     const std::vector<int> missed = penetrated_outside_patch(*pose, model);

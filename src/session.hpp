@@ -48,8 +48,9 @@ struct SessionProfile {
 /// Fine spacings ahead of the blade for which a body is condensed: in the step that needs it.
 inline constexpr double way_spacings = 3;
 
-/// Times blade.advance that a blade goes on before the steps wait for a body that is made beside them.
-inline constexpr double most_advances = 3;
+/// Fine spacings of blade.advance where it is left out and a body is made beside the steps, and times blade.advance
+/// that a blade goes on before the steps wait for that.
+inline constexpr double aside_advance = 0.5, most_advances = 3;
 
 class Session {
  public:
@@ -110,11 +111,14 @@ class Session {
   void set_recondensing(bool on);
 
   /// On: nodes that follow a tool are sprinkled, and their body assembled and condensed, on a thread of their own, and
-  /// so are those that follow a cut which was put off (blade.advance). It takes over at swap_body(), or, after waiting
-  /// for it, once the contact has left the fine zone that it would replace, or the blade has gone most_advances times
-  /// blade.advance since; until then cut and wound are those of the body. When it begins, and what it becomes, depends
-  /// on the steps alone.
+  /// so are those that follow a cut which was put off (blade.advance), or which the blade has left off at rest. It
+  /// takes over at swap_body(), or, after waiting for it, once the contact has left the fine zone that it would
+  /// replace, or the blade has gone most_advances times blade.advance since; until then cut and wound are those of the
+  /// body. When it begins, and what it becomes, depends on the steps alone.
   void set_following_aside(bool on);
+
+  /// Whether a cut is put off that the next step would have made if the blade rested.
+  [[nodiscard]] bool has_put_off() const { return put_off_ > 0 && follows_cuts_aside() && !cuts_aside(); }
 
   /// Whether such a body is under way; and whether it is there and has followed all that was cut meanwhile.
   [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr || following_; }
@@ -195,6 +199,7 @@ class Session {
   void follow_aside(const StepSample& sample, const topology::SurfaceContact& centre);
   void begin_following(const topology::SurfaceContact& centre);
   [[nodiscard]] bool follows_cuts_aside() const;
+  [[nodiscard]] double advance() const;
   [[nodiscard]] bool may_cut_aside(const StepSample& sample) const;
   [[nodiscard]] bool cuts_aside() const { return following_ && !following_->centre; }
   void begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report);
@@ -293,7 +298,8 @@ class Session {
   std::optional<topology::SurfaceContact> last_contact_;
   double put_off_ = 0;                            // m the edge has gone since the body last followed its cut
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
-  bool blade_moves_ = false;                      // since that step
+  double blade_moved_ = 0;                        // s, when it last did
+  bool blade_rests_ = true;                       // or there is none
   bool blade_lifted_ = false;                     // its next pose places it
   bool hand_led_ = false;                         // the blade goes where it likes, not along the scenario's path
   std::vector<solvers::PointState> node_states_;

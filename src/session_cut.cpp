@@ -113,13 +113,14 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
   }
   if (!sample.blade)
     return solved;
-  const double advance = scenario_.blade->advance * zone_.spacing.fine;
-  if (advance > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
+  if (advance() > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
     put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
     topology::RestMap to_rest;
     if (model_.state)
       to_rest = [this](const Vector3& x) { return rest_position(x); };
-    if (put_off_ < (cuts_aside() ? most_advances : 1) * advance && incisions_->put_off(*sample.blade, to_rest))
+    const bool leaves_off = follows_cuts_aside() && !cuts_aside() && blade_rests_ && put_off_ > 0;
+    if (!leaves_off && put_off_ < (cuts_aside() ? most_advances : 1) * advance() &&
+        incisions_->put_off(*sample.blade, to_rest))
       return solved;
   }
   make_cut(sample);

@@ -69,8 +69,13 @@ void Session::begin_following(const topology::SurfaceContact& centre) {
 
 // Where nothing but the blade, which may be ahead of its body, changes the tissue.
 bool Session::follows_cuts_aside() const {
-  return following_aside_ && scenario_.blade && scenario_.blade->advance > 0 && !tears() &&
-         !(scenario_.tool && scenario_.tool->grasp);
+  return following_aside_ && scenario_.blade && scenario_.blade->advance.value_or(aside_advance) > 0 &&
+         blade_force_ == nullptr && !tears() && !(scenario_.tool && scenario_.tool->grasp);
+}
+
+// m that the blade goes before its body follows.
+double Session::advance() const {
+  return scenario_.blade->advance.value_or(follows_cuts_aside() ? aside_advance : 0) * zone_.spacing.fine;
 }
 
 bool Session::may_cut_aside(const StepSample& sample) const {

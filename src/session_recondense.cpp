@@ -38,7 +38,7 @@ solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMes
   const auto pays = [&](const topology::SurfaceMesh& way) {
     return way.triangles.empty() || can_follow(scenario_, model_, way);
   };
-  const bool renews = !follows || !scenario_.blade || scenario_.blade->advance == 0 || pays(way_ahead());
+  const bool renews = !follows || !scenario_.blade || advance() == 0 || pays(way_ahead());
   solvers::BodyGrowth growth = grow(recondensing_ != nullptr || !renews);
   bool taken = false;
   if (next.body == nullptr && recondensing_ != nullptr && (growth.update.declined || !follows)) {

@@ -116,7 +116,8 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
       continue;
     }
     const DeviceState state = shared.poses.front();
-    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved) && !simulation.recondensed()) {
+    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved) && !simulation.recondensed() &&
+        !simulation.has_put_off()) {
       feed.offer_again(simulation);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       continue;
@@ -138,8 +139,8 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
     if (record.failed)
       continue;
     shared.snapshots.publish();
-    if ((record.resprinkled && !options.follow_aside) || record.cut_triangles > 0)
-      rule.rebuilt(record.seconds);
+    if (const std::optional<double> seconds = rebuilt_in(record))
+      rule.rebuilt(*seconds);
     feed.offer(simulation, record);
     report.solve_seconds += 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - began);
   }

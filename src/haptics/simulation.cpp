@@ -168,6 +168,14 @@ SystemUpdate update_of(const StepResult& result) {
 
 } // namespace
 
+std::optional<double> rebuilt_in(const SolveRecord& record) {
+  if (record.cut_triangles > 0)
+    return record.event.aside && record.event.swaps ? 0 : record.seconds;
+  if (record.resprinkled && !record.event.aside)
+    return record.seconds;
+  return std::nullopt;
+}
+
 SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
                             ContactSnapshot& snapshot) {
   const auto failed = [&](const std::exception& error) {

@@ -6,6 +6,8 @@
 #include "src/haptics/loop_records.hpp"
 #include "src/session.hpp"
 
+#include <optional>
+
 namespace spherecut::app {
 
 /// Coarsening rule of a loop that must not fall behind: a rebuild (nodes that follow the tool, a cut) that took longer
@@ -45,6 +47,7 @@ class HapticSimulation {
   /// waiting for it where need be (Session::set_recondensing).
   [[nodiscard]] bool recondensed() const { return session_.recondensed(); }
   void swap_body() { session_.swap_body(); }
+  [[nodiscard]] bool has_put_off() const { return session_.has_put_off(); }
   /// As Session::set_following_aside.
   void set_following_aside(bool on) { session_.set_following_aside(on); }
 
@@ -71,6 +74,9 @@ class HapticSimulation {
   int degradation_ = 0;
   HandMode mode_ = HandMode::usual; // of the last solve
 };
+
+/// s that a solve counts for in that rule: what was made beside it in time has held nothing up. Empty: no rebuild.
+std::optional<double> rebuilt_in(const SolveRecord& record);
 
 /// Solves as an event says and tells what came of it. A failure leaves the snapshot as it was.
 SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,

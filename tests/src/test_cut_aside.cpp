@@ -171,6 +171,79 @@ TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the c
   CHECK(session.incision()->area() == result.cut->area);
 }
 
+TEST_CASE("Beside the steps a cut is put off by half a spacing unless the scenario says how far, and not at all at 0") {
+  const std::string left_out = replaced(pressed_and_cut, "advance = 0.4\n", "");
+  const auto increments = [](const std::string& text, bool aside, int& beside) {
+    Session session(scenario_of(text));
+    session.set_following_aside(aside);
+    int count = 0;
+    beside = 0;
+    for (const StepSample& sample : session.steps()) {
+      count += session.step(sample).cut->triangles > 0 ? 1 : 0;
+      beside += session.recondensing() ? 1 : 0;
+      if (session.recondensing())
+        CHECK(session.swap_body());
+    }
+    return count;
+  };
+  int beside = 0;
+  const int every = increments(left_out, false, beside);
+  CHECK(beside == 0);
+  CHECK(every >= 12);
+  CHECK(increments(replaced(left_out, "step = 0.05\n[[blade", "step = 0.05\nadvance = 0\n[[blade"), true, beside) ==
+        every);
+  CHECK(beside == 0);
+  const int some = increments(left_out, true, beside);
+  CHECK(beside >= 3);
+  CHECK(2 * some <= every);
+}
+
+TEST_CASE("A blade that comes to rest is followed to where it is") {
+  Session session(scenario_of(pressed_and_cut));
+  session.set_following_aside(true);
+  std::size_t i = 0;
+  while (session.incision() == nullptr) {
+    session.step(session.steps()[i++]);
+    if (session.recondensing())
+      CHECK(session.swap_body());
+  }
+  StepSample sample = session.steps()[i];
+  sample.blade->position.z() -= 1e-4;
+  session.step(sample);
+  REQUIRE(session.has_put_off());
+  const double area = session.incision()->area();
+  int steps = 0;
+  for (; session.has_put_off() && steps < 50; ++steps) {
+    sample.time += 0.005;
+    sample.blade->time = sample.time;
+    session.step(sample);
+  }
+  CHECK(steps >= 15); // a tenth of a second
+  CHECK(steps <= 25);
+  REQUIRE(session.recondensing());
+  CHECK(session.swap_body());
+  sample.time += 0.005;
+  sample.blade->time = sample.time;
+  CHECK(session.step(sample).cut->area > area);
+  CHECK_FALSE(session.has_put_off());
+}
+
+TEST_CASE("What a solve counts for in the rule of coarser nodes is what it held up") {
+  SolveRecord record;
+  record.seconds = 0.3;
+  CHECK_FALSE(rebuilt_in(record));
+  record.resprinkled = true;
+  CHECK(rebuilt_in(record) == 0.3);
+  record.event.aside = true;
+  CHECK_FALSE(rebuilt_in(record));
+  record.cut_triangles = 10;
+  CHECK(rebuilt_in(record) == 0.3); // the blade was too far ahead: it waited
+  record.event.swaps = true;
+  CHECK(rebuilt_in(record) == 0.0);
+  record.event.aside = false; // an update on a body that was condensed beside it
+  CHECK(rebuilt_in(record) == 0.3);
+}
+
 TEST_CASE("While the blade moves fields of the contact are not made for a body that will soon be another") {
   Session session(scenario_of(replaced(pressed_and_cut, "advance = 0.4", "advance = 1")));
   session.set_force_only(true);
@@ -180,7 +253,7 @@ TEST_CASE("While the blade moves fields of the contact are not made for a body t
   });
   const auto press_on = [&](double way) {
     for (int i = 0; i < few_presses + 5; ++i) {
-      sample.time += 1e-5;
+      sample.time += 0.01;
       sample.blade->time = sample.time;
       sample.blade->position.z() -= way;
       session.step(sample);
