@@ -28,6 +28,7 @@ topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
   return topology::read_sheet(file.file, file.scale);
 }
 
+constexpr double same_place = 1e-6;  // edges: nearer to the pose before it a pose is the same
 constexpr double straight = 2e-3;    // edges: a way is, where no pose put off is farther from it
 constexpr double least_share = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
 
@@ -113,7 +114,6 @@ void IncisionBuilder::use(const std::vector<topology::SurfaceMesh>& sheets) {
   wound_->grow(sheets);
 }
 
-// Whether the whole edge is farther from the body than the sweep reaches.
 bool IncisionBuilder::is_outside(const topology::BladePose& pose, const topology::RestMap& to_rest) const {
   for (std::size_t i = 1; i < blade_->edge.size(); ++i) {
     const Vector3 along = blade_->edge[i] - blade_->edge[i - 1];
@@ -127,11 +127,13 @@ bool IncisionBuilder::is_outside(const topology::BladePose& pose, const topology
   return true;
 }
 
-topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, const topology::RestMap& to_rest) {
+topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, const topology::RestMap& to_rest,
+                                               std::optional<topology::Wound>* wound_before) {
+  std::erase_if(missed_, [&](const topology::BladePose& missed) { return missed.time >= pose.time; });
   before_ = mark();
   before_.missed.push_back(pose);
   try {
-    if (!missed_.empty() && is_outside(missed_.back(), to_rest))
+    if (refused_ && !missed_.empty() && is_outside(missed_.back(), to_rest))
       place(topology::BladePose(missed_.back()), to_rest);
     std::vector<topology::BladePose> way = missed_;
     way.push_back(pose);
@@ -145,10 +147,13 @@ topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, 
     }
     at_ = pose;
     missed_.clear();
+    refused_ = false;
     last.triangles = triangles;
     if (last.triangles == 0)
       return last;
     find_swept();
+    if (wound_before != nullptr)
+      *wound_before = wound();
     use(sheets());
     return last;
   } catch (...) {
@@ -157,12 +162,12 @@ topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, 
   }
 }
 
-bool IncisionBuilder::put_off(const topology::BladePose& pose, const topology::RestMap& to_rest) {
-  if (is_outside(pose, to_rest))
-    return false;
+void IncisionBuilder::put_off(const topology::BladePose& pose) {
+  const std::optional<topology::BladePose> last = missed_.empty() ? at_ : missed_.back();
+  if (last && edge_travel(blade_->edge, *last, pose) <= same_place * options_.edge) // however long it rests
+    return;
   missed_.push_back(pose);
   before_.missed.push_back(pose); // taking the last motion back leaves it
-  return true;
 }
 
 void IncisionBuilder::update_fields() {
@@ -172,6 +177,7 @@ void IncisionBuilder::update_fields() {
 
 void IncisionBuilder::place(const topology::BladePose& pose, const topology::RestMap& to_rest) {
   missed_.clear();
+  refused_ = false;
   sweep_->lift();
   sweep_->move_to(pose, to_rest);
   at_ = pose;
@@ -220,6 +226,7 @@ void IncisionBuilder::take_back() {
   sweep_ = before_.sweep;
   at_ = before_.at;
   missed_ = before_.missed;
+  refused_ = true;
   if (!grew)
     return;
   auto wound = std::make_unique<topology::IncrementalWound>(domain_->surface());

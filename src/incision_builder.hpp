@@ -21,12 +21,16 @@ class IncisionBuilder {
   /// Moves the blade and lets incision and wound grow; the first call only places it. Throws InputError and
   /// NumericalError; everything is then as it was. A motion that was not made, or taken back, is made up for by the
   /// next one: that starts where the blade last cut and passes all poses since, but for those on a straight way, which
-  /// would give but narrower triangles. When the blade has been out of the body in between it starts there.
-  topology::SweepResult move_to(const topology::BladePose& pose, const topology::RestMap& to_rest);
+  /// would give but narrower triangles. When a motion was refused and the blade has been out of the body since it
+  /// starts there. `wound_before` (may be null) is given the wound as it was, if that grows.
+  topology::SweepResult move_to(const topology::BladePose& pose, const topology::RestMap& to_rest,
+                                std::optional<topology::Wound>* wound_before = nullptr);
 
-  /// Keeps a pose for the next motion, which passes it on its way; false, and not kept, when the edge is out of the
-  /// body there.
-  bool put_off(const topology::BladePose& pose, const topology::RestMap& to_rest);
+  /// Keeps a pose for the next motion, which passes it on its way.
+  void put_off(const topology::BladePose& pose);
+
+  /// Whether the whole edge is farther from the body than its motion reaches.
+  [[nodiscard]] bool is_outside(const topology::BladePose& pose, const topology::RestMap& to_rest) const;
 
   /// Places the blade; its next motion starts there.
   void place(const topology::BladePose& pose, const topology::RestMap& to_rest);
@@ -66,7 +70,6 @@ class IncisionBuilder {
   void add_own(topology::SurfaceMesh sheet);
   void find_swept();
   void use(const std::vector<topology::SurfaceMesh>& sheets);
-  [[nodiscard]] bool is_outside(const topology::BladePose& pose, const topology::RestMap& to_rest) const;
 
   std::shared_ptr<const topology::Domain> domain_;
   std::optional<topology::Blade> blade_;
@@ -81,6 +84,7 @@ class IncisionBuilder {
   int revision_ = 0;
   std::optional<topology::BladePose> at_;   // of sweep_
   std::vector<topology::BladePose> missed_; // since then
+  bool refused_ = false;                    // some of these motions
   Mark before_;                             // before the last motion; missed: and the pose of that motion
 };
 

@@ -135,7 +135,7 @@ StepResult Session::step(const StepSample& sample) {
     last_contact_ = result.contact;
   }
   if (cuts())
-    result.cut = std::exchange(aside_cut_, std::nullopt).value_or(CutReport{});
+    result.cut = aside_cut_.value_or(CutReport{});
   const auto kept = std::exchange(kept_grip_, std::nullopt);
   grip_memory_ = model_.state ? remembered_grip() : kept;
   if (without_blade_) {
@@ -151,12 +151,14 @@ StepResult Session::step(const StepSample& sample) {
     blade_moved_ = sample.time;
   blade_rests_ = !sample.blade || sample.time - blade_moved_ >= rest;
   bool solved = false;
-  if (result.cut && result.cut->update == SystemUpdate::taken_over) { // the blade is carried to rest with its field
-    solve(sample, model_);
-    solved = true;
-  }
-  if (incisions_ != nullptr && blade_force_ == nullptr)
+  if (incisions_ != nullptr && blade_force_ == nullptr) {
+    if (model_.body != nullptr && !model_.state && (sample.blade || aside_cut_)) { // by its field a blade is carried
+      solve(sample, model_);                                                       // to the tissue at rest
+      solved = true;
+    }
+    aside_cut_.reset();
     solved = move_blade(sample, *result.cut) || solved;
+  }
   if (sample.blade)
     last_blade_ = sample.blade;
   // Without any load the organ keeps its rest shape until the tool is on it.
@@ -173,7 +175,7 @@ StepResult Session::step(const StepSample& sample) {
       const topology::SurfaceContact centre = centre_of(result.contact, result.pose);
       const bool waits = cuts_aside() && !leaves_zone(centre); // nodes are made at one place at a time
       if (must_follow(centre) && !waits) {
-        if (following_aside_ && recondensing_ == nullptr && !sample.blade) {
+        if (following_aside_ && recondensing_ == nullptr && !sample.blade && !cuts_aside()) {
           follow_aside(sample, centre);
         } else {
           if (cuts_aside())
@@ -192,6 +194,7 @@ StepResult Session::step(const StepSample& sample) {
     evaluate(result);
   }
   result.resprinkled = result.resprinkled || std::exchange(followed_aside_, false);
+  result.rebuild = std::exchange(rebuild_, Rebuild::none);
   if (result.cut)
     report_cut(*result.cut);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -255,6 +258,7 @@ topology::SurfaceContact Session::next_zone(const topology::SurfaceContact& cont
 void Session::follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result) {
   const Vector3 before = model_.state->tool.tool_force;
   say_(fmt::format("the fine zone follows the tool, t = {:g} s", sample.time));
+  rebuild_ = Rebuild::in_step;
   zone_contact_ = next_zone(centre);
   zone_.spacing.centres = {zone_contact_->point};
   BodyModel next;
@@ -356,8 +360,8 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
     if (model.patch.nodes.empty())
       return;
     // A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
-    // While it moves the next body is on its way.
-    if (force_only_ && blade_rests_ && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
+    const bool is_for_good = blade_rests_ || (put_off_ == 0 && !cuts_aside()); // else the next body is on its way
+    if (force_only_ && is_for_good && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
         ++model.presses > few_presses)
       solvers::extend_responses(*model.body, candidates_a_press, model.patch);
     const std::vector<int> missed = penetrated_outside_patch(*pose, model);

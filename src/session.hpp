@@ -18,6 +18,14 @@
 
 namespace spherecut::app {
 
+/// What a step had to do with a body that was built or updated.
+enum class Rebuild : std::uint8_t {
+  none,
+  in_step,     // it did that, or waited for it
+  aside,       // it took over what had been made beside the steps
+  aside_early, // before the blade had gone a third of the way on which it need not wait
+};
+
 /// Outcome of one step.
 struct StepResult {
   double time = 0; // s
@@ -34,6 +42,7 @@ struct StepResult {
   double rotation_degrees = 0;    // largest rotation of the tissue
   bool resprinkled = false;       // the fine zone has followed the tool
   double force_jump = 0;          // |force after - before| / |force before| at the re-sprinkle
+  Rebuild rebuild = Rebuild::none;
   double seconds = 0;             // wall clock of the step
   std::optional<CutReport> cut;   // in a scenario that cuts
   std::optional<TearReport> tear; // in one that tears, from the first solution on
@@ -319,7 +328,8 @@ class Session {
   topology::SurfaceMesh recondensing_way_;                // for which it is condensed
   std::optional<solvers::SprinkleIncrement> followed_;    // by the body of the last cut
   bool following_aside_ = false;
-  bool followed_aside_ = false; // its body has taken over since the last step
+  bool followed_aside_ = false;     // its body has taken over since the last step
+  Rebuild rebuild_ = Rebuild::none; // since the last step
   std::vector<std::string> warnings_;
   std::vector<std::string> warned_;
   std::optional<CutReport> aside_cut_; // whose body has taken over since the last step, or which was refused

@@ -149,6 +149,7 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
       const StageTimer timer(report.seconds.level_sets);
       incisions_->update_fields();
     }
+    rebuild_ = Rebuild::in_step;
     build_cut({.way_ahead = [&] { return way_of_blade(sample, to_rest); }, .beside = true}, next, report);
     const StageTimer timer(report.seconds.solve);
     solve(sample, next);

@@ -97,31 +97,39 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
     wait();
     put_off_ = 0;
     CutReport made;
-    solved = cut(at, made) || solved;
+    const bool is_solved = cut(at, made);
+    solved = is_solved || (solved && !made.refused);
     report.add(made);
   };
-  const bool leads_on = sample.blade && !blade_lifted_;
-  if (!leads_on)
+  const bool is_last = sample.time == steps_.back().time;
+  if (!sample.blade || blade_lifted_) {
+    if (cuts_aside() && !sample.blade && !is_last) // nothing needs the blade until its body is there
+      return false;
     wait();
-  if (put_off_ > 0 && !leads_on) { // a lifted blade is placed anew in the step after this one
-    StepSample left = sample;
-    left.blade = std::exchange(last_blade_, std::nullopt);
-    const bool lifted = std::exchange(blade_lifted_, false);
-    make_cut(left);
-    blade_lifted_ = lifted;
-    return solved;
+    if (put_off_ > 0) { // a lifted blade is placed anew in the step after this one
+      StepSample left = sample;
+      left.blade = std::exchange(last_blade_, std::nullopt);
+      const bool lifted = std::exchange(blade_lifted_, false);
+      make_cut(left);
+      blade_lifted_ = lifted;
+      return solved;
+    }
+    if (!sample.blade)
+      return solved;
   }
-  if (!sample.blade)
-    return solved;
-  if (advance() > 0 && last_blade_ && !blade_lifted_ && sample.time != steps_.back().time) {
+  if (advance() > 0 && last_blade_ && !blade_lifted_ && !is_last) {
     put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
     topology::RestMap to_rest;
     if (model_.state)
       to_rest = [this](const Vector3& x) { return rest_position(x); };
-    const bool leaves_off = follows_cuts_aside() && !cuts_aside() && blade_rests_ && put_off_ > 0;
-    if (!leaves_off && put_off_ < (cuts_aside() ? most_advances : 1) * advance() &&
-        incisions_->put_off(*sample.blade, to_rest))
+    const bool is_outside = incisions_->is_outside(*sample.blade, to_rest);
+    const bool leaves_off = follows_cuts_aside() && blade_rests_ && put_off_ > 0;
+    const bool waits = cuts_aside() ? is_outside || put_off_ < most_advances * advance()
+                                    : !is_outside && !leaves_off && put_off_ < advance();
+    if (waits) {
+      incisions_->put_off(*sample.blade);
       return solved;
+    }
   }
   make_cut(sample);
   return solved;
@@ -153,9 +161,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
       if (std::exchange(blade_lifted_, false)) {
         incisions_->place(*sample.blade, to_rest);
       } else {
-        if (aside)
-          wound_before = incisions_->wound();
-        swept = incisions_->move_to(*sample.blade, to_rest);
+        swept = incisions_->move_to(*sample.blade, to_rest, aside ? &wound_before : nullptr);
       }
     } catch (const InputError& error) {
       refuse_cut(sample.time, error.what(), report);
@@ -184,8 +190,11 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
     if (aside) {
       begin_cutting(next.incision, sample.time, report);
       shown_wound_ = std::move(wound_before);
+      profile_.topology += report.seconds.topology;
+      profile_.level_sets += report.seconds.level_sets;
       return false;
     }
+    rebuild_ = Rebuild::in_step;
     build_cut({.way_ahead = [&] { return way_of_blade(sample, to_rest); }}, next, report);
     {
       const StageTimer timer(report.seconds.solve);

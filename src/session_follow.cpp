@@ -39,6 +39,7 @@ void Session::follow_aside(const StepSample& sample, const topology::SurfaceCont
   if (!leaves_zone(centre))
     return;
   take_following();
+  rebuild_ = Rebuild::in_step;
   solve(sample, model_);
 }
 
@@ -87,9 +88,12 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
   BodyModel next;
   next.incision = std::move(incision);
   const bool touches = tool_in_reach();
+  const std::string renewed =
+      model_.coarseness != coarseness_
+          ? "the spacing has changed"
+          : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
   auto make = [&scenario = scenario_, domain = organ_.domain, how = sprinkle_options(next),
-               incision_before = model_.incision, sprinkling = model_.sprinkling,
-               same_spacing = model_.coarseness == coarseness_, coarseness = coarseness_,
+               incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, coarseness = coarseness_,
                centre = touches ? zone_contact_ : std::nullopt, reach = zone_.candidate_radius,
                waits_for = std::move(unwanted_)]() mutable {
     yield_to_steps();
@@ -114,8 +118,8 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
       near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
       app::assemble(scenario, domain, model, {}, near);
     };
-    update.update_reason = "the spacing has changed";
-    if (same_spacing)
+    update.update_reason = renewed;
+    if (renewed.empty())
       try {
         build([&] { exchange_nodes(*domain, how, before, model.sprinkling); });
         update.update_reason = "the cut was put off";
@@ -170,6 +174,7 @@ void Session::take_cut() {
     static_cast<BodyUpdate&>(report) = std::move(made.report);
     report.update = SystemUpdate::taken_over;
     report.triangles = following.triangles;
+    rebuild_ = put_off_ < advance() * most_advances / 3 ? Rebuild::aside_early : Rebuild::aside;
     profile_.sprinkle += report.seconds.sprinkling;
     profile_.discretise += report.seconds.assembly + report.seconds.visibility;
     profile_.condense += report.seconds.solve;
@@ -185,7 +190,9 @@ void Session::take_cut() {
 // The body has to be at its cut before this step goes on.
 void Session::wait_for_cut(const StepSample& sample, CutReport& report) {
   take_cut();
-  grip_memory_ = std::exchange(kept_grip_, std::nullopt);
+  rebuild_ = Rebuild::in_step;
+  if (!model_.state)
+    grip_memory_ = std::exchange(kept_grip_, std::nullopt);
   solve(sample, model_);
   report.add(*std::exchange(aside_cut_, std::nullopt));
 }

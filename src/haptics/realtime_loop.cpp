@@ -139,8 +139,7 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
     if (record.failed)
       continue;
     shared.snapshots.publish();
-    if (const std::optional<double> seconds = rebuilt_in(record))
-      rule.rebuilt(*seconds);
+    rule.solved(simulation.result().rebuild, record.seconds);
     feed.offer(simulation, record);
     report.solve_seconds += 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - began);
   }

@@ -52,6 +52,15 @@ void DegradationRule::rebuilt(double seconds) {
   }
 }
 
+void DegradationRule::solved(Rebuild rebuild, double seconds) {
+  if (rebuild == Rebuild::in_step)
+    rebuilt(seconds);
+  else if (rebuild == Rebuild::aside_early)
+    rebuilt(0);
+  else if (rebuild == Rebuild::aside)
+    rebuilt(budget_ / 2);
+}
+
 HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const std::string&)> say)
     : session_(std::move(scenario), std::move(say)) {
   session_.set_force_only(true);
@@ -167,14 +176,6 @@ SystemUpdate update_of(const StepResult& result) {
 }
 
 } // namespace
-
-std::optional<double> rebuilt_in(const SolveRecord& record) {
-  if (record.cut_triangles > 0)
-    return record.event.aside && record.event.swaps ? 0 : record.seconds;
-  if (record.resprinkled && !record.event.aside)
-    return record.seconds;
-  return std::nullopt;
-}
 
 SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
                             ContactSnapshot& snapshot) {

@@ -6,8 +6,6 @@
 #include "src/haptics/loop_records.hpp"
 #include "src/session.hpp"
 
-#include <optional>
-
 namespace spherecut::app {
 
 /// Coarsening rule of a loop that must not fall behind: a rebuild (nodes that follow the tool, a cut) that took longer
@@ -22,6 +20,9 @@ class DegradationRule {
   explicit DegradationRule(double budget) : budget_(budget) {}
   [[nodiscard]] int level() const { return level_; }
   void rebuilt(double seconds);
+  /// What a solve of so many seconds did: a body that was made beside the solves counts as within a third of the budget
+  /// where it came early, else as within it.
+  void solved(Rebuild rebuild, double seconds);
 
  private:
   double budget_;
@@ -74,9 +75,6 @@ class HapticSimulation {
   int degradation_ = 0;
   HandMode mode_ = HandMode::usual; // of the last solve
 };
-
-/// s that a solve counts for in that rule: what was made beside it in time has held nothing up. Empty: no rebuild.
-std::optional<double> rebuilt_in(const SolveRecord& record);
 
 /// Solves as an event says and tells what came of it. A failure leaves the snapshot as it was.
 SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,

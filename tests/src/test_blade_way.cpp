@@ -110,7 +110,9 @@ TEST_CASE("A cut along poses that were put off has the triangles of its ends, an
     auto builder = std::make_unique<IncisionBuilder>(scenario, domain, 0.0025);
     for (int i = 0; i <= 100; ++i) {
       const BladePose pose{1e-2 * i, {0, 0, 0.034 - 1.4e-4 * i}, Eigen::Quaterniond::Identity()};
-      if (!puts_off || i % 20 == 0 || !builder->put_off(pose, nullptr))
+      if (puts_off && i % 20 != 0)
+        builder->put_off(pose);
+      else
         builder->move_to(pose, nullptr);
     }
     return builder;
@@ -122,4 +124,30 @@ TEST_CASE("A cut along poses that were put off has the triangles of its ends, an
     return builder.incision()->sheets().front().triangles.size();
   };
   CHECK(4 * triangles(*some) < triangles(*every));
+}
+
+TEST_CASE("A way that was put off up to the blade's own place is cut, however many poses it has") {
+  const Scenario scenario = scenario_of(
+      cut_block + "[blade]\nedge = [[0, -0.009, 0], [0, 0.009, 0.001]]\n[[blade.path]]\ntime = 0\nposition = [0, 0, "
+                  "0.034]\n[[blade.path]]\ntime = 1\nposition = [0, 0, 0.02]\n");
+  const auto domain = make_organ(scenario.organ).domain;
+  double area = 0;
+  for (const int count : {1, 2, 63, 64, 65, 66, 129, 130, 131}) {
+    IncisionBuilder builder(scenario, domain, 0.0025);
+    BladePose pose{0, {0, 0, 0.034}, Eigen::Quaterniond::Identity()};
+    builder.move_to(pose, nullptr);
+    for (int i = 1; i <= count; ++i) {
+      pose.time = i;
+      pose.position.z() = 0.034 - 0.01 * i / count;
+      builder.put_off(pose);
+      builder.put_off(pose); // it rests there
+    }
+    CHECK(builder.move_to(pose, nullptr).triangles > 0);
+    REQUIRE(builder.incision() != nullptr);
+    area = area > 0 ? area : builder.incision()->area();
+    // A motion below the sweep's smallest is left for the next one.
+    const double least = topology::SweepOptions{}.minimum_step * 0.0025 * 0.018;
+    CHECK(builder.incision()->area() <= area * (1 + 1e-9));
+    CHECK(builder.incision()->area() >= area - 1.01 * least);
+  }
 }

@@ -171,6 +171,44 @@ TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the c
   CHECK(session.incision()->area() == result.cut->area);
 }
 
+TEST_CASE("What was put off is cut when the blade is lifted or gone") {
+  const bool aside = GENERATE(true, false), is_gone = GENERATE(true, false);
+  const int poses = GENERATE(3, 65);
+  Session session(scenario_of(in_and_out));
+  session.set_following_aside(aside);
+  std::size_t i = 0;
+  while (session.incision() == nullptr)
+    session.step(session.steps()[i++]);
+  StepSample sample = session.steps()[i - 1];
+  const double before = session.incision()->area();
+  for (int k = 0; k < poses; ++k) {
+    sample.time += 1e-4;
+    sample.blade->time = sample.time;
+    sample.blade->position.z() -= 1e-3 / poses;
+    CHECK(session.step(sample).cut->triangles == 0);
+  }
+  CHECK(session.incision()->area() == before);
+  CHECK_FALSE(session.recondensing());
+  if (is_gone)
+    sample.blade.reset();
+  else
+    session.lift_blade();
+  StepResult result;
+  for (int k = 0; k < 3; ++k) {
+    sample.time += 1e-4;
+    if (sample.blade)
+      sample.blade->time = sample.time;
+    result = session.step(sample);
+    CHECK_FALSE(result.cut->refused);
+    if (session.recondensing()) {
+      CHECK(aside);
+      CHECK(session.swap_body());
+    }
+  }
+  CHECK(session.warnings().empty());
+  CHECK(result.cut->area > before + 0.9 * 0.018e-3);
+}
+
 TEST_CASE("Beside the steps a cut is put off by half a spacing unless the scenario says how far, and not at all at 0") {
   const std::string left_out = replaced(pressed_and_cut, "advance = 0.4\n", "");
   const auto increments = [](const std::string& text, bool aside, int& beside) {
@@ -228,20 +266,39 @@ TEST_CASE("A blade that comes to rest is followed to where it is") {
   CHECK_FALSE(session.has_put_off());
 }
 
-TEST_CASE("What a solve counts for in the rule of coarser nodes is what it held up") {
-  SolveRecord record;
-  record.seconds = 0.3;
-  CHECK_FALSE(rebuilt_in(record));
-  record.resprinkled = true;
-  CHECK(rebuilt_in(record) == 0.3);
-  record.event.aside = true;
-  CHECK_FALSE(rebuilt_in(record));
-  record.cut_triangles = 10;
-  CHECK(rebuilt_in(record) == 0.3); // the blade was too far ahead: it waited
-  record.event.swaps = true;
-  CHECK(rebuilt_in(record) == 0.0);
-  record.event.aside = false; // an update on a body that was condensed beside it
-  CHECK(rebuilt_in(record) == 0.3);
+TEST_CASE("What is made beside the steps in time makes no nodes coarser, and early it makes them finer again") {
+  DegradationRule rule(0.01);
+  rule.solved(Rebuild::none, 1);
+  rule.solved(Rebuild::aside, 1);
+  rule.solved(Rebuild::aside_early, 1);
+  CHECK(rule.level() == 0);
+  rule.solved(Rebuild::in_step, 0.3); // the blade was too far ahead: it waited
+  CHECK(rule.level() == 1);
+  for (int i = 0; i < 7; ++i)
+    rule.solved(Rebuild::aside_early, 0.3);
+  rule.solved(Rebuild::aside, 0.3);
+  CHECK(rule.level() == 1);
+  for (int i = 0; i < 8; ++i)
+    rule.solved(Rebuild::aside_early, 0.3);
+  CHECK(rule.level() == 0);
+}
+
+TEST_CASE("A step tells what it had to do with a body that was made anew") {
+  Session session(scenario_of(pressed_and_cut));
+  session.set_following_aside(true);
+  int early = 0, late = 0, in_step = 0, steps = 0;
+  for (const StepSample& sample : session.steps()) {
+    const Rebuild rebuild = session.step(sample).rebuild;
+    early += rebuild == Rebuild::aside_early ? 1 : 0;
+    late += rebuild == Rebuild::aside ? 1 : 0;
+    in_step += rebuild == Rebuild::in_step ? 1 : 0;
+    steps = session.recondensing() ? steps + 1 : 0;
+    if (steps == (early == 0 ? 1 : late == 0 ? 4 : 50)) // at once, later, and not before it has to wait
+      session.swap_body();
+  }
+  CHECK(early >= 1);
+  CHECK(late >= 1);
+  CHECK(in_step >= 1);
 }
 
 TEST_CASE("While the blade moves fields of the contact are not made for a body that will soon be another") {
@@ -252,7 +309,7 @@ TEST_CASE("While the blade moves fields of the contact are not made for a body t
     return session.incision() != nullptr;
   });
   const auto press_on = [&](double way) {
-    for (int i = 0; i < few_presses + 5; ++i) {
+    for (int i = 0; i < few_presses + 15; ++i) {
       sample.time += 0.01;
       sample.blade->time = sample.time;
       sample.blade->position.z() -= way;
