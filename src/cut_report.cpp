@@ -34,6 +34,15 @@ std::string_view to_string(SystemUpdate update) {
   return "";
 }
 
+void report_body(const BodyModel& body, double sight, BodyUpdate& report) {
+  report.seconds.visibility = sight;
+  report.seconds.solve = body.body->report().factor_seconds;
+  report.seconds.assembly -= report.seconds.visibility + report.seconds.solve;
+  report.nodes = body.sprinkling.nodes.size();
+  const std::vector<int>& from = body.sprinkling.kept_from;
+  report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+}
+
 void CutReport::add(const CutReport& later) {
   triangles += later.triangles;
   if (later.refused || !refused)

@@ -29,6 +29,9 @@ struct CutReport : BodyUpdate {
   void add(const CutReport& later);
 };
 
+/// Nodes of a body that has been built, and what of the time of its assembly, s, was sight and factorisation.
+void report_body(const BodyModel& body, double sight, BodyUpdate& report);
+
 /// Volume between the faces of the cut, m3: the integral of the opening over the sheets, each face displaced as the
 /// material on its own side.
 double opening_volume(const topology::Wound& wound, const BodyModel& model);

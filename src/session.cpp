@@ -21,7 +21,7 @@ constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
 constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
 constexpr int patch_growths = 6;            // in one step
 constexpr double same_place = 1e-6;         // of the fine spacing: a blade that has gone less has not moved
-constexpr double rest = 0.1;                // s without motion after which it is at rest
+constexpr double rest_delay = 0.1;          // s without motion after which it is at rest
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
@@ -149,7 +149,7 @@ StepResult Session::step(const StepSample& sample) {
   if (sample.blade &&
       (!last_blade || edge_travel(scenario_.blade->edge, *last_blade, *sample.blade) > same_place * zone_.spacing.fine))
     blade_moved_ = sample.time;
-  blade_rests_ = !sample.blade || sample.time - blade_moved_ >= rest;
+  blade_rests_ = !sample.blade || sample.time - blade_moved_ >= rest_delay;
   bool solved = false;
   if (incisions_ != nullptr && blade_force_ == nullptr) {
     if (model_.body != nullptr && !model_.state && (sample.blade || aside_cut_)) { // by its field a blade is carried

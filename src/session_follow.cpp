@@ -3,7 +3,6 @@
 #include "src/session.hpp"
 #include "src/stage_timer.hpp"
 
-#include <algorithm>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <utility>
@@ -129,14 +128,11 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
       }
     if (model.body == nullptr)
       build([&] { model.sprinkling = resprinkle_held(scenario, *domain, how, before.sprinkling.nodes); });
-    update.seconds.visibility = solvers::sight_seconds() - seen;
-    update.seconds.solve = model.body->report().factor_seconds;
-    update.seconds.assembly -= update.seconds.visibility + update.seconds.solve;
-    update.nodes = model.sprinkling.nodes.size();
-    const std::vector<int>& from = model.sprinkling.kept_from;
-    update.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
-    const StageTimer timer(update.seconds.solve);
-    app::condense(near, model, true);
+    report_body(model, solvers::sight_seconds() - seen, update);
+    {
+      const StageTimer timer(update.seconds.solve);
+      app::condense(near, model, true);
+    }
     return made;
   };
   following_ = Following{std::nullopt, time, std::exchange(report.triangles, 0),

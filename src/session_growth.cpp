@@ -157,12 +157,7 @@ void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& re
     }
     build();
   }
-  report.seconds.visibility = solvers::sight_seconds() - seen;
-  report.seconds.solve = next.body->report().factor_seconds;
-  report.seconds.assembly -= report.seconds.visibility + report.seconds.solve;
-  report.nodes = next.sprinkling.nodes.size();
-  const std::vector<int>& from = next.sprinkling.kept_from;
-  report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+  report_body(next, solvers::sight_seconds() - seen, report);
   const StageTimer timer(report.seconds.solve);
   condense(near, next, true);
 }

@@ -161,7 +161,7 @@ void begin(app::HapticSimulation& simulation, app::ScriptedPath& device) {
 }
 
 /// Steps of a session at 100 a second, the ball swinging, from the tenth on.
-Rate session_rate(Motion motion, int steps) {
+Rate session_rate(const Motion& motion, int steps) {
   app::HapticSimulation simulation(motion.scenario);
   app::ScriptedPath device(motion.path, 1000);
   begin(simulation, device);
@@ -205,7 +205,7 @@ class OneCore {
 
 /// The same motion by the clock, on one core: a step is due every `period` ms, at the pose of then, or where one takes
 /// longer at the last that is due by then; what follows the cut is made beside the steps.
-Rate rate_by_the_clock(Motion motion, int steps, std::uint64_t period) {
+Rate rate_by_the_clock(const Motion& motion, int steps, std::uint64_t period) {
   using Clock = std::chrono::steady_clock;
   const OneCore core;
   if (!core.holds())
@@ -304,9 +304,8 @@ std::vector<Check> run_solve_rate(const ExperimentContext& context) {
         const int steps = context.quick ? 10 : how.goes_on ? 200 : 50;
         const double asked = nodes == 300 ? 100 : 40;
         const std::uint64_t period = nodes == 300 ? 5 : 10; // ms: twice the rate that is asked for, and more
-        Motion motion = motion_of(method, nodes, how.cut, how.advance, steps);
-        const Rate rate =
-            how.beside ? rate_by_the_clock(std::move(motion), steps, period) : session_rate(std::move(motion), steps);
+        const Motion motion = motion_of(method, nodes, how.cut, how.advance, steps);
+        const Rate rate = how.beside ? rate_by_the_clock(motion, steps, period) : session_rate(motion, steps);
         const bool puts_off = how.cut && how.advance > 0;
         const auto difference = puts_off ? std::optional(force_difference(every_step.at(nodes), rate)) : std::nullopt;
         report(name, rate, asked, difference);
