@@ -110,6 +110,8 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
   bool tearing = false;              // in that
   const auto interval = options.most_solves > 0 ? static_cast<long long>(second / options.most_solves) : 0; // ns
   long long next = 0;                                                                                       // solve
+  const Session& session = simulation.session();
+  const bool aside = options.follow_aside || (session.scenario().blade && session.blade() == nullptr);
   while (!shared.done.load(std::memory_order_acquire)) {
     if (!shared.poses.fetch()) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
@@ -130,8 +132,7 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
     }
     next = began + interval;
     solved = state;
-    const SolveEvent event{++sequence,          state.tick, SolveEvent::never, rule.level(), simulation.recondensed(),
-                           options.follow_aside};
+    const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level(), simulation.recondensed(), aside};
     ContactSnapshot& snapshot = shared.snapshots.back();
     const SolveRecord record = solve_recording(simulation, state, event, snapshot);
     lost += shared.solves.push(record) ? 0 : 1;

@@ -106,7 +106,6 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
       say(fmt::format("bridge at {} port {}", settings.bridge.address, bridge->port()));
     RealtimeOptions options;
     options.stop = [&] { return watch.interrupted(); };
-    options.follow_aside = scenario.blade && simulation.session().blade() == nullptr;
     recorder.listen(options);
     records = run_realtime(settings, simulation, *device, command.duration, options, report);
   }
