@@ -156,7 +156,7 @@ struct GrowingCut::State {
   /// Of tractions on the surface and the lips.
   [[nodiscard]] VectorX tractions() const;
 
-  /// Kept until the cut changes it: every step of a run asks for the same ones.
+  /// Kept until the cut grows: every step of a run asks for the same ones.
   [[nodiscard]] const DisplacementMean& mean(int node) const;
 
   /// Candidates that the cut has removed are none any more.

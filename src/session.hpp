@@ -106,6 +106,9 @@ class Session {
   /// those.
   void set_grip(std::optional<bool> closed) { grip_ = closed; }
 
+  /// On: the last of steps() is not the end, and what is put off there waits for the steps that follow.
+  void set_going_on(bool on) { goes_on_ = on; }
+
   /// On: a tear makes one increment a step at most, and goes on in the next: a loop in real time gets its solutions.
   void set_tear_gradually(bool on) { tear_gradually_ = on; }
 
@@ -209,6 +212,7 @@ class Session {
   void begin_following(const topology::SurfaceContact& centre);
   [[nodiscard]] bool follows_cuts_aside() const;
   [[nodiscard]] double advance() const;
+  [[nodiscard]] bool ends(const StepSample& sample) const { return !goes_on_ && sample.time == steps_.back().time; }
   [[nodiscard]] bool may_cut_aside(const StepSample& sample) const;
   [[nodiscard]] bool cuts_aside() const { return following_ && !following_->centre; }
   void begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report);
@@ -319,6 +323,7 @@ class Session {
   std::optional<TearAccount> tears_;
   std::function<double(const Vector3&)> toughness_; // J/m2, in the tissue at rest
   bool tear_gradually_ = false;
+  bool goes_on_ = false;
   bool force_only_ = false;
   bool updating_ = true;
   std::optional<solvers::GripMemory> grip_memory_; // friction at the start of the step, should its nodes change

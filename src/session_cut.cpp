@@ -101,9 +101,8 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
     solved = is_solved || (solved && !made.refused);
     report.add(made);
   };
-  const bool is_last = sample.time == steps_.back().time;
   if (!sample.blade || blade_lifted_) {
-    if (cuts_aside() && !sample.blade && !is_last) // nothing needs the blade until its body is there
+    if (cuts_aside() && !sample.blade && !ends(sample)) // nothing needs the blade until its body is there
       return false;
     wait();
     if (put_off_ > 0) { // a lifted blade is placed anew in the step after this one
@@ -117,13 +116,16 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
     if (!sample.blade)
       return solved;
   }
-  if (advance() > 0 && last_blade_ && !blade_lifted_ && !is_last) {
+  const bool leaves_off = follows_cuts_aside() && blade_rests_ && put_off_ > 0;
+  if (follows_cuts_aside() && last_blade_ && !blade_lifted_ && !ends(sample) && !leaves_off &&
+      blade_moved_ != sample.time) // where it was
+    return solved;
+  if (advance() > 0 && last_blade_ && !blade_lifted_ && !ends(sample)) {
     put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
     topology::RestMap to_rest;
     if (model_.state)
       to_rest = [this](const Vector3& x) { return rest_position(x); };
     const bool is_outside = incisions_->is_outside(*sample.blade, to_rest);
-    const bool leaves_off = follows_cuts_aside() && blade_rests_ && put_off_ > 0;
     const bool waits = cuts_aside() ? is_outside || put_off_ < most_advances * advance()
                                     : !is_outside && !leaves_off && put_off_ < advance();
     if (waits) {

@@ -79,7 +79,7 @@ double Session::advance() const {
 }
 
 bool Session::may_cut_aside(const StepSample& sample) const {
-  return follows_cuts_aside() && model_.state && sample.time != steps_.back().time;
+  return follows_cuts_aside() && model_.state && !ends(sample);
 }
 
 // On the nodes that a step would have made, rebuilt: no window pays that serves one increment.

@@ -66,6 +66,7 @@ HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const s
   session_.set_force_only(true);
   session_.set_tear_gradually(true);
   session_.set_recondensing(true);
+  session_.set_going_on(true);
   static_cast<void>(path());
   parked_ = parked_tool();
 }
@@ -87,8 +88,10 @@ StepSample HapticSimulation::sample(const DeviceState& device) const {
     sample.tool = scenario.tool ? std::optional(tool_pose(scenario.tool->shape, device)) : std::nullopt;
   } else if (scenario.tool) {
     sample.tool = tool_pose(scenario.tool->shape, device);
-    if (scenario.blade)
-      sample.blade = blade_pose(*scenario.blade, device.time);
+    if (scenario.blade) // to the end of its way, whenever it is solved
+      sample.blade = blade_pose(*scenario.blade, solved_before(scenario.blade->path.back().time)
+                                                     ? std::min(device.time, scenario.blade->path.back().time)
+                                                     : device.time);
   } else {
     sample.blade = topology::BladePose{device.time, device.position, device.orientation};
   }
@@ -128,6 +131,7 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   if (mode_ != HandMode::usual)
     session_.set_grip(mode_ == HandMode::grasper && (device.buttons & 1U) != 0);
   result_ = session_.step(sample(device));
+  last_time_ = device.time;
   const BodyModel& model = session_.model();
   snapshot.friction = session_.scenario().contact.friction;
   const solvers::ContactCondition condition =

@@ -67,11 +67,13 @@ class HapticSimulation {
 
  private:
   [[nodiscard]] StepSample sample(const DeviceState& device) const;
+  [[nodiscard]] bool solved_before(double time) const { return last_time_ && *last_time_ < time; }
 
   Session session_;
   StepResult result_;
   std::shared_ptr<const CondensedContact> condensed_; // handed over last
   std::optional<topology::ToolPose> parked_;
+  std::optional<double> last_time_; // s, of the device in the last solve
   int degradation_ = 0;
   HandMode mode_ = HandMode::usual; // of the last solve
 };
