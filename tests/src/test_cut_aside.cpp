@@ -283,6 +283,51 @@ TEST_CASE("What is made beside the steps in time makes no nodes coarser, and ear
   CHECK(rule.level() == 0);
 }
 
+TEST_CASE("A scripted blade cuts to the end of its way however seldom it is solved, in real time beside the steps") {
+  const bool aside = GENERATE(true, false);
+  const Scenario scenario = scenario_of(pressed_and_cut);
+  Session plain(scenario);
+  double area = 0;
+  for (const StepSample& sample : plain.steps())
+    area = plain.step(sample).cut->area;
+  HapticSimulation simulation(scenario);
+  simulation.set_following_aside(aside);
+  ScriptedPath device(simulation.path(), 1000);
+  ContactSnapshot snapshot;
+  simulation.prepare(device.read(0));
+  int beside = 0;
+  for (const std::uint64_t tick : {0, 100, 200, 450, 1000, 1300, 1310, 1320, 1330}) { // 1000: the end of its way
+    if (simulation.session().recondensing())
+      simulation.swap_body();
+    simulation.solve(device.read(tick), 0, snapshot);
+    beside += simulation.session().recondensing() ? 1 : 0;
+  }
+  CHECK((beside >= 2) == aside);
+  CHECK_FALSE(simulation.session().recondensing());
+  REQUIRE(simulation.session().incision() != nullptr);
+  CHECK(simulation.session().incision()->area() == Approx(area).epsilon(0.01));
+}
+
+TEST_CASE("A scripted blade that is past the end of its way at the next solve has cut to there") {
+  const Scenario scenario = scenario_of(pressed_and_cut);
+  Session plain(scenario);
+  double area = 0;
+  for (const StepSample& sample : plain.steps())
+    area = plain.step(sample).cut->area;
+  HapticSimulation simulation(scenario);
+  simulation.set_following_aside(true);
+  ScriptedPath device(simulation.path(), 1000);
+  ContactSnapshot snapshot;
+  simulation.prepare(device.read(0));
+  for (const std::uint64_t tick : {0, 200, 400, 1400, 1410, 1420, 1430, 1440}) {
+    if (simulation.session().recondensing())
+      simulation.swap_body();
+    simulation.solve(device.read(tick), 0, snapshot);
+  }
+  REQUIRE(simulation.session().incision() != nullptr);
+  CHECK(simulation.session().incision()->area() == Approx(area).epsilon(0.01));
+}
+
 TEST_CASE("A step tells what it had to do with a body that was made anew") {
   Session session(scenario_of(pressed_and_cut));
   session.set_following_aside(true);
