@@ -50,9 +50,12 @@ struct SweepResult {
 ///
 /// A strip extends the sheet it starts from. It starts a sheet of its own where the edge was out of the body or too far
 /// from it (over one `edge`), where the motion turns sharply, where the blade turns about a point within its edge, and
-/// where the strip would cross the sheet it belongs to. New sheets abut on the old ones with the same vertices.
+/// where the strip would cross the sheet it belongs to. New sheets abut on the old ones with the same vertices: where
+/// the edge comes out of an earlier sheet, or to one, by its border, the strip begins or ends at the border's vertices,
+/// which lie up to 0.75 `edge` along it.
 /// Nothing is added by a motion along the edge itself, nor where a sheet is already (within the blade's edge radius, or
-/// a tenth of `edge` if less): moving out of a cut and in again extends it from its front.
+/// a tenth of `edge` if less), nor by an end of the edge that reaches out beside a sheet by less than a quarter of
+/// `edge`: moving out of a cut and in again extends it from its front.
 /// Sheets reach past the surface of the body by up to about one `edge`; a sheet that never reaches inside is not given.
 class BladeSweep {
  public:

@@ -85,8 +85,8 @@ void SweptSheets::add_triangle(int sheet, const Triangle& triangle) {
             [&](std::uint64_t key) { cells_[key].push_back(place); });
 }
 
-std::optional<Vector3> SweptSheets::on_sheet(const Vector3& x) const {
-  std::optional<Vector3> nearest;
+std::optional<SweptSheets::Foot> SweptSheets::on_sheet(const Vector3& x) const {
+  std::optional<Foot> nearest;
   double nearest_height = thickness_;
   for_cells({x, x}, [&](std::uint64_t key) {
     const auto found = cells_.find(key);
@@ -106,10 +106,11 @@ std::optional<Vector3> SweptSheets::on_sheet(const Vector3& x) const {
       if (!over)
         continue;
       nearest_height = height;
-      nearest = x - area_vector.dot(x - p[0]) / squared * area_vector;
+      nearest = Foot{x - area_vector.dot(x - p[0]) / squared * area_vector, area_vector / std::sqrt(squared),
+                     places_[place].sheet};
       for (const Vector3& corner : p)
-        if ((corner - *nearest).norm() <= thickness_)
-          nearest = corner;
+        if ((corner - nearest->point).norm() <= thickness_)
+          nearest->point = corner;
     }
   });
   return nearest;

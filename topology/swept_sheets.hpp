@@ -22,9 +22,14 @@ class SweptSheets {
   int add_vertex(int sheet, const Vector3& x);
   void add_triangle(int sheet, const Triangle& triangle);
 
+  /// Place on a sheet.
+  struct Foot {
+    Vector3 point, normal; // m; of the triangle, unit
+    int sheet = -1;
+  };
   /// The foot of x on a triangle of some sheet that x lies over, no more than `thickness` off; the nearest vertex of
   /// the triangle in its place where that is as near. Nothing when x lies beside all triangles.
-  [[nodiscard]] std::optional<Vector3> on_sheet(const Vector3& x) const;
+  [[nodiscard]] std::optional<Foot> on_sheet(const Vector3& x) const;
 
   /// Whether the triangle meets one of `sheet` that shares no vertex with it. `indices` are its vertices in the sheet,
   /// beyond the last one where they are new.

@@ -221,6 +221,56 @@ TEST_CASE("Cutting again in place adds nothing, going on from there extends the 
   require_sheets(deeper);
 }
 
+TEST_CASE("A blade that comes back beside its own cut by a little cuts nothing, and abuts on it where it goes on") {
+  // An edge askew to its way and to the old rows, in steps that end anywhere.
+  const Blade askew{{Vector3(0, 0, 0), Vector3(0.02, 0, 0.06)}, 1e-4};
+  for (const double lower : {0.0003, 0.0011, -0.0007}) {
+    BladeSweep sweep(askew, block(), options());
+    int time = 0;
+    const auto go = [&](double to_x, double z, double step) {
+      const double from_x = sweep.edge_at_rest().empty() ? to_x : sweep.edge_at_rest().front().x();
+      const int parts = std::max(1, static_cast<int>(std::ceil(std::abs(to_x - from_x) / step)));
+      double area = 0;
+      for (int k = 1; k <= parts; ++k)
+        area += sweep.move_to(at(++time, from_x + (to_x - from_x) * k / parts, 0.03, z)).area;
+      return area;
+    };
+    sweep.move_to(at(0, -0.025, 0.03, 0.02));
+    go(0.041, 0.02, 0.0013);
+    const double front = sweep.incision()->front_length(), once = sweep.incision()->area();
+    CHECK(go(0.0, 0.02 - lower, 0.0017) < 0.01 * once);
+    CHECK(go(0.03, 0.02 - lower, 0.0017) < 0.01 * once);
+    go(0.043, 0.02 - lower, 0.0019);
+    go(0.0633, 0.02 - lower, 0.0019);
+    require_sheets(sweep);
+    INFO("lower by " << lower << ", sheets: " << sweep.sheets().size());
+    CHECK(sweep.incision()->front_length() < front + 0.0633 - 0.041 + 4 * std::abs(lower) + 0.5 * edge);
+    CHECK(sweep.incision()->area() == Approx(0.0633 * 0.03 + 1.5e-4).epsilon(0.04));
+    for (double x = 0.03; x < 0.065; x += 0.0007)
+      for (double z = 0.0215; z < 0.05; z += 0.0007)
+        if (x < 0.0633 + (z - 0.02) / 3 - 0.001)
+          REQUIRE(sweep.incision()->blocks(Vector3(x, 0.02, z), Vector3(x, 0.04, z)));
+  }
+}
+
+TEST_CASE("A deeper cut beside its own abuts on it") {
+  BladeSweep sweep(scalpel(), block(), options());
+  sweep.move_to(at(0, -0.01, 0.03, 0.0213));
+  sweep.move_to(at(1, 0.0607, 0.03, 0.0213));
+  sweep.move_to(at(2, 0.0607, 0.03, 0.0171)); // along itself
+  int time = 3;
+  double area = 0;
+  for (double x = 0.0589; x > 0.011; x -= 0.0019, ++time)
+    area += sweep.move_to(at(time, x, 0.03, 0.0171)).area;
+  require_sheets(sweep);
+  const double way = 0.0607 - sweep.edge_at_rest().front().x();
+  CHECK(area == Approx(way * 0.0042).epsilon(0.05));
+  CHECK(sweep.incision()->front_length() == Approx(0.0607 + 0.05 - 0.0171 + 0.0042).margin(edge));
+  for (double x = 0.0601; x > 0.0607 - way + 0.75 * edge; x -= 0.0007)
+    for (double z = 0.0175; z < 0.05; z += 0.0007)
+      REQUIRE(sweep.incision()->blocks(Vector3(x, 0.02, z), Vector3(x, 0.04, z)));
+}
+
 TEST_CASE("A path that crosses its own sheet goes on in a new sheet", "[blade]") {
   BladeSweep sweep(scalpel(), block(), options());
   sweep.move_to(at(0, 0.03, 0.03, 0.02));

@@ -1,0 +1,235 @@
+// The triangles of what a run of pieces sweeps, and the sheet that they go to.
+#include "topology/edge_sweep.hpp"
+
+#include "topology/errors.hpp"
+#include "topology/sheet_front.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <utility>
+
+namespace spherecut::topology {
+
+namespace {
+
+void flip(Strip& strip) {
+  for (Triangle& t : strip.triangles)
+    std::swap(t[1], t[2]);
+  for (std::array<Vector3, 3>& corners : strip.corners)
+    std::swap(corners[1], corners[2]);
+}
+
+/// The better of the two diagonals of a piece's quadrangle, from the left of the old edge when they are as good.
+bool rising_diagonal(const std::vector<Vector3>& a, const std::vector<Vector3>& b, std::size_t i) {
+  const double rising = std::min(quality(a[i], a[i + 1], b[i + 1]), quality(a[i], b[i + 1], b[i]));
+  const double falling = std::min(quality(a[i], a[i + 1], b[i]), quality(a[i + 1], b[i + 1], b[i]));
+  return rising > falling * (1 - 1e-6);
+}
+
+} // namespace
+
+bool EdgeSweep::sound(const Motion& motion, std::size_t i) {
+  const std::vector<Vector3>&a = motion.a, &b = motion.b;
+  if (a[i] == b[i])
+    return quality(a[i], a[i + 1], b[i + 1]) > flattest_of_strip;
+  if (a[i + 1] == b[i + 1])
+    return quality(a[i], a[i + 1], b[i]) > flattest_of_strip;
+  return rising_diagonal(a, b, i)
+             ? std::min(quality(a[i], a[i + 1], b[i + 1]), quality(a[i], b[i + 1], b[i])) > flattest_of_strip
+             : std::min(quality(a[i], a[i + 1], b[i]), quality(a[i + 1], b[i + 1], b[i])) > flattest_of_strip;
+}
+
+bool EdgeSweep::crosses(int sheet, const Strip& strip) const {
+  for (std::size_t t = 0; sheet >= 0 && t < strip.triangles.size(); ++t)
+    if (sheets_.crosses(sheet, strip.triangles[t], strip.corners[t]))
+      return true;
+  return false;
+}
+
+// Whether a sheet is one with this strip, too.
+bool EdgeSweep::stays_sheet(int sheet, const Strip& strip) const {
+  if (sheet < 0)
+    return true;
+  SurfaceMesh grown = sheets_.sheets()[sheet];
+  grown.vertices.insert(grown.vertices.end(), strip.vertices.begin(), strip.vertices.end());
+  grown.triangles.insert(grown.triangles.end(), strip.triangles.begin(), strip.triangles.end());
+  try {
+    check_sheet(grown, "sheet");
+  } catch (const InputError&) {
+    return false;
+  }
+  return true;
+}
+
+// Piece by piece, for a run without anchors.
+Strip EdgeSweep::strip(const Run& run, const Motion& motion) const {
+  const std::vector<Vector3>&a = motion.a, &b = motion.b;
+  Strip result;
+  const int base = run.sheet < 0 ? 0 : static_cast<int>(sheets_.sheets()[run.sheet].vertices.size());
+  const auto vertex = [&](const Vector3& x) {
+    result.vertices.push_back(x);
+    return base + static_cast<int>(result.vertices.size()) - 1;
+  };
+  const auto known = [&](std::size_t i) { return run.sheet >= 0 && leads_[i].sheet == run.sheet; };
+  const auto add = [&](const Triangle& t, const Vector3& p, const Vector3& q, const Vector3& r) {
+    result.triangles.push_back(t);
+    result.corners.push_back({p, q, r});
+  };
+  int a_right = -1, b_right = -1;
+  for (std::size_t i = run.first; i < run.last; ++i) {
+    const bool left_stays = a[i] == b[i], right_stays = a[i + 1] == b[i + 1];
+    const int a_left = known(i) ? leads_[i].left : i > run.first ? a_right : vertex(a[i]);
+    const int b_left = i > run.first ? b_right : left_stays ? a_left : vertex(b[i]);
+    a_right = known(i) ? leads_[i].right : i + 1 < run.last && known(i + 1) ? leads_[i + 1].left : vertex(a[i + 1]);
+    b_right = right_stays ? a_right : vertex(b[i + 1]);
+    if (left_stays)
+      add({a_left, a_right, b_right}, a[i], a[i + 1], b[i + 1]);
+    else if (right_stays)
+      add({a_left, a_right, b_left}, a[i], a[i + 1], b[i]);
+    else if (rising_diagonal(a, b, i)) {
+      add({a_left, a_right, b_right}, a[i], a[i + 1], b[i + 1]);
+      add({a_left, b_right, b_left}, a[i], b[i + 1], b[i]);
+    } else {
+      add({a_left, a_right, b_left}, a[i], a[i + 1], b[i]);
+      add({a_right, b_right, b_left}, a[i + 1], b[i + 1], b[i]);
+    }
+    result.leads.push_back({b_left, b_right});
+  }
+  if (run.flipped)
+    flip(result);
+  return result;
+}
+
+// Appends the border's vertices between two anchors, those of `sheet` as its own.
+void EdgeSweep::add_between(const Anchor& p, const Anchor& q, int sheet, std::vector<StripPoint>& points) {
+  constexpr double longest = 4; // edges
+  if (!p.is_set() || p.sheet != q.sheet)
+    return;
+  const SurfaceMesh& old = sheets_.sheets()[p.sheet];
+  for (const int v :
+       borders_.between(old, p.sheet, p.vertex, q.vertex, longest * options_.edge).value_or(std::vector<int>{}))
+    points.push_back({old.vertices[v], p.sheet == sheet ? v : -1});
+}
+
+// What lies between the rows of a run and the borders between its anchors.
+std::optional<Strip> EdgeSweep::abutting_strip(const Run& run, const Motion& motion) {
+  const auto& [a, b, from, to, strokes] = motion;
+  const auto [first, last, sheet, flipped] = run;
+  const auto vertex = [sheet = sheet](const Anchor& at) { return sheet >= 0 && at.sheet == sheet ? at.vertex : -1; };
+  const auto known = [&, first = first, last = last, sheet = sheet](std::size_t i) {
+    if (sheet >= 0 && i < last && leads_[i].sheet == sheet)
+      return leads_[i].left;
+    return sheet >= 0 && i > first && leads_[i - 1].sheet == sheet ? leads_[i - 1].right : -1;
+  };
+  std::vector<StripPoint> lower, upper;
+  if (to[first].is_set() && from[first].is_set() && b[first] != a[first]) {
+    lower.push_back({b[first], vertex(to[first])});
+    add_between(to[first], from[first], sheet, lower);
+  }
+  for (std::size_t i = first; i <= last; ++i) {
+    if (i > first && known(i) < 0)
+      add_between(from[i - 1], from[i], sheet, lower);
+    lower.push_back({a[i], known(i) >= 0 ? known(i) : vertex(from[i])});
+    if (i > first)
+      add_between(to[i - 1], to[i], sheet, upper);
+    upper.push_back({b[i], vertex(to[i])});
+  }
+  if (to[last].is_set() && from[last].is_set() && b[last] != a[last]) {
+    add_between(from[last], to[last], sheet, lower);
+    lower.push_back({b[last], vertex(to[last])});
+  }
+  const int base = sheet < 0 ? 0 : static_cast<int>(sheets_.sheets()[sheet].vertices.size());
+  std::optional<Strip> result = strip_between(lower, upper, base);
+  if (!result || result->triangles.empty())
+    return result;
+  // Leads of the pieces: none where the border of an earlier sheet lies between their points.
+  std::vector<std::array<int, 2>> of_pieces;
+  std::size_t at = 0;
+  for (std::size_t i = first; i < last; ++i) {
+    std::vector<StripPoint> inserted;
+    add_between(to[i], to[i + 1], sheet, inserted);
+    const bool is_old = to[i].is_set() && to[i].sheet == to[i + 1].sheet;
+    const bool is_one = inserted.empty() && b[i] != b[i + 1] && !is_old;
+    of_pieces.push_back(is_one ? result->leads[at] : std::array<int, 2>{-1, -1});
+    at += inserted.size() + 1;
+  }
+  result->leads = std::move(of_pieces);
+  if (flipped)
+    flip(*result);
+  return result;
+}
+
+// The sheet from whose border alone a run goes on, without a sharp turn; -1: none.
+int EdgeSweep::left_sheet(const Run& run, const Motion& motion) const {
+  int sheet = -1;
+  for (std::size_t i = run.first; i <= run.last; ++i) {
+    const Anchor& from = motion.from[i];
+    if (!from.is_set())
+      continue;
+    const Stroke& stroke = motion.strokes[std::min(i, run.last - 1)];
+    if ((sheet >= 0 && from.sheet != sheet) || std::abs(stroke.normal.dot(from.normal)) < cos_turn_)
+      return -1;
+    sheet = from.sheet;
+  }
+  return sheet;
+}
+
+void EdgeSweep::append(Run run, const Strip& added, const Motion& motion) {
+  if (run.sheet < 0)
+    run.sheet = sheets_.add_sheet();
+  for (const Vector3& x : added.vertices)
+    sheets_.add_vertex(run.sheet, x);
+  for (const Triangle& t : added.triangles)
+    sheets_.add_triangle(run.sheet, t);
+  for (std::size_t i = run.first; i < run.last; ++i) {
+    const auto [left, right] = added.leads[i - run.first];
+    leads_[i] = left < 0 ? Lead{} : Lead{run.sheet, left, right, motion.strokes[i].normal, run.flipped};
+  }
+}
+
+// Piece by piece, to the run's sheet or, where that is none or would be crossed, to a new one.
+void EdgeSweep::append_plain(Run run, const Motion& motion, bool is_checked) {
+  Strip added = strip(run, motion);
+  if (crosses(run.sheet, added) || (is_checked && !stays_sheet(run.sheet, added))) {
+    run.sheet = -1;
+    run.flipped = false;
+    added = strip(run, motion);
+  }
+  append(run, added, motion);
+}
+
+// A run some of whose points lie on borders of earlier sheets: to the sheet that it extends, or to one that it comes
+// out of, else to a new one.
+EdgeSweep::Abutting EdgeSweep::append_abutting(const Run& run, const Motion& motion) {
+  std::vector<Run> choices{run};
+  if (const int left = run.sheet < 0 ? left_sheet(run, motion) : -1; left >= 0)
+    choices = {{run.first, run.last, left, false}, {run.first, run.last, left, true}};
+  choices.push_back({run.first, run.last, -1, false});
+  for (const Run& choice : choices) {
+    const std::optional<Strip> added = abutting_strip(choice, motion);
+    if (added && added->triangles.empty())
+      return Abutting::nothing;
+    if (added && stays_sheet(choice.sheet, *added) && !crosses(choice.sheet, *added)) {
+      append(choice, *added, motion);
+      drop_used_leads(choice.sheet);
+      return Abutting::added;
+    }
+  }
+  return Abutting::failed;
+}
+
+// Pieces whose edge a strip has closed lead no further.
+void EdgeSweep::drop_used_leads(int sheet) {
+  if (sheet < 0)
+    return;
+  const std::vector<Triangle>& all = sheets_.sheets()[sheet].triangles;
+  for (Lead& lead : leads_) {
+    const auto has = [](const Triangle& t, int v) { return std::find(t.begin(), t.end(), v) != t.end(); };
+    if (lead.sheet == sheet && std::count_if(all.begin(), all.end(), [&](const Triangle& t) {
+                                 return has(t, lead.left) && has(t, lead.right);
+                               }) != 1)
+      lead = {};
+  }
+}
+
+} // namespace spherecut::topology
