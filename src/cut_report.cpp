@@ -80,9 +80,32 @@ double opening_volume(const topology::Wound& wound, const BodyModel& model) {
   return volume;
 }
 
+std::vector<char> splinters(const topology::Wound& wound) {
+  constexpr double thinnest = 2e-4, smallest = 1e-12; // of the largest piece's size and volume
+  double volume = 0;
+  for (const topology::WoundPiece& piece : wound.pieces)
+    volume = std::max(volume, piece.volume);
+  std::vector<double> size(wound.pieces.size(), 0);
+  if (size.size() > 1) {
+    for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t)
+      size[static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)))] +=
+          area_vector(wound.surface, wound.surface.triangles[t]).norm();
+    for (std::size_t piece = 0; piece < size.size(); ++piece)
+      size[piece] = 6 * wound.pieces[piece].volume / size[piece];
+  }
+  std::vector<char> thin(size.size(), 0);
+  for (std::size_t piece = 0; piece < size.size(); ++piece)
+    thin[piece] = size[piece] < thinnest * *std::max_element(size.begin(), size.end()) ||
+                          wound.pieces[piece].volume < smallest * volume
+                      ? 1
+                      : 0;
+  return thin;
+}
+
 void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing) {
   if (wound.pieces.size() < 2)
     return;
+  const std::vector<char> is_splinter = splinters(wound);
   std::vector<double> area(wound.pieces.size(), 0);
   std::vector<Vector3> centre(wound.pieces.size(), Vector3::Zero());
   for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
@@ -94,6 +117,8 @@ void require_pieces(const topology::Wound& wound, const solvers::SpacingField& s
       centre[piece] += part / 3 * wound.surface.vertices[vertex];
   }
   for (std::size_t piece = 0; piece < wound.pieces.size(); ++piece) {
+    if (is_splinter[piece] != 0)
+      continue;
     const Vector3 middle = centre[piece] / area[piece];
     const double size = 6 * wound.pieces[piece].volume / area[piece];
     if (const double h = spacing(middle); size < h)
@@ -115,8 +140,9 @@ std::vector<int> unheld_pieces(const topology::Wound& wound, const std::vector<F
     mark = std::any_of(fixed.begin(), fixed.end(), [&](const FixedRegion& region) { return region.holds(middle); });
   }
   std::vector<int> unheld;
+  const std::vector<char> is_splinter = splinters(wound);
   for (std::size_t piece = 0; piece < held.size(); ++piece)
-    if (held[piece] == 0)
+    if (held[piece] == 0 && is_splinter[piece] == 0)
       unheld.push_back(static_cast<int>(piece));
   return unheld;
 }

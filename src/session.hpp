@@ -132,7 +132,10 @@ class Session {
   /// Whether a cut is put off that the next step would have made if the blade rested.
   [[nodiscard]] bool has_put_off() const { return put_off_ > 0 && follows_cuts_aside() && !cuts_aside(); }
 
-  /// Whether such a body is under way; and whether it is there and has followed all that was cut meanwhile.
+  /// Whether the blade has gone where the body has not followed it yet.
+  [[nodiscard]] bool lags_behind_blade() const { return put_off_ > 0 || cuts_aside(); }
+
+  /// Whether a body is under way beside the steps; and whether it is there and has followed all that was cut meanwhile.
   [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr || following_; }
   [[nodiscard]] bool recondensed() const;
   /// Takes it over, after waiting for it where need be; the next step solves with it. False: there is none, or it could

@@ -15,6 +15,40 @@ constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
 constexpr double same_place = 1e-6;       // of the fine spacing: nearer to its path a blade is on it
 
+// The place of a sheet whose faces have parted so that x lies between them: on the straight line from face to face. Out
+// of the body the sheet goes on in its plane. Nothing where x lies in material on one side, or ahead of the front.
+std::optional<Vector3> place_in_opening(const Vector3& x, const topology::Incision& incision,
+                                        const std::function<Vector3(const Vector3&)>& displacement, double fine) {
+  constexpr double off = 1e-3;   // fine spacings from the sheet: on a face
+  constexpr double tilted = 0.5; // more than the faces are by the displacement: a slope
+  constexpr double near = 1e-2;  // fine spacings along the sheet: nothing is cut there
+  constexpr int most_steps = 20;
+  const Vector3 moved = displacement(x);
+  const double reach = gap_reach * fine + moved.norm(); // a face may have gone that far
+  Vector3 place = x - moved;
+  for (int step = 0; step < most_steps; ++step) {
+    const auto on = incision.closest(place, reach);
+    if (!on || (on->on_border && incision.domain()->signed_distance(on->point) < 0))
+      return std::nullopt;
+    const Vector3 lift = off * fine * on->normal;
+    const Vector3 above = x - on->point - displacement(on->point + lift),
+                  below = x - on->point - displacement(on->point - lift);
+    const double over = above.dot(on->normal), under = below.dot(on->normal);
+    const bool is_between = over < 0 && under > 0;
+    // What is left along the sheet, seen from face to face or from the face of the material.
+    const Vector3 along = is_between  ? Vector3((under * above - over * below) / (under - over))
+                          : over >= 0 ? Vector3(above - over * on->normal)
+                                      : Vector3(below - under * on->normal);
+    if (!is_between && std::max(over, -under) > tilted * along.norm())
+      return std::nullopt;
+    const Vector3 next = on->point + along;
+    if (along.norm() <= near * fine || (on->on_border && (next - place).norm() <= near * fine))
+      return is_between ? std::optional(on->on_border ? next : on->point) : std::nullopt;
+    place = next;
+  }
+  return std::nullopt;
+}
+
 } // namespace
 
 // Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
@@ -24,15 +58,23 @@ Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
   const auto displacement = [&](const Vector3& rest) {
     return model.at(domain.signed_distance(rest) <= 0 ? rest : domain.closest_surface_point(rest)).displacement;
   };
+  const double fine = zone_.spacing.fine;
+  if (model.incision != nullptr)
+    if (const auto between = place_in_opening(x, *model.incision, displacement, fine))
+      return *between;
   for (const double tolerance : {rest_tolerance, coarse_tolerance})
     try {
-      return topology::rest_position(x, displacement, tolerance * zone_.spacing.fine);
+      Vector3 rest = topology::rest_position(x, displacement, tolerance * fine);
+      if (tolerance > rest_tolerance && model.incision != nullptr) // the displacement jumps: there is a sheet
+        if (const auto on = model.incision->closest(rest, 2 * tolerance * fine))
+          rest = on->point;
+      return rest;
     } catch (const NumericalError&) {
       if (tolerance == rest_tolerance)
         continue;
       Vector3 guess = x - displacement(x);
       if (model.incision != nullptr)
-        if (const auto on = model.incision->closest(guess, gap_reach * zone_.spacing.fine))
+        if (const auto on = model.incision->closest(guess, gap_reach * fine))
           return on->point;
       if (domain.signed_distance(guess) <= 0) // outside no material is cut
         throw;
@@ -116,21 +158,21 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
     if (!sample.blade)
       return solved;
   }
-  const bool leaves_off = follows_cuts_aside() && blade_rests_ && put_off_ > 0;
-  if (follows_cuts_aside() && last_blade_ && !blade_lifted_ && !ends(sample) && !leaves_off &&
-      blade_moved_ != sample.time) // where it was
-    return solved;
-  if (advance() > 0 && last_blade_ && !blade_lifted_ && !ends(sample)) {
-    put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
-    topology::RestMap to_rest;
-    if (model_.state)
-      to_rest = [this](const Vector3& x) { return rest_position(x); };
-    const bool is_outside = incisions_->is_outside(*sample.blade, to_rest);
-    const bool waits = cuts_aside() ? is_outside || put_off_ < most_advances * advance()
-                                    : !is_outside && !leaves_off && put_off_ < advance();
-    if (waits) {
-      incisions_->put_off(*sample.blade);
+  if (last_blade_ && !blade_lifted_ && !ends(sample)) {
+    const bool leaves_off = follows_cuts_aside() && blade_rests_ && put_off_ > 0;
+    if (follows_cuts_aside() && !leaves_off && blade_moved_ != sample.time) // it is where it was
       return solved;
+    if (advance() > 0) {
+      put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
+      topology::RestMap to_rest;
+      if (model_.state)
+        to_rest = [this](const Vector3& x) { return rest_position(x); };
+      const bool is_outside = incisions_->is_outside(*sample.blade, to_rest);
+      if (cuts_aside() ? is_outside || put_off_ < most_advances * advance()
+                       : !is_outside && !leaves_off && put_off_ < advance()) {
+        incisions_->put_off(*sample.blade);
+        return solved;
+      }
     }
   }
   make_cut(sample);
@@ -242,9 +284,11 @@ void Session::report_cut(CutReport& report) const {
     report.front_length = model_.incision->front_length();
     report.sheets = static_cast<int>(model_.incision->sheets().size());
   }
-  report.pieces = static_cast<int>(wound.pieces.size());
-  for (const topology::WoundPiece& piece : wound.pieces)
-    report.volumes.push_back(piece.volume);
+  const std::vector<char> is_splinter = splinters(wound);
+  for (std::size_t piece = 0; piece < wound.pieces.size(); ++piece)
+    if (is_splinter[piece] == 0)
+      report.volumes.push_back(wound.pieces[piece].volume);
+  report.pieces = static_cast<int>(report.volumes.size());
   std::sort(report.volumes.rbegin(), report.volumes.rend());
   report.unheld = static_cast<int>(unheld_pieces(wound, scenario_.fixed).size());
   report.nodes = model_.sprinkling.nodes.size();

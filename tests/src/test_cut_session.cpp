@@ -125,6 +125,35 @@ TEST_CASE("A blade that comes down through a stretched block leaves two pieces t
   CHECK(session.at({-0.002, 0, 0.029}).displacement.x() < 0);
 }
 
+TEST_CASE("A wound stays as it is while the blade goes back through it, and goes on as if it had not") {
+  // A slanted edge, drawn along a stretched block whose faces part behind it.
+  const auto drawn = [](const std::vector<std::pair<double, double>>& way) {
+    std::string text = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.4\npretension = [0.15, 0, 0]") +
+                       "[blade]\nedge = [[0, 0, 0], [0, 0.02, 0.03]]\nstep = 0.05\n";
+    for (const auto& [time, y] : way)
+      text += fmt::format("[[blade.path]]\ntime = {}\nposition = [0.001, {}, 0.012]\n", time, y);
+    return text;
+  };
+  Session straight = session_of(drawn({{0, -0.045}, {0.5, -0.012}, {0.8, 0.005}}));
+  Session back = session_of(drawn({{0, -0.045}, {0.5, -0.012}, {0.9, -0.045}, {1.3, -0.012}, {1.6, 0.005}}));
+  StepResult there, again, last;
+  for (const StepSample& sample : back.steps()) {
+    last = back.step(sample);
+    CHECK_FALSE(last.cut->refused);
+    if (sample.time <= 0.5)
+      there = last;
+    else if (sample.time <= 1.3)
+      again = last;
+  }
+  CHECK(there.cut->opening_volume > 5e-8);
+  CHECK(again.cut->area < 1.01 * there.cut->area);
+  CHECK(again.cut->opening_volume == Approx(there.cut->opening_volume).epsilon(0.03));
+  const CutReport expected = *run(straight).back().cut;
+  CHECK(last.cut->area == Approx(expected.area).epsilon(0.01));
+  CHECK(last.cut->front_length == Approx(expected.front_length).epsilon(0.03));
+  CHECK(last.cut->opening_volume == Approx(expected.opening_volume).epsilon(0.06));
+}
+
 TEST_CASE("A severed piece that nothing holds is held, dropped or refused as the scenario asks, and said") {
   SECTION("hold") {
     Session session = session_of(cut_block + topping + "[cut]\nunheld = \"hold\"\n");
