@@ -247,8 +247,13 @@ LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& p
                             ? MatrixX(lips.tool_of_lips.transpose())
                             : openings(pairs, lips.modes, body.compliance_between(nodes, tool->nodes));
   }
-  if (!lips.compliance.allFinite())
-    throw NumericalError(fmt::format("the compliance of {} lip pairs is not finite", pairs.size()));
+  for (Eigen::Index p = 0; p < std::ssize(pairs); ++p)
+    if (!lips.compliance.middleRows(lips.modes * p, lips.modes).allFinite()) {
+      const Vector3& x = body.problem().nodes.positions[pairs[p].plus];
+      throw NumericalError(fmt::format("forces on the faces of the cut give openings that are not finite, first at "
+                                       "({:.4g}, {:.4g}, {:.4g}) m; moment matrices' worst condition {:.2g}",
+                                       x.x(), x.y(), x.z(), body.report().worst_moment_condition));
+    }
   return lips;
 }
 

@@ -188,17 +188,24 @@ std::string text_of(const HapticFindings& f) {
                                  f.loop.fifo ? "SCHED_FIFO, spinning" : "plain scheduling");
   text += fmt::format("  wake latency {}\n  compute time {}\n", line_of(f.latency), line_of(f.compute));
   text += fmt::format("simulation: {:.1f} solves/s, p50 {:.2f}, p99 {:.2f}, max {:.1f} ms; {} cut increments, {} "
-                      "re-sprinkles, {} failed, coarsened to level {}\n",
+                      "re-sprinkles, {} failed, coarsened to level {}{}\n",
                       f.solve_rate, 1e3 * f.solve.p50, 1e3 * f.solve.p99, 1e3 * f.solve.largest, f.increments,
-                      f.resprinkled, f.failed, f.highest_degradation);
+                      f.resprinkled, f.failed, f.highest_degradation,
+                      f.highest_degradation > 0 ? fmt::format(" (rebuilds missed their budget: nodes up to {:.2g} "
+                                                              "times as far apart)",
+                                                              std::pow(coarse_per_level, f.highest_degradation))
+                                                : "");
   text += fmt::format("force: peak {:.4g} N; largest step in a tick {:.3g} N (at hand-overs {:.3g}, onset {:.3g}, cut "
                       "increments {:.3g} N)\n",
                       f.peak, f.steps.any, f.steps.hand_over, f.steps.onset, f.steps.cut);
   text += fmt::format("  {} ticks limited, {} softened, {} with the contact beyond the patch, {} not converged\n",
                       f.limited, f.softened, f.outside, f.unconverged);
   if (f.blade_work > 0)
-    text += fmt::format("blade: peak {:.4g} N; {:.3g} mJ, {:.3g} mJ of it on new surface; cut of {:.4g} cm2\n",
-                        f.blade_peak, 1e3 * f.blade_work, 1e3 * f.blade_surface, 1e4 * f.cut_area);
+    text += fmt::format("blade: peak {:.4g} N; {:.3g} mJ, {:.3g} mJ of it on new surface\n", f.blade_peak,
+                        1e3 * f.blade_work, 1e3 * f.blade_surface);
+  if (f.increments > 0)
+    text += fmt::format("cut: {:.4g} cm2{}\n", 1e4 * f.cut_area,
+                        f.unfollowed ? "; the body had yet to follow the blade's last way" : "");
   if (f.error.ticks > 0)
     text += fmt::format("  against the solved force at {} ticks: RMS {:.3g} N = {:.2f} % of the peak {:.4g} N, largest "
                         "{:.3g} N\n",
@@ -246,6 +253,7 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
       {"port_energy_J", {{"end", f.energy}, {"lowest", f.lowest_energy}}},
       {"blade", {{"peak_N", f.blade_peak}, {"work_J", f.blade_work}, {"surface_J", f.blade_surface}}},
       {"cut_area_m2", f.cut_area},
+      {"cut_unfollowed", f.unfollowed},
       {"ticks_limited", f.limited},
       {"ticks_softened", f.softened},
       {"ticks_outside", f.outside},

@@ -116,6 +116,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
     return RunEnd::interrupted;
   }
   HapticFindings findings = findings_of(settings, records, report);
+  findings.unfollowed = simulation.session().lags_behind_blade();
   if (bridge != nullptr)
     findings.bridge = bridge->counters();
   std::vector<SolvedForce> solved;

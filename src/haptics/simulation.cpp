@@ -88,10 +88,12 @@ StepSample HapticSimulation::sample(const DeviceState& device) const {
     sample.tool = scenario.tool ? std::optional(tool_pose(scenario.tool->shape, device)) : std::nullopt;
   } else if (scenario.tool) {
     sample.tool = tool_pose(scenario.tool->shape, device);
-    if (scenario.blade) // to the end of its way, whenever it is solved
-      sample.blade = blade_pose(*scenario.blade, solved_before(scenario.blade->path.back().time)
-                                                     ? std::min(device.time, scenario.blade->path.back().time)
-                                                     : device.time);
+    if (scenario.blade) {
+      double time = device.time;
+      if (const double end = scenario.blade->path.back().time; solved_before(end)) // to there, whenever it is solved
+        time = std::min(time, end);
+      sample.blade = blade_pose(*scenario.blade, time);
+    }
   } else {
     sample.blade = topology::BladePose{device.time, device.position, device.orientation};
   }

@@ -1,0 +1,54 @@
+// Sessions in virtual time that must come out the same twice.
+#pragma once
+
+#include "src/haptics/virtual_loop.hpp"
+
+#include <catch2/catch.hpp>
+#include <string>
+#include <vector>
+
+namespace spherecut::tests {
+
+/// Solves at regular ticks that follow tool and cut aside; every third takes over what has been made there.
+inline std::vector<app::SolveEvent> solves_aside(std::uint64_t ticks, std::uint64_t period, std::uint64_t delay) {
+  std::vector<app::SolveEvent> events = app::regular_solves(ticks, period, delay);
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    events[i].aside = true;
+    events[i].swaps = i % 3 == 2;
+  }
+  return events;
+}
+
+/// A scripted session, run twice with the same bits in every solve and tick, and none that fails.
+inline app::LoopRecords run_twice(const app::Scenario& scenario, const std::vector<app::SolveEvent>& events,
+                                  std::uint64_t ticks) {
+  const auto run = [&] {
+    const app::HapticSettings settings;
+    app::HapticSimulation simulation(scenario);
+    app::ScriptedPath device(simulation.path(), settings.rate);
+    return app::run_virtual(settings, simulation, device, events, ticks);
+  };
+  app::LoopRecords first = run();
+  const app::LoopRecords second = run();
+  REQUIRE(first.solves.size() == events.size());
+  REQUIRE(second.solves.size() == events.size());
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const app::SolveRecord &a = first.solves[i], &b = second.solves[i];
+    CHECK_FALSE(a.failed);
+    CHECK(a.event.swaps == events[i].swaps);
+    CHECK(a.topology == b.topology);
+    CHECK(a.cut_area == b.cut_area);
+    CHECK(a.residual == b.residual);
+    CHECK(a.update == b.update);
+    CHECK(a.force == b.force);
+  }
+  REQUIRE(first.ticks.size() == ticks);
+  REQUIRE(second.ticks.size() == ticks);
+  bool same = true;
+  for (std::size_t i = 0; i < first.ticks.size(); ++i)
+    same = same && first.ticks[i].force == second.ticks[i].force;
+  CHECK(same);
+  return first;
+}
+
+} // namespace spherecut::tests
