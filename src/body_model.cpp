@@ -315,6 +315,11 @@ void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few
   }
 }
 
+void find_lips(BodyModel& model) {
+  model.field = model.base;
+  static_cast<void>(normal_openings(model));
+}
+
 namespace {
 
 /// What a later solve and the haptic loop ask of a patch that is held: where it is bonded to the tool, and where that

@@ -100,6 +100,10 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
 /// fields of the patch where the method can do without (contact_solver.hpp).
 void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
 
+/// Finds, for a condensed model, the means over lips that every solve of it takes, so that the first does not have to.
+/// Throws NumericalError where no sound support covers a lip: the model cannot be solved.
+void find_lips(BodyModel& model);
+
 /// Presses on a patch without fields after which they are made, a few candidates a press.
 inline constexpr int few_presses = 20;
 

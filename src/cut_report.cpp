@@ -81,24 +81,19 @@ double opening_volume(const topology::Wound& wound, const BodyModel& model) {
 }
 
 std::vector<char> splinters(const topology::Wound& wound) {
-  constexpr double thinnest = 2e-4, smallest = 1e-12; // of the largest piece's size and volume
-  double volume = 0;
-  for (const topology::WoundPiece& piece : wound.pieces)
-    volume = std::max(volume, piece.volume);
-  std::vector<double> size(wound.pieces.size(), 0);
-  if (size.size() > 1) {
-    for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t)
-      size[static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)))] +=
-          area_vector(wound.surface, wound.surface.triangles[t]).norm();
-    for (std::size_t piece = 0; piece < size.size(); ++piece)
-      size[piece] = 6 * wound.pieces[piece].volume / size[piece];
-  }
-  std::vector<char> thin(size.size(), 0);
+  constexpr double thinnest = 2e-4; // of the largest piece's size
+  std::vector<double> area(wound.pieces.size(), 0);
+  for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t)
+    area[static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)))] +=
+        area_vector(wound.surface, wound.surface.triangles[t]).norm();
+  std::vector<double> size(wound.pieces.size(), 0); // of one that has come to nothing, too
   for (std::size_t piece = 0; piece < size.size(); ++piece)
-    thin[piece] = size[piece] < thinnest * *std::max_element(size.begin(), size.end()) ||
-                          wound.pieces[piece].volume < smallest * volume
-                      ? 1
-                      : 0;
+    if (area[piece] > 0)
+      size[piece] = 6 * wound.pieces[piece].volume / area[piece];
+  const double largest = *std::max_element(size.begin(), size.end());
+  std::vector<char> thin;
+  for (const double each : size)
+    thin.push_back(each < thinnest * largest ? 1 : 0);
   return thin;
 }
 

@@ -37,7 +37,7 @@ void report_body(const BodyModel& body, double sight, BodyUpdate& report);
 double opening_volume(const topology::Wound& wound, const BodyModel& model);
 
 /// Which pieces are no tissue, but what rounding leaves between strips of a cut that all but coincide: those whose 6
-/// volume / area is below 2e-4 of the largest piece's, or their volume below 1e-12 of its.
+/// volume / area is below 2e-4 of the largest piece's.
 std::vector<char> splinters(const topology::Wound& wound);
 
 /// Throws InputError naming the first piece that is smaller than the node spacing there: 6 volume / area, the diameter

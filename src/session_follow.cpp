@@ -62,6 +62,7 @@ void Session::begin_following(const topology::SurfaceContact& centre) {
     const std::vector<int> near = touchable_nodes(scenario, *domain, model.sprinkling.nodes, centre, reach);
     app::assemble(scenario, domain, model, {}, near);
     app::condense(near, model);
+    find_lips(model);
     return made;
   };
   following_ = Following{centre, 0, 0, std::async(std::launch::async, std::move(make))};
@@ -106,16 +107,23 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
     BodyModel before;
     before.incision = std::move(incision_before);
     before.sprinkling = std::move(sprinkling);
-    std::vector<int> near;
-    const double seen = solvers::sight_seconds();
+    double sight = 0, condensing = 0; // s
     const auto build = [&](const auto& sprinkle) {
       {
         const StageTimer timer(update.seconds.sprinkling);
         sprinkle();
       }
-      const StageTimer timer(update.seconds.assembly);
-      near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
-      app::assemble(scenario, domain, model, {}, near);
+      std::vector<int> near;
+      {
+        const StageTimer timer(update.seconds.assembly);
+        const double seen = solvers::sight_seconds();
+        near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
+        app::assemble(scenario, domain, model, {}, near);
+        sight += solvers::sight_seconds() - seen;
+      }
+      const StageTimer timer(condensing);
+      app::condense(near, model, true);
+      find_lips(model);
     };
     update.update_reason = renewed;
     if (renewed.empty())
@@ -128,11 +136,8 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
       }
     if (model.body == nullptr)
       build([&] { model.sprinkling = resprinkle_held(scenario, *domain, how, before.sprinkling.nodes); });
-    report_body(model, solvers::sight_seconds() - seen, update);
-    {
-      const StageTimer timer(update.seconds.solve);
-      app::condense(near, model, true);
-    }
+    report_body(model, sight, update);
+    update.seconds.solve += condensing;
     return made;
   };
   following_ = Following{std::nullopt, time, std::exchange(report.triangles, 0),

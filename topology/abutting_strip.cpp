@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 
 namespace spherecut::topology {
 
@@ -17,21 +19,19 @@ double quality(const Vector3& a, const Vector3& b, const Vector3& c) {
 std::optional<Strip> strip_between(const std::vector<StripPoint>& lower, const std::vector<StripPoint>& upper,
                                    int base) {
   Strip strip;
-  std::vector<StripPoint> known;
+  std::vector<StripPoint> known; // by place; those that the sheet has first
+  for (const std::vector<StripPoint>* points : {&lower, &upper})
+    std::copy_if(points->begin(), points->end(), std::back_inserter(known),
+                 [](const StripPoint& point) { return point.vertex >= 0; });
   const auto vertices_of = [&](const std::vector<StripPoint>& points) {
     std::vector<int> ids;
     for (const StripPoint& point : points) {
-      const auto same = std::find_if(known.begin(), known.end(), [&](const StripPoint& k) { return k.x == point.x; });
-      if (same != known.end()) {
-        ids.push_back(same->vertex);
-        continue;
-      }
-      known.push_back(point);
-      if (point.vertex < 0) {
-        known.back().vertex = base + static_cast<int>(strip.vertices.size());
+      auto same = std::find_if(known.begin(), known.end(), [&](const StripPoint& k) { return k.x == point.x; });
+      if (same == known.end()) {
+        same = known.insert(same, {point.x, base + static_cast<int>(strip.vertices.size())});
         strip.vertices.push_back(point.x);
       }
-      ids.push_back(known.back().vertex);
+      ids.push_back(same->vertex);
     }
     return ids;
   };
@@ -44,10 +44,11 @@ std::optional<Strip> strip_between(const std::vector<StripPoint>& lower, const s
   add_side(lower, 1);
   add_side(upper, -1);
   whole += (lower.back().x - lower[0].x).cross(upper.back().x - lower[0].x);
-  constexpr double folded = 0.1; // times the quality of a triangle that faces the other way
-  // Of all ways to go on, on one polyline or the other, that whose flattest triangle is the best; then the best sum.
+  // Of all ways to go on, on one polyline or the other, that which folds least often, a triangle facing the other way;
+  // then that whose flattest triangle is the best; then the best sum. Material within a fold would see nothing.
   const std::size_t m = low.size(), n = up.size();
   struct Way {
+    int folds = std::numeric_limits<int>::max();
     double flattest = -1, sum = 0; // below 0: none
     bool came_low = false;
   };
@@ -55,12 +56,16 @@ std::optional<Strip> strip_between(const std::vector<StripPoint>& lower, const s
   const auto way = [&](std::size_t i, std::size_t j) -> Way& { return ways[i * n + j]; };
   const auto go = [&](const Way& from, int p, int q, int r, const std::array<Vector3, 3>& x, bool low_side, Way& to) {
     const bool is_none = p == q || q == r || r == p;
-    const bool folds = (x[1] - x[0]).cross(x[2] - x[0]).dot(whole) < 0;
-    const double good = is_none ? 1 : (folds ? folded : 1) * quality(x[0], x[1], x[2]);
-    const Way next{std::min(from.flattest, good), from.sum + (is_none ? 0 : good), low_side};
-    if (std::pair(next.flattest, next.sum) > std::pair(to.flattest, to.sum))
+    const bool folds = !is_none && (x[1] - x[0]).cross(x[2] - x[0]).dot(whole) < 0;
+    const double good = is_none ? 1 : quality(x[0], x[1], x[2]);
+    if (std::min(from.flattest, good) <= flattest_of_strip)
+      return;
+    const Way next{from.folds + (folds ? 1 : 0), std::min(from.flattest, good), from.sum + (is_none ? 0 : good),
+                   low_side};
+    if (std::tuple(-next.folds, next.flattest, next.sum) > std::tuple(-to.folds, to.flattest, to.sum))
       to = next;
   };
+  way(0, 0).folds = 0;
   way(0, 0).flattest = 1;
   for (std::size_t i = 0; i < m; ++i)
     for (std::size_t j = 0; j < n; ++j) {
@@ -69,7 +74,7 @@ std::optional<Strip> strip_between(const std::vector<StripPoint>& lower, const s
       if (j + 1 < n)
         go(way(i, j), low[i], up[j + 1], up[j], {lower[i].x, upper[j + 1].x, upper[j].x}, false, way(i, j + 1));
     }
-  if (way(m - 1, n - 1).flattest <= flattest_of_strip)
+  if (way(m - 1, n - 1).flattest < 0)
     return std::nullopt;
   const auto add = [&](const Triangle& t, const std::array<Vector3, 3>& x) {
     if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])

@@ -82,7 +82,7 @@ class EdgeSweep {
   void add_run(const Run& run, Motion& motion);
 
   [[nodiscard]] Vector3 vertex_of(const Anchor& anchor) const;
-  [[nodiscard]] Anchor anchor_at(const SweptSheets::Foot& foot, const Vector3& x);
+  [[nodiscard]] Anchor anchor_at(const SweptSheets::Foot& foot, const Vector3& x) const;
   [[nodiscard]] Vector3 last_on_sheets(const Vector3& x, const Vector3& y) const;
   [[nodiscard]] bool covered(const Vector3& x, const Vector3& y) const;
   [[nodiscard]] bool cut_before(const Motion& motion, std::size_t i) const;
@@ -91,10 +91,9 @@ class EdgeSweep {
 
   [[nodiscard]] static bool sound(const Motion& motion, std::size_t i);
   [[nodiscard]] bool crosses(int sheet, const Strip& strip) const;
-  [[nodiscard]] bool stays_sheet(int sheet, const Strip& strip) const;
   [[nodiscard]] Strip strip(const Run& run, const Motion& motion) const;
-  void add_between(const Anchor& p, const Anchor& q, int sheet, std::vector<StripPoint>& points);
-  [[nodiscard]] std::optional<Strip> abutting_strip(const Run& run, const Motion& motion);
+  void add_between(const Anchor& p, const Anchor& q, int sheet, std::vector<StripPoint>& points) const;
+  [[nodiscard]] std::optional<Strip> abutting_strip(const Run& run, const Motion& motion) const;
   [[nodiscard]] int left_sheet(const Run& run, const Motion& motion) const;
   void append(Run run, const Strip& added, const Motion& motion);
   void append_plain(Run run, const Motion& motion, bool is_checked);
@@ -108,7 +107,6 @@ class EdgeSweep {
   std::shared_ptr<const Domain> domain_;
   SweepOptions options_;
   SweptSheets sheets_;
-  SheetBorders borders_;
   double tiny_; // m: less motion, less height than this is none
   double cos_turn_;
   std::vector<Vector3> row_;

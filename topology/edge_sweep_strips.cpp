@@ -1,9 +1,6 @@
 // The triangles of what a run of pieces sweeps, and the sheet that they go to.
 #include "topology/edge_sweep.hpp"
 
-#include "topology/errors.hpp"
-#include "topology/sheet_front.hpp"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <utility>
@@ -19,11 +16,26 @@ void flip(Strip& strip) {
     std::swap(corners[1], corners[2]);
 }
 
+/// How good two triangles are that share an edge: those that do not fold there before those that do, then by the
+/// flatter one.
+std::pair<bool, double> goodness(const std::array<Vector3, 3>& p, const std::array<Vector3, 3>& q) {
+  const Vector3 n = (p[1] - p[0]).cross(p[2] - p[0]), m = (q[1] - q[0]).cross(q[2] - q[0]);
+  return {n.dot(m) > 0, std::min(quality(p[0], p[1], p[2]), quality(q[0], q[1], q[2]))};
+}
+
+std::pair<bool, double> rising(const std::vector<Vector3>& a, const std::vector<Vector3>& b, std::size_t i) {
+  return goodness({a[i], a[i + 1], b[i + 1]}, {a[i], b[i + 1], b[i]});
+}
+
+std::pair<bool, double> falling(const std::vector<Vector3>& a, const std::vector<Vector3>& b, std::size_t i) {
+  return goodness({a[i], a[i + 1], b[i]}, {a[i + 1], b[i + 1], b[i]});
+}
+
 /// The better of the two diagonals of a piece's quadrangle, from the left of the old edge when they are as good.
-bool rising_diagonal(const std::vector<Vector3>& a, const std::vector<Vector3>& b, std::size_t i) {
-  const double rising = std::min(quality(a[i], a[i + 1], b[i + 1]), quality(a[i], b[i + 1], b[i]));
-  const double falling = std::min(quality(a[i], a[i + 1], b[i]), quality(a[i + 1], b[i + 1], b[i]));
-  return rising > falling * (1 - 1e-6);
+bool rises(const std::vector<Vector3>& a, const std::vector<Vector3>& b, std::size_t i) {
+  const auto [is_flat, up] = rising(a, b, i);
+  const auto [is_flat_down, down] = falling(a, b, i);
+  return is_flat != is_flat_down ? is_flat : up > down * (1 - 1e-6);
 }
 
 } // namespace
@@ -34,9 +46,7 @@ bool EdgeSweep::sound(const Motion& motion, std::size_t i) {
     return quality(a[i], a[i + 1], b[i + 1]) > flattest_of_strip;
   if (a[i + 1] == b[i + 1])
     return quality(a[i], a[i + 1], b[i]) > flattest_of_strip;
-  return rising_diagonal(a, b, i)
-             ? std::min(quality(a[i], a[i + 1], b[i + 1]), quality(a[i], b[i + 1], b[i])) > flattest_of_strip
-             : std::min(quality(a[i], a[i + 1], b[i]), quality(a[i + 1], b[i + 1], b[i])) > flattest_of_strip;
+  return (rises(a, b, i) ? rising(a, b, i) : falling(a, b, i)).second > flattest_of_strip;
 }
 
 bool EdgeSweep::crosses(int sheet, const Strip& strip) const {
@@ -44,21 +54,6 @@ bool EdgeSweep::crosses(int sheet, const Strip& strip) const {
     if (sheets_.crosses(sheet, strip.triangles[t], strip.corners[t]))
       return true;
   return false;
-}
-
-// Whether a sheet is one with this strip, too.
-bool EdgeSweep::stays_sheet(int sheet, const Strip& strip) const {
-  if (sheet < 0)
-    return true;
-  SurfaceMesh grown = sheets_.sheets()[sheet];
-  grown.vertices.insert(grown.vertices.end(), strip.vertices.begin(), strip.vertices.end());
-  grown.triangles.insert(grown.triangles.end(), strip.triangles.begin(), strip.triangles.end());
-  try {
-    check_sheet(grown, "sheet");
-  } catch (const InputError&) {
-    return false;
-  }
-  return true;
 }
 
 // Piece by piece, for a run without anchors.
@@ -86,7 +81,7 @@ Strip EdgeSweep::strip(const Run& run, const Motion& motion) const {
       add({a_left, a_right, b_right}, a[i], a[i + 1], b[i + 1]);
     else if (right_stays)
       add({a_left, a_right, b_left}, a[i], a[i + 1], b[i]);
-    else if (rising_diagonal(a, b, i)) {
+    else if (rises(a, b, i)) {
       add({a_left, a_right, b_right}, a[i], a[i + 1], b[i + 1]);
       add({a_left, b_right, b_left}, a[i], b[i + 1], b[i]);
     } else {
@@ -100,19 +95,21 @@ Strip EdgeSweep::strip(const Run& run, const Motion& motion) const {
   return result;
 }
 
-// Appends the border's vertices between two anchors, those of `sheet` as its own.
-void EdgeSweep::add_between(const Anchor& p, const Anchor& q, int sheet, std::vector<StripPoint>& points) {
+// Appends the vertices between two anchors on the way along the borders from one to the other, those of `sheet` as its
+// own.
+void EdgeSweep::add_between(const Anchor& p, const Anchor& q, int sheet, std::vector<StripPoint>& points) const {
   constexpr double longest = 4; // edges
-  if (!p.is_set() || p.sheet != q.sheet)
+  if (!p.is_set() || !q.is_set())
     return;
-  const SurfaceMesh& old = sheets_.sheets()[p.sheet];
-  for (const int v :
-       borders_.between(old, p.sheet, p.vertex, q.vertex, longest * options_.edge).value_or(std::vector<int>{}))
-    points.push_back({old.vertices[v], p.sheet == sheet ? v : -1});
+  const std::vector<SheetVertex> way =
+      way_along_borders(sheets_, {p.sheet, p.vertex}, {q.sheet, q.vertex}, longest * options_.edge);
+  for (std::size_t k = 1; k + 1 < way.size(); ++k)
+    points.push_back(
+        {sheets_.sheets()[way[k].sheet].vertices[way[k].vertex], way[k].sheet == sheet ? way[k].vertex : -1});
 }
 
 // What lies between the rows of a run and the borders between its anchors.
-std::optional<Strip> EdgeSweep::abutting_strip(const Run& run, const Motion& motion) {
+std::optional<Strip> EdgeSweep::abutting_strip(const Run& run, const Motion& motion) const {
   const auto& [a, b, from, to, strokes] = motion;
   const auto [first, last, sheet, flipped] = run;
   const auto vertex = [sheet = sheet](const Anchor& at) { return sheet >= 0 && at.sheet == sheet ? at.vertex : -1; };
@@ -190,7 +187,7 @@ void EdgeSweep::append(Run run, const Strip& added, const Motion& motion) {
 // Piece by piece, to the run's sheet or, where that is none or would be crossed, to a new one.
 void EdgeSweep::append_plain(Run run, const Motion& motion, bool is_checked) {
   Strip added = strip(run, motion);
-  if (crosses(run.sheet, added) || (is_checked && !stays_sheet(run.sheet, added))) {
+  if (crosses(run.sheet, added) || (is_checked && run.sheet >= 0 && !sheets_.stays_sheet(run.sheet, added.triangles))) {
     run.sheet = -1;
     run.flipped = false;
     added = strip(run, motion);
@@ -209,7 +206,8 @@ EdgeSweep::Abutting EdgeSweep::append_abutting(const Run& run, const Motion& mot
     const std::optional<Strip> added = abutting_strip(choice, motion);
     if (added && added->triangles.empty())
       return Abutting::nothing;
-    if (added && stays_sheet(choice.sheet, *added) && !crosses(choice.sheet, *added)) {
+    const bool stays = added && (choice.sheet < 0 || sheets_.stays_sheet(choice.sheet, added->triangles));
+    if (stays && !crosses(choice.sheet, *added)) {
       append(choice, *added, motion);
       drop_used_leads(choice.sheet);
       return Abutting::added;
@@ -222,12 +220,12 @@ EdgeSweep::Abutting EdgeSweep::append_abutting(const Run& run, const Motion& mot
 void EdgeSweep::drop_used_leads(int sheet) {
   if (sheet < 0)
     return;
-  const std::vector<Triangle>& all = sheets_.sheets()[sheet].triangles;
   for (Lead& lead : leads_) {
-    const auto has = [](const Triangle& t, int v) { return std::find(t.begin(), t.end(), v) != t.end(); };
-    if (lead.sheet == sheet && std::count_if(all.begin(), all.end(), [&](const Triangle& t) {
-                                 return has(t, lead.left) && has(t, lead.right);
-                               }) != 1)
+    if (lead.sheet != sheet)
+      continue;
+    const std::vector<int>&left = sheets_.around(sheet, lead.left), &right = sheets_.around(sheet, lead.right);
+    if (std::count_if(left.begin(), left.end(),
+                      [&](int t) { return std::find(right.begin(), right.end(), t) != right.end(); }) != 1)
       lead = {};
   }
 }

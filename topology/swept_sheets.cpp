@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace spherecut::topology {
 
@@ -43,6 +44,34 @@ BoundingBox box_of(const Corners& p, double margin) {
   return {p[0].cwiseMin(p[1]).cwiseMin(p[2]).array() - margin, p[0].cwiseMax(p[1]).cwiseMax(p[2]).array() + margin};
 }
 
+/// The edge of a triangle that faces one of its vertices.
+std::array<int, 2> edge_facing(const Triangle& t, int vertex) {
+  const std::size_t c = t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2;
+  return {t[(c + 1) % 3], t[(c + 2) % 3]};
+}
+
+/// Whether the edges that face a vertex make one chain, open or closed.
+bool is_one_fan(const std::vector<std::array<int, 2>>& edges) {
+  const auto count = [&](std::size_t end, int vertex) {
+    return std::count_if(edges.begin(), edges.end(), [&](const auto& e) { return e[end] == vertex; });
+  };
+  const std::array<int, 2>* first = edges.data();
+  for (const std::array<int, 2>& edge : edges) {
+    if (count(0, edge[0]) > 1 || count(1, edge[1]) > 1)
+      return false;
+    if (count(1, edge[0]) == 0)
+      first = &edge;
+  }
+  std::size_t length = 1;
+  for (int at = (*first)[1]; at != (*first)[0] && length <= edges.size(); ++length) {
+    const auto next = std::find_if(edges.begin(), edges.end(), [&](const auto& e) { return e[0] == at; });
+    if (next == edges.end())
+      break;
+    at = (*next)[1];
+  }
+  return length == edges.size();
+}
+
 } // namespace
 
 template <class Visit>
@@ -69,20 +98,47 @@ std::array<Vector3, 3> SweptSheets::corners(const Place& place) const {
 
 int SweptSheets::add_sheet() {
   sheets_.emplace_back();
+  around_.emplace_back();
   return static_cast<int>(sheets_.size()) - 1;
 }
 
 int SweptSheets::add_vertex(int sheet, const Vector3& x) {
   sheets_[sheet].vertices.push_back(x);
+  around_[sheet].emplace_back();
   return static_cast<int>(sheets_[sheet].vertices.size()) - 1;
 }
 
 void SweptSheets::add_triangle(int sheet, const Triangle& triangle) {
   const int place = static_cast<int>(places_.size());
   places_.push_back({sheet, static_cast<int>(sheets_[sheet].triangles.size())});
+  for (const int vertex : triangle)
+    around_[sheet][vertex].push_back(places_.back().triangle);
   sheets_[sheet].triangles.push_back(triangle);
   for_cells(box_of(corners(places_.back()), 1.01 * thickness_),
             [&](std::uint64_t key) { cells_[key].push_back(place); });
+}
+
+void SweptSheets::near(int sheet, const Vector3& x, double reach, std::vector<int>& triangles) const {
+  for_cells({x.array() - reach, x.array() + reach}, [&](std::uint64_t key) {
+    if (const auto found = cells_.find(key); found != cells_.end())
+      for (const int place : found->second)
+        if (places_[place].sheet == sheet)
+          triangles.push_back(places_[place].triangle);
+  });
+}
+
+bool SweptSheets::stays_sheet(int sheet, const std::vector<Triangle>& added) const {
+  std::map<int, std::vector<std::array<int, 2>>> facing; // by vertex
+  for (const Triangle& t : added)
+    for (const int vertex : t)
+      facing[vertex].push_back(edge_facing(t, vertex));
+  return std::all_of(facing.begin(), facing.end(), [&](auto& vertex) {
+    auto& [v, edges] = vertex;
+    if (v < std::ssize(around_[sheet]))
+      for (const int t : around_[sheet][v])
+        edges.push_back(edge_facing(sheets_[sheet].triangles[t], v));
+    return is_one_fan(edges);
+  });
 }
 
 std::optional<SweptSheets::Foot> SweptSheets::on_sheet(const Vector3& x) const {

@@ -22,6 +22,16 @@ class SweptSheets {
   int add_vertex(int sheet, const Vector3& x);
   void add_triangle(int sheet, const Triangle& triangle);
 
+  /// Triangles of the sheet around one of its vertices.
+  [[nodiscard]] const std::vector<int>& around(int sheet, int vertex) const { return around_[sheet][vertex]; }
+
+  /// Appends the triangles of the sheet that may come within `reach` m of x, some of them more than once.
+  void near(int sheet, const Vector3& x, double reach, std::vector<int>& triangles) const;
+
+  /// Whether the sheet is one with these triangles, too: no more than two at an edge, in opposite directions, and one
+  /// fan at every vertex. Vertices beyond the last one are new.
+  [[nodiscard]] bool stays_sheet(int sheet, const std::vector<Triangle>& added) const;
+
   /// Place on a sheet.
   struct Foot {
     Vector3 point, normal; // m; of the triangle, unit
@@ -45,6 +55,7 @@ class SweptSheets {
 
   double cell_, thickness_;
   std::vector<SurfaceMesh> sheets_;
+  std::vector<std::vector<std::vector<int>>> around_; // by sheet and vertex
   std::vector<Place> places_;
   std::unordered_map<std::uint64_t, std::vector<int>> cells_; // places whose boxes, enlarged, meet the cell
 };

@@ -4,6 +4,7 @@
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "topology/errors.hpp"
+#include "topology/organs.hpp"
 #include "topology/surface_io.hpp"
 
 #include <algorithm>
@@ -195,6 +196,52 @@ TEST_CASE("A cut that would leave a piece smaller than the node spacing is refus
   CHECK(session.sprinkling().nodes.positions == nodes);
   CHECK(session.field().coefficients == coefficients);
   static_cast<void>(before);
+}
+
+TEST_CASE("What rounding leaves between faces that all but coincide is no piece of tissue") {
+  // A cushion about a square, closed, of this thickness: across the block, or within it.
+  const auto cushion = [](double width, double thickness) {
+    topology::SurfaceMesh sheet;
+    const double half = 0.5 * width;
+    sheet.vertices = {{0.002, -half, 0.015 - half}, {0.002, half, 0.015 - half}, {0.002, half, 0.015 + half},
+                      {0.002, -half, 0.015 + half}, {0.002 - thickness, 0, 0.015}, {0.002 + thickness, 0, 0.015}};
+    for (int i = 0; i < 4; ++i) {
+      sheet.triangles.push_back({i, (i + 1) % 4, 5});
+      sheet.triangles.push_back({(i + 1) % 4, i, 4});
+    }
+    return sheet;
+  };
+  const topology::SurfaceMesh organ = topology::make_block({0.06, 0.06, 0.03}, 0.006);
+  const std::vector<FixedRegion> base = scenario_of(cut_block + disc_precut).fixed;
+  const solvers::SpacingField spacing{.fine = 0.005, .coarse = 0.005};
+  for (const auto& [thickness, is_splinter] : {std::pair(1e-9, true), {1e-6, true}, {1e-3, false}}) {
+    const topology::Wound wound = topology::cut_surface(organ, {cushion(0.016, thickness)});
+    REQUIRE(wound.pieces.size() == 2);
+    const std::vector<char> thin = splinters(wound);
+    const std::size_t small = wound.pieces[0].volume < wound.pieces[1].volume ? 0 : 1;
+    CHECK(wound.pieces[small].volume > 0);
+    CHECK((thin[small] != 0) == is_splinter);
+    CHECK(thin[1 - small] == 0);
+    CHECK(unheld_pieces(wound, base).size() == (is_splinter ? 0 : 1));
+    if (is_splinter)
+      CHECK_NOTHROW(require_pieces(wound, spacing));
+    else
+      CHECK_THROWS_WITH(require_pieces(wound, spacing), Contains("smaller than the node spacing"));
+  }
+  const TemporaryFolder folder;
+  topology::write_surface(folder.path() / "cut.obj", cushion(0.12, 1e-8));
+  const auto scenario = write_file(folder.path() / "case.toml",
+                                   stretched(cut_block) + "[[precut]]\nshape = \"file\"\nfile = \"cut.obj\"\n");
+  Session session(read_scenario(scenario));
+  const StepResult result = session.step(session.steps().front());
+  CHECK(session.wound()->pieces.size() == 3);
+  CHECK(result.cut->pieces == 2);
+  CHECK(result.cut->unheld == 0);
+  CHECK(result.cut->volumes.size() == 2);
+  CHECK(total(result.cut->volumes) == Approx(block_volume).epsilon(1e-5));
+  CHECK(result.cut->opening > 1e-4);
+  CHECK(result.cut->opening < 0.01);
+  CHECK(result.residual < 1e-8);
 }
 
 TEST_CASE("A cut where the tool is pressing is refused with the way out, a node spacing away it is made") {

@@ -55,6 +55,7 @@ struct Swept {
 
 TEST_CASE("A blade that goes to and fro in a plane cuts what its edge sweeps, once, with a front around it",
           "[blade]") {
+  const double tremor = GENERATE(0.0, 2e-4); // m, out of the plane: less than a tenth of an edge
   const auto block = make_box_domain({-half, -half, 0}, {half, half, height}, 0.02);
   int holes = 0, overlaps = 0, inner_fronts = 0, paths = 0;
   for (unsigned seed = 0; seed < 60; ++seed) {
@@ -70,7 +71,7 @@ TEST_CASE("A blade that goes to and fro in a plane cuts what its edge sweeps, on
     const auto move = [&](double to_y, double to_z) {
       BladePose pose;
       pose.time = time++;
-      pose.position = {0.001, to_y, to_z};
+      pose.position = {0.001 + (tremor > 0 ? between(-0.5 * tremor, 0.5 * tremor) : 0), to_y, to_z};
       sweep.move_to(pose);
       swept.add({y, z}, {to_y, to_z}, {y + top.y(), z + top.z()}, {to_y + top.y(), to_z + top.z()});
       y = to_y;
@@ -110,7 +111,7 @@ TEST_CASE("A blade that goes to and fro in a plane cuts what its edge sweeps, on
       if (swept.at(i, k) && swept.is_deep(i, k))
         inner += (segment.to - segment.from).norm();
     }
-    INFO("seed " << seed);
+    INFO("seed " << seed << ", tremor " << tremor);
     CHECK(hole <= 4); // of 0.25 mm2, in a notch that reaches out of the cut by less than a quarter of an edge
     CHECK(off == 0);
     holes += hole > 0 ? 1 : 0;
@@ -121,6 +122,6 @@ TEST_CASE("A blade that goes to and fro in a plane cuts what its edge sweeps, on
   // Where three borders meet within an edge a joint may be left. Strips that overlap what was cut before would be in
   // half of the paths.
   CHECK(holes <= 2);
-  CHECK(overlaps <= 2);
-  CHECK(inner_fronts <= 2);
+  CHECK(overlaps <= (tremor > 0 ? 4 : 2));
+  CHECK(inner_fronts <= (tremor > 0 ? 8 : 2));
 }
