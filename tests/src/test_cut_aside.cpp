@@ -52,6 +52,13 @@ double cut_area(const Scenario& scenario) {
   return run(session).back().cut->area;
 }
 
+bool same_sheets(const Session& a, const Session& b) {
+  return std::equal(a.incision()->sheets().begin(), a.incision()->sheets().end(), b.incision()->sheets().begin(),
+                    b.incision()->sheets().end(), [](const topology::SurfaceMesh& p, const topology::SurfaceMesh& q) {
+                      return p.vertices == q.vertices && p.triangles == q.triangles;
+                    });
+}
+
 // Cut area, m2, of a session that is solved at these ticks; how often a body was left under way.
 double area_when_solved(const Scenario& scenario, bool aside, const std::vector<std::uint64_t>& ticks, int& beside) {
   HapticSimulation simulation(scenario);
@@ -81,6 +88,7 @@ TEST_CASE("A body made beside the steps is the one that a step would have made, 
   waits.set_updating(false);
   goes_on.set_following_aside(true);
   int followed = 0;
+  bool is_same = true;
   double area = 0;
   for (const StepSample& sample : waits.steps()) {
     const bool cuts = waits.step(sample).cut->triangles > 0;
@@ -103,9 +111,13 @@ TEST_CASE("A body made beside the steps is the one that a step would have made, 
     again.time += 1e-6;
     again.blade->time = again.time;
     const StepResult here = waits.step(again), there = goes_on.step(again);
-    if (!is_pressed) // else rounding of the blade's places at rest may decide for another node
+    // Where the tool presses, rounding of the blade's places at rest comes to decide between nodes that are as good.
+    is_same = is_same && same_sheets(goes_on, waits);
+    if (is_same)
       CHECK(goes_on.sprinkling().nodes.positions == waits.sprinkling().nodes.positions);
-    CHECK(std::abs(there.nodes - here.nodes) <= 4);
+    else
+      CHECK(std::abs(there.nodes - here.nodes) <= 0.01 * here.nodes);
+    CHECK((is_same || (is_pressed && followed > 1)));
     CHECK(there.cut->triangles > 0);
     CHECK(there.cut->update == SystemUpdate::taken_over);
     CHECK(there.cut->nodes == there.nodes);

@@ -5,7 +5,9 @@
 #include "tests/src/scenario_text.hpp"
 #include "topology/errors.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <limits>
 
 namespace spherecut::app {
 
@@ -60,6 +62,22 @@ struct Before {
 
 bool can_grow(const Session& session) {
   return dynamic_cast<const solvers::Growable*>(session.body()) != nullptr;
+}
+
+/// m; how far the ends of the segments lie from others at most.
+double farthest_end(const std::vector<std::array<Vector3, 2>>& segments,
+                    const std::vector<std::array<Vector3, 2>>& others) {
+  double farthest = 0;
+  for (const std::array<Vector3, 2>& segment : segments)
+    for (const Vector3& end : segment) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const auto& [from, to] : others) {
+        const double share = std::clamp((end - from).dot(to - from) / (to - from).squaredNorm(), 0.0, 1.0);
+        nearest = std::min(nearest, (end - from - share * (to - from)).norm());
+      }
+      farthest = std::max(farthest, nearest);
+    }
+  return farthest;
 }
 
 Session tearing_session(const std::string& method) {
@@ -128,7 +146,12 @@ TEST_CASE("Increments of a tear that are refused once each leave the fine zone's
       CHECK(update.update_reason == expected.update_reason);
       left += expected.update_reason == "the front has left the fine zone" ? 1 : 0;
     }
-    CHECK(session.zone().spacing.segments.size() == undisturbed.zone().spacing.segments.size());
+    // How many pieces the fine zone's way is told in is a matter of rounding; where it runs is not.
+    const auto &way = session.zone().spacing.segments, &expected_way = undisturbed.zone().spacing.segments;
+    REQUIRE_FALSE(way.empty());
+    REQUIRE_FALSE(expected_way.empty());
+    CHECK(std::max(farthest_end(way, expected_way), farthest_end(expected_way, way)) <
+          0.02 * session.zone().spacing.fine);
   }
   CHECK(left >= 1);
 }
@@ -198,7 +221,7 @@ TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the 
   CHECK(session.step(session.steps()[i++]).cut->triangles > 0);
   const Before before(session);
   const std::size_t triangles = session.wound()->surface.triangles.size();
-  failing_condensations = 1;
+  failing_condensations = 2; // on exchanged nodes, and on nodes made anew
   go_until_it_cuts();
   CHECK_FALSE(session.swap_body());
   CHECK(failing_condensations == 0);
@@ -210,6 +233,12 @@ TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the 
   CHECK(refused.cut->triangles == 0);
   CHECK_THAT(refused.cut->reason, Contains("not condensed"));
   CHECK(refused.cut->area == before.area);
+  failing_condensations = 1;
+  go_until_it_cuts();
+  CHECK(session.swap_body());
+  const StepResult made = session.step(session.steps()[i++]);
+  CHECK(made.cut->triangles > 0);
+  CHECK(made.cut->update_reason == "not condensed"); // why all nodes were made anew
   StepResult last, as_plain;
   for (; i < session.steps().size(); ++i)
     last = session.step(session.steps()[i]);
