@@ -53,7 +53,8 @@ void EdgeSweep::run_along_sheets(Motion& motion) {
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (a[i] == b[i] || sweeps_on(i) || (i > 0 && sweeps_on(i - 1)) || !sheets_.on_sheet(a[i]))
       continue;
-    const auto at = [&](int k) { return Vector3(a[i] + double(k) / samples * (b[i] - a[i])); };
+    const Vector3 start = a[i], way = b[i] - a[i];
+    const auto at = [&](int k) { return Vector3(start + double(k) / samples * way); };
     int k = 1;
     while (k <= samples && sheets_.on_sheet(at(k)))
       ++k;

@@ -7,22 +7,13 @@ namespace spherecut::topology {
 
 namespace {
 
-// Whether the edge between two vertices of a triangle of the sheet is on its border: no other triangle has both.
-bool is_border(const SweptSheets& sheets, int sheet, int p, int q) {
-  const std::vector<Triangle>& triangles = sheets.sheets()[sheet].triangles;
-  const std::vector<int>& around = sheets.around(sheet, p);
-  return std::count_if(around.begin(), around.end(), [&](int t) {
-           return std::find(triangles[t].begin(), triangles[t].end(), q) != triangles[t].end();
-         }) == 1;
-}
-
 // The vertex of the border after one, or before it; -1: it lies inside the sheet.
 int neighbour(const SweptSheets& sheets, const SheetVertex& at, bool on) {
   for (const int t : sheets.around(at.sheet, at.vertex)) {
     const Triangle& triangle = sheets.sheets()[at.sheet].triangles[t];
     const auto c = std::find(triangle.begin(), triangle.end(), at.vertex) - triangle.begin();
     const int other = triangle[static_cast<std::size_t>(on ? c + 1 : c + 2) % 3];
-    if (is_border(sheets, at.sheet, at.vertex, other))
+    if (sheets.is_border(at.sheet, at.vertex, other))
       return other;
   }
   return -1;
@@ -60,7 +51,7 @@ int nearest_on_border(const SweptSheets& sheets, int sheet, const Vector3& x, do
       const Vector3 from = mesh.vertices[v], along = mesh.vertices[w] - from;
       const double s = std::clamp((x - from).dot(along) / along.squaredNorm(), 0.0, 1.0);
       const double squared = (from + s * along - x).squaredNorm();
-      if (squared > least || !is_border(sheets, sheet, v, w))
+      if (squared > least || !sheets.is_border(sheet, v, w))
         continue;
       least = squared;
       nearest = s < 0.5 ? v : w;

@@ -118,6 +118,14 @@ void SweptSheets::add_triangle(int sheet, const Triangle& triangle) {
             [&](std::uint64_t key) { cells_[key].push_back(place); });
 }
 
+bool SweptSheets::is_border(int sheet, int from, int to) const {
+  const std::vector<Triangle>& triangles = sheets_[sheet].triangles;
+  const std::vector<int>& around = around_[sheet][from];
+  return std::count_if(around.begin(), around.end(), [&](int t) {
+           return std::find(triangles[t].begin(), triangles[t].end(), to) != triangles[t].end();
+         }) == 1;
+}
+
 void SweptSheets::near(int sheet, const Vector3& x, double reach, std::vector<int>& triangles) const {
   for_cells({x.array() - reach, x.array() + reach}, [&](std::uint64_t key) {
     if (const auto found = cells_.find(key); found != cells_.end())
@@ -139,6 +147,58 @@ bool SweptSheets::stays_sheet(int sheet, const std::vector<Triangle>& added) con
         edges.push_back(edge_facing(sheets_[sheet].triangles[t], v));
     return is_one_fan(edges);
   });
+}
+
+bool SweptSheets::is_on_border(int sheet, int vertex) const {
+  const std::vector<int>& around = around_[sheet][vertex];
+  return std::any_of(around.begin(), around.end(), [&](int t) {
+    const Triangle& triangle = sheets_[sheet].triangles[t];
+    return std::any_of(triangle.begin(), triangle.end(),
+                       [&](int other) { return other != vertex && is_border(sheet, vertex, other); });
+  });
+}
+
+// Over a ridge between triangles x lies over none of them: the foot is on the nearest edge of a sheet then, if that is
+// not on its border.
+std::optional<SweptSheets::Foot> SweptSheets::on_ridge(const Vector3& x, const std::vector<int>& places) const {
+  struct Nearest {
+    double distance;
+    Foot foot;
+    bool on_border;
+  };
+  std::vector<Nearest> of_sheets;
+  for (const int place : places) {
+    const int sheet = places_[place].sheet;
+    const auto p = corners(places_[place]);
+    const Triangle& vertices = sheets_[sheet].triangles[places_[place].triangle];
+    for (std::size_t e = 0; e < 3; ++e) {
+      const std::size_t next = (e + 1) % 3;
+      const Vector3 along = p[next] - p[e];
+      const double s = std::clamp((x - p[e]).dot(along) / along.squaredNorm(), 0.0, 1.0);
+      const Vector3 foot = p[e] + s * along;
+      const double distance = (foot - x).norm();
+      auto known =
+          std::find_if(of_sheets.begin(), of_sheets.end(), [&](const Nearest& n) { return n.foot.sheet == sheet; });
+      if (distance > thickness_ || (known != of_sheets.end() && known->distance <= distance))
+        continue;
+      const bool on_border = s == 0   ? is_on_border(sheet, vertices[e])
+                             : s == 1 ? is_on_border(sheet, vertices[next])
+                                      : is_border(sheet, vertices[e], vertices[next]);
+      const Nearest nearest{distance, {foot, (p[1] - p[0]).cross(p[2] - p[0]).normalized(), sheet}, on_border};
+      if (known == of_sheets.end())
+        of_sheets.push_back(nearest);
+      else
+        *known = nearest;
+    }
+  }
+  std::optional<Foot> foot;
+  double least = thickness_;
+  for (const Nearest& nearest : of_sheets)
+    if (!nearest.on_border && nearest.distance <= least) {
+      least = nearest.distance;
+      foot = nearest.foot;
+    }
+  return foot;
 }
 
 std::optional<SweptSheets::Foot> SweptSheets::on_sheet(const Vector3& x) const {
@@ -168,6 +228,8 @@ std::optional<SweptSheets::Foot> SweptSheets::on_sheet(const Vector3& x) const {
         if ((corner - nearest->point).norm() <= thickness_)
           nearest->point = corner;
     }
+    if (!nearest)
+      nearest = on_ridge(x, found->second);
   });
   return nearest;
 }

@@ -25,6 +25,9 @@ class SweptSheets {
   /// Triangles of the sheet around one of its vertices.
   [[nodiscard]] const std::vector<int>& around(int sheet, int vertex) const { return around_[sheet][vertex]; }
 
+  /// Whether the edge between two vertices of a triangle of the sheet is on its border: no other triangle has both.
+  [[nodiscard]] bool is_border(int sheet, int from, int to) const;
+
   /// Appends the triangles of the sheet that may come within `reach` m of x, some of them more than once.
   void near(int sheet, const Vector3& x, double reach, std::vector<int>& triangles) const;
 
@@ -37,8 +40,9 @@ class SweptSheets {
     Vector3 point, normal; // m; of the triangle, unit
     int sheet = -1;
   };
-  /// The foot of x on a triangle of some sheet that x lies over, no more than `thickness` off; the nearest vertex of
-  /// the triangle in its place where that is as near. Nothing when x lies beside all triangles.
+  /// The foot of x on a triangle of some sheet that x lies over, or over an edge that it shares, no more than
+  /// `thickness` off; the nearest vertex of the triangle in its place where that is as near. Nothing when x lies beside
+  /// all sheets.
   [[nodiscard]] std::optional<Foot> on_sheet(const Vector3& x) const;
 
   /// Whether the triangle meets one of `sheet` that shares no vertex with it. `indices` are its vertices in the sheet,
@@ -50,6 +54,8 @@ class SweptSheets {
     int sheet, triangle;
   };
   [[nodiscard]] std::array<Vector3, 3> corners(const Place& place) const;
+  [[nodiscard]] bool is_on_border(int sheet, int vertex) const;
+  [[nodiscard]] std::optional<Foot> on_ridge(const Vector3& x, const std::vector<int>& places) const;
   template <class Visit>
   void for_cells(const BoundingBox& box, const Visit& visit) const;
 

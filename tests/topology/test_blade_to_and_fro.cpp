@@ -55,7 +55,7 @@ struct Swept {
 
 TEST_CASE("A blade that goes to and fro in a plane cuts what its edge sweeps, once, with a front around it",
           "[blade]") {
-  const double tremor = GENERATE(0.0, 2e-4); // m, out of the plane: less than a tenth of an edge
+  const double tremor = GENERATE(0.0, 2e-4, 4e-4); // m, out of the plane, up to a tenth of an edge
   const auto block = make_box_domain({-half, -half, 0}, {half, half, height}, 0.02);
   int holes = 0, overlaps = 0, inner_fronts = 0, paths = 0;
   for (unsigned seed = 0; seed < 60; ++seed) {
@@ -122,6 +122,6 @@ TEST_CASE("A blade that goes to and fro in a plane cuts what its edge sweeps, on
   // Where three borders meet within an edge a joint may be left. Strips that overlap what was cut before would be in
   // half of the paths.
   CHECK(holes <= 2);
-  CHECK(overlaps <= (tremor > 0 ? 4 : 2));
-  CHECK(inner_fronts <= (tremor > 0 ? 8 : 2));
+  CHECK(overlaps <= (tremor > 2e-4 ? 6 : 2));
+  CHECK(inner_fronts <= (tremor > 0 ? 5 : 2));
 }
