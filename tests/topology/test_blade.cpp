@@ -1,3 +1,4 @@
+#include "topology/abutting_strip.hpp"
 #include "topology/blade.hpp"
 
 #include "topology/errors.hpp"
@@ -458,4 +459,23 @@ TEST_CASE("Random blades on any organ leave sound sheets", "[blade]") {
       CHECK(sweep.incision()->area() == Approx(swept).epsilon(0.05).margin(1e-6));
     }
   CHECK(cut > 120);
+}
+
+TEST_CASE("A strip of an edge that moves nearly along itself does not fold", "[blade]") {
+  // An edge that bends, moved along its middle by a fortieth of the distance of its points: the triangle over the bend
+  // is the best in shape, but lies in what was cut before.
+  const std::vector<StripPoint> lower = {
+      {{-5.55e-3, 51.40e-3, 0}}, {{-1.58e-3, 52.81e-3, 0}}, {{1.74e-3, 55.43e-3, 0}}};
+  const std::vector<StripPoint> upper = {
+      {{-5.62e-3, 51.34e-3, 0}}, {{-1.64e-3, 52.72e-3, 0}}, {{1.71e-3, 55.30e-3, 0}}};
+  const std::optional<Strip> strip = strip_between(lower, upper, 0);
+  REQUIRE(strip);
+  CHECK(strip->triangles.size() == 4);
+  double area = 0, sum = 0;
+  for (const std::array<Vector3, 3>& x : strip->corners) {
+    const double signed_area = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]).z();
+    sum += signed_area;
+    area += std::abs(signed_area);
+  }
+  CHECK(area == Approx(std::abs(sum)).epsilon(1e-9));
 }
