@@ -150,6 +150,11 @@ BladeState push_blade(const BladePatch& patch, const VectorX& advance, double dr
   for (Eigen::Index c = 0; c < m; ++c)
     state.edge_force -= state.forces[c] * patch.contacts[static_cast<std::size_t>(c)].push;
   state.blade_force = state.edge_force - drag * patch.drag;
+  if (!state.forces.allFinite() || !state.displacements.allFinite())
+    throw NumericalError(
+        fmt::format("the forces on {} pieces of the blade's edge and {} lip pairs are not finite; it is "
+                    "{:g} m past where it met the tissue",
+                    m, n - m, m > 0 ? advance.maxCoeff() : 0.0));
   return state;
 }
 

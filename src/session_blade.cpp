@@ -137,6 +137,8 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
     }
     if (report.triangles == 0) {
       report.reason = swept.refused;
+      if (blade_force_->proposed()) // these poses are asked for again, with those after them
+        incisions_->go_back(before);
       return std::nullopt;
     }
     BodyModel next;

@@ -107,8 +107,10 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
     BodyModel before;
     before.incision = std::move(incision_before);
     before.sprinkling = std::move(sprinkling);
-    double sight = 0, condensing = 0; // s
+    double sight = 0, condensing = 0; // s, of the attempt that goes
     const auto build = [&](const auto& sprinkle) {
+      update.seconds = {};
+      condensing = 0;
       {
         const StageTimer timer(update.seconds.sprinkling);
         sprinkle();
@@ -119,7 +121,7 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
         const double seen = solvers::sight_seconds();
         near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
         app::assemble(scenario, domain, model, {}, near);
-        sight += solvers::sight_seconds() - seen;
+        sight = solvers::sight_seconds() - seen;
       }
       const StageTimer timer(condensing);
       app::condense(near, model, true);
@@ -144,7 +146,7 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
                          std::async(std::launch::async, std::move(make))};
 }
 
-// Waits for it where need be. A failure leaves the body as it is.
+// Waits for it where need be. A failure leaves the body as it is: of a cut, that is refused; else it throws.
 void Session::take_following() {
   if (cuts_aside()) {
     take_cut();

@@ -8,8 +8,8 @@
 
 namespace spherecut::topology {
 
-/// Height of a triangle over its longest edge, by that edge: 0 flat, 0.87 equilateral; below `flattest` no sheet has
-/// one.
+/// Height of a triangle over its longest edge, by that edge: 0 flat, 0.87 equilateral; below `flattest_of_strip` no
+/// sheet has one.
 double quality(const Vector3& a, const Vector3& b, const Vector3& c);
 constexpr double flattest_of_strip = 1e-5;
 

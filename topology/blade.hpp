@@ -54,9 +54,9 @@ struct SweepResult {
 /// the edge comes out of an earlier sheet, or to one, by its border, the strip begins or ends at the border's vertices,
 /// which lie up to 0.75 `edge` along it.
 /// Nothing is added by a motion along the edge itself, nor where a sheet is already (within a tenth of `edge`: a hand
-/// trembles, and no node sees into what would be left between), nor by an end of the edge that reaches out beside a sheet by less than a quarter of
-/// `edge`: moving out of a cut and in again extends it from its front.
-/// Sheets reach past the surface of the body by up to about one `edge`; a sheet that never reaches inside is not given.
+/// trembles, and no node sees into what would be left between), nor by an end of the edge that reaches out beside a
+/// sheet by less than a quarter of `edge`: moving out of a cut and in again extends it from its front. Sheets reach
+/// past the surface of the body by up to about one `edge`; a sheet that never reaches inside is not given.
 class BladeSweep {
  public:
   /// Throws InputError when the blade or an option is not usable.

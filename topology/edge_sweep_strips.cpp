@@ -114,9 +114,10 @@ std::optional<Strip> EdgeSweep::abutting_strip(const Run& run, const Motion& mot
   const auto [first, last, sheet, flipped] = run;
   const auto vertex = [sheet = sheet](const Anchor& at) { return sheet >= 0 && at.sheet == sheet ? at.vertex : -1; };
   const auto known = [&, first = first, last = last, sheet = sheet](std::size_t i) {
+    int own = sheet >= 0 && i > first && leads_[i - 1].sheet == sheet ? leads_[i - 1].right : -1;
     if (sheet >= 0 && i < last && leads_[i].sheet == sheet)
-      return leads_[i].left;
-    return sheet >= 0 && i > first && leads_[i - 1].sheet == sheet ? leads_[i - 1].right : -1;
+      own = leads_[i].left;
+    return own >= 0 && vertex_of({sheet, own}) == motion.a[i] ? own : -1; // it may have gone to a border
   };
   std::vector<StripPoint> lower, upper;
   if (to[first].is_set() && from[first].is_set() && b[first] != a[first]) {
@@ -187,7 +188,8 @@ void EdgeSweep::append(Run run, const Strip& added, const Motion& motion) {
 // Piece by piece, to the run's sheet or, where that is none or would be crossed, to a new one.
 void EdgeSweep::append_plain(Run run, const Motion& motion, bool is_checked) {
   Strip added = strip(run, motion);
-  if (crosses(run.sheet, added) || (is_checked && run.sheet >= 0 && !sheets_.stays_sheet(run.sheet, added.triangles))) {
+  if (crosses(run.sheet, added) ||
+      (is_checked && run.sheet >= 0 && !sheets_.stays_sheet(run.sheet, added.triangles, added.corners))) {
     run.sheet = -1;
     run.flipped = false;
     added = strip(run, motion);
@@ -206,7 +208,8 @@ EdgeSweep::Abutting EdgeSweep::append_abutting(const Run& run, const Motion& mot
     const std::optional<Strip> added = abutting_strip(choice, motion);
     if (added && added->triangles.empty())
       return Abutting::nothing;
-    const bool stays = added && (choice.sheet < 0 || sheets_.stays_sheet(choice.sheet, added->triangles));
+    const bool stays =
+        added && (choice.sheet < 0 || sheets_.stays_sheet(choice.sheet, added->triangles, added->corners));
     if (stays && !crosses(choice.sheet, *added)) {
       append(choice, *added, motion);
       drop_used_leads(choice.sheet);

@@ -52,23 +52,17 @@ std::array<int, 2> edge_facing(const Triangle& t, int vertex) {
 
 /// Whether the edges that face a vertex make one chain, open or closed.
 bool is_one_fan(const std::vector<std::array<int, 2>>& edges) {
-  const auto count = [&](std::size_t end, int vertex) {
-    return std::count_if(edges.begin(), edges.end(), [&](const auto& e) { return e[end] == vertex; });
-  };
-  const std::array<int, 2>* first = edges.data();
-  for (const std::array<int, 2>& edge : edges) {
-    if (count(0, edge[0]) > 1 || count(1, edge[1]) > 1)
+  std::map<int, int> next, previous;
+  for (const auto& [from, to] : edges)
+    if (!next.emplace(from, to).second || !previous.emplace(to, from).second)
       return false;
-    if (count(1, edge[0]) == 0)
-      first = &edge;
-  }
-  std::size_t length = 1;
-  for (int at = (*first)[1]; at != (*first)[0] && length <= edges.size(); ++length) {
-    const auto next = std::find_if(edges.begin(), edges.end(), [&](const auto& e) { return e[0] == at; });
-    if (next == edges.end())
-      break;
-    at = (*next)[1];
-  }
+  int first = edges.front()[0];
+  for (const auto& [from, to] : next)
+    if (!previous.contains(from))
+      first = from;
+  std::size_t length = 0;
+  for (int at = first; next.contains(at) && (length == 0 || at != first); at = next.at(at))
+    ++length;
   return length == edges.size();
 }
 
@@ -135,7 +129,31 @@ void SweptSheets::near(int sheet, const Vector3& x, double reach, std::vector<in
   });
 }
 
-bool SweptSheets::stays_sheet(int sheet, const std::vector<Triangle>& added) const {
+// Whether a triangle lies back on the neighbour that it gets at an edge of the sheet.
+bool SweptSheets::folds_back(int sheet, const Triangle& indices, const std::array<Vector3, 3>& p) const {
+  constexpr double sharpest = -0.5; // cosine of the angle between normals
+  const Vector3 normal = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+  for (std::size_t e = 0; e < 3; ++e) {
+    const int from = indices[e], to = indices[(e + 1) % 3];
+    if (from >= std::ssize(around_[sheet]) || to >= std::ssize(around_[sheet]))
+      continue;
+    for (const int t : around_[sheet][from]) {
+      const Triangle& other = sheets_[sheet].triangles[t];
+      if (std::find(other.begin(), other.end(), to) == other.end())
+        continue;
+      const auto q = corners({sheet, t});
+      if (normal.dot((q[1] - q[0]).cross(q[2] - q[0]).normalized()) < sharpest)
+        return true;
+    }
+  }
+  return false;
+}
+
+bool SweptSheets::stays_sheet(int sheet, const std::vector<Triangle>& added,
+                              const std::vector<std::array<Vector3, 3>>& corners) const {
+  for (std::size_t t = 0; t < added.size(); ++t)
+    if (folds_back(sheet, added[t], corners[t]))
+      return false;
   std::map<int, std::vector<std::array<int, 2>>> facing; // by vertex
   for (const Triangle& t : added)
     for (const int vertex : t)

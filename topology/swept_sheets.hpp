@@ -32,8 +32,9 @@ class SweptSheets {
   void near(int sheet, const Vector3& x, double reach, std::vector<int>& triangles) const;
 
   /// Whether the sheet is one with these triangles, too: no more than two at an edge, in opposite directions, and one
-  /// fan at every vertex. Vertices beyond the last one are new.
-  [[nodiscard]] bool stays_sheet(int sheet, const std::vector<Triangle>& added) const;
+  /// fan at every vertex; nor do they fold back on it. Vertices beyond the last one are new; `corners` are the places.
+  [[nodiscard]] bool stays_sheet(int sheet, const std::vector<Triangle>& added,
+                                 const std::vector<std::array<Vector3, 3>>& corners) const;
 
   /// Place on a sheet.
   struct Foot {
@@ -55,6 +56,7 @@ class SweptSheets {
   };
   [[nodiscard]] std::array<Vector3, 3> corners(const Place& place) const;
   [[nodiscard]] bool is_on_border(int sheet, int vertex) const;
+  [[nodiscard]] bool folds_back(int sheet, const Triangle& indices, const std::array<Vector3, 3>& corners) const;
   [[nodiscard]] std::optional<Foot> on_ridge(const Vector3& x, const std::vector<int>& places) const;
   template <class Visit>
   void for_cells(const BoundingBox& box, const Visit& visit) const;

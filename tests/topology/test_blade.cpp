@@ -2,7 +2,9 @@
 #include "topology/blade.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/organs.hpp"
 #include "topology/sheet_front.hpp"
+#include "topology/wound.hpp"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
@@ -204,7 +206,7 @@ TEST_CASE("Cutting again in place adds nothing, going on from there extends the 
   sweep.move_to(at(1, 0.041, 0.03, 0.02));
   const double once = total_area(sweep.sheets());
   CHECK(sweep.move_to(at(2, -0.01, 0.03, 0.02)).triangles == 0);     // back through its own cut
-  CHECK(sweep.move_to(at(3, 0.0333, 0.03003, 0.02)).triangles == 0); // in again, within the edge radius
+  CHECK(sweep.move_to(at(3, 0.0333, 0.03003, 0.02)).triangles == 0); // in again, within a tenth of an edge
   CHECK(total_area(sweep.sheets()) == once);
   const SweepResult on = sweep.move_to(at(4, 0.063, 0.03003, 0.02));
   CHECK(on.area == Approx((0.063 - 0.041) * 0.03).epsilon(1e-3));
@@ -480,4 +482,28 @@ TEST_CASE("A strip of an edge that moves nearly along itself does not fold", "[b
     normals.push_back((x[1] - x[0]).cross(x[2] - x[0]).normalized());
   for (const Vector3& normal : normals)
     CHECK(normal.dot(normals.front()) > 0);
+}
+
+TEST_CASE("A cut out of the middle of an earlier one begins on it, however slowly the blade goes", "[blade]") {
+  const double edge = 0.004, step = GENERATE(1e-4, 2e-4, 3.9e-4, 1e-3, 4e-3);
+  const SurfaceMesh organ = make_block({-0.03, -0.03, 0}, {0.03, 0.03, 0.03}, 0.01);
+  const auto block = make_box_domain({-0.03, -0.03, 0}, {0.03, 0.03, 0.03}, 0.02);
+  BladeSweep sweep({{{0, 0, -0.005}, {0, 0, 0.035}}, 1e-4}, block, {.edge = edge});
+  double time = 0;
+  const auto go = [&](double x, double y) {
+    BladePose pose;
+    pose.time = time++;
+    pose.position = {x, y, 0};
+    sweep.move_to(pose);
+  };
+  for (int k = -20; k <= 20; ++k) // in two
+    go(0, 0.002 * k);
+  for (int k = 20; k >= 0; --k) // back to the middle
+    go(0, 0.002 * k + 0.0003);
+  for (int k = 1; k * step < 0.038; ++k) // one half in two
+    go(k * step, 0.0003);
+  go(0.038, 0.0003);
+  const Wound wound = cut_surface(organ, sweep.sheets());
+  CHECK(wound.pieces.size() == 3);
+  CHECK(sweep.incision()->area() == Approx(0.06 * 0.03 + 0.03 * 0.03).epsilon(1e-3));
 }
