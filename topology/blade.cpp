@@ -73,8 +73,8 @@ void check(const Blade& blade) {
 
 struct BladeSweep::State {
   State(Blade blade_in, std::shared_ptr<const Domain> domain_in, const SweepOptions& options_in)
-      : blade(std::move(blade_in)), domain(std::move(domain_in)), options(options_in),
-        swept(domain, options, 0.1 * options.edge), edge(resampled(blade.edge, options.edge)) {}
+      : blade(std::move(blade_in)), domain(std::move(domain_in)), options(options_in), swept(domain, options),
+        edge(resampled(blade.edge, options.edge)) {}
 
   [[nodiscard]] std::vector<Vector3> row_at(const Vector3& position, const Eigen::Quaterniond& orientation,
                                             const RestMap& to_rest) const {

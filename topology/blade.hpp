@@ -12,7 +12,7 @@ namespace spherecut::topology {
 /// The cutting edge of a rigid blade, a polyline in the blade's own frame.
 struct Blade {
   std::vector<Vector3> edge; // m, at least 2 points
-  double edge_radius = 1e-4; // m, finite: an edge of no width has no stiffness against tissue
+  double edge_radius = 1e-4; // m, finite, for its force: an edge of no width has no stiffness against tissue
 };
 
 /// Where the blade is: x = orientation * point of the blade + position.
@@ -53,10 +53,10 @@ struct SweepResult {
 /// where the strip would cross the sheet it belongs to. New sheets abut on the old ones with the same vertices: where
 /// the edge comes out of an earlier sheet, or to one, by its border, the strip begins or ends at the border's vertices,
 /// which lie up to 0.75 `edge` along it.
-/// Nothing is added by a motion along the edge itself, nor where a sheet is already (within a tenth of `edge`: a hand
+/// Nothing is added by a motion along the edge itself, nor where a sheet is already (within a quarter of `edge`: a hand
 /// trembles, and no node sees into what would be left between), nor by an end of the edge that reaches out beside a
-/// sheet by less than a quarter of `edge`: moving out of a cut and in again extends it from its front. Sheets reach
-/// past the surface of the body by up to about one `edge`; a sheet that never reaches inside is not given.
+/// sheet by less than that: moving out of a cut and in again extends it from its front.
+/// Sheets reach past the surface of the body by up to about one `edge`; a sheet that never reaches inside is not given.
 class BladeSweep {
  public:
   /// Throws InputError when the blade or an option is not usable.

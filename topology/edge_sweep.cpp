@@ -21,9 +21,9 @@ Vector3 nearest_on(const std::vector<Vector3>& polyline, const Vector3& x) {
 
 } // namespace
 
-EdgeSweep::EdgeSweep(std::shared_ptr<const Domain> domain, const SweepOptions& options, double thickness)
-    : domain_(std::move(domain)), options_(options), sheets_(2 * options.edge, thickness), tiny_(1e-4 * options.edge),
-      cos_turn_(std::cos(options.sharp_turn * M_PI / 180)) {}
+EdgeSweep::EdgeSweep(std::shared_ptr<const Domain> domain, const SweepOptions& options)
+    : domain_(std::move(domain)), options_(options), sheets_(2 * options.edge, least_reach * options.edge),
+      tiny_(1e-4 * options.edge), cos_turn_(std::cos(options.sharp_turn * M_PI / 180)) {}
 
 void EdgeSweep::place(std::vector<Vector3> row) {
   row_ = std::move(row);

@@ -15,7 +15,7 @@ namespace spherecut::topology {
 
 class EdgeSweep {
  public:
-  EdgeSweep(std::shared_ptr<const Domain> domain, const SweepOptions& options, double thickness);
+  EdgeSweep(std::shared_ptr<const Domain> domain, const SweepOptions& options);
 
   [[nodiscard]] const SweptSheets& sheets() const { return sheets_; }
   /// Where the edge last cut or was placed; empty: it is lifted.
@@ -102,7 +102,7 @@ class EdgeSweep {
   Abutting append_abutting(const Run& run, const Motion& motion);
   void drop_used_leads(int sheet);
 
-  static constexpr double least_reach = 0.25; // edges, out of an earlier sheet: less is not cut
+  static constexpr double least_reach = 0.25; // edges, out of an earlier sheet or beside it: less is not cut
 
   std::shared_ptr<const Domain> domain_;
   SweepOptions options_;

@@ -15,7 +15,7 @@ Vector3 EdgeSweep::vertex_of(const Anchor& anchor) const {
 // The vertex of a sheet's border that a point of the edge at x, with its foot on that sheet, may be moved to.
 EdgeSweep::Anchor EdgeSweep::anchor_at(const SweptSheets::Foot& foot, const Vector3& x) const {
   constexpr double farthest = 0.75; // edges
-  const int vertex = nearest_on_border(sheets_, foot.sheet, x, least_reach * options_.edge, farthest * options_.edge);
+  const int vertex = nearest_on_border(sheets_, foot.sheet, x, 1.5 * sheets_.thickness(), farthest * options_.edge);
   return vertex < 0 ? Anchor{} : Anchor{foot.sheet, vertex, foot.normal};
 }
 

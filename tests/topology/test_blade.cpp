@@ -206,7 +206,7 @@ TEST_CASE("Cutting again in place adds nothing, going on from there extends the 
   sweep.move_to(at(1, 0.041, 0.03, 0.02));
   const double once = total_area(sweep.sheets());
   CHECK(sweep.move_to(at(2, -0.01, 0.03, 0.02)).triangles == 0);     // back through its own cut
-  CHECK(sweep.move_to(at(3, 0.0333, 0.03003, 0.02)).triangles == 0); // in again, within a tenth of an edge
+  CHECK(sweep.move_to(at(3, 0.0333, 0.03003, 0.02)).triangles == 0); // in again, within a quarter of an edge
   CHECK(total_area(sweep.sheets()) == once);
   const SweepResult on = sweep.move_to(at(4, 0.063, 0.03003, 0.02));
   CHECK(on.area == Approx((0.063 - 0.041) * 0.03).epsilon(1e-3));
