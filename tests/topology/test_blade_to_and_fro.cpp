@@ -28,17 +28,18 @@ bool in_triangle(const Place& a, const Place& b, const Place& c, const Place& x)
 
 // The cells of the plane that an edge between two places of a blade has swept.
 struct Swept {
-  std::vector<char> cells = std::vector<char>(static_cast<std::size_t>(across * upright), 0);
+  std::vector<char> cells = std::vector<char>(static_cast<std::size_t>(across) * upright, 0);
 
   static Place centre(int i, int k) { return {-half + (i + 0.5) * cell, (k + 0.5) * cell}; }
   [[nodiscard]] bool at(int i, int k) const {
-    return i >= 0 && k >= 0 && i < across && k < upright && cells[static_cast<std::size_t>(i * upright + k)] != 0;
+    return i >= 0 && k >= 0 && i < across && k < upright &&
+           cells[static_cast<std::size_t>(i) * upright + static_cast<std::size_t>(k)] != 0;
   }
   void add(const Place& from, const Place& to, const Place& from_top, const Place& to_top) {
     for (int i = 0; i < across; ++i)
       for (int k = 0; k < upright; ++k)
         if (const Place x = centre(i, k); in_triangle(from, to, to_top, x) || in_triangle(from, to_top, from_top, x))
-          cells[static_cast<std::size_t>(i * upright + k)] = 1;
+          cells[static_cast<std::size_t>(i) * upright + static_cast<std::size_t>(k)] = 1;
   }
   // Whether all cells of the plane within 0.75 edges of this one are as it is.
   [[nodiscard]] bool is_deep(int i, int k) const {
