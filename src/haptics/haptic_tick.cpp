@@ -102,14 +102,15 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   result.contact = contact_;
   result.model = ask(device, result.outside);
   const bool arrives = arrived_;
+  // On at a solve too: solves that come in every tick would hold the force where it was otherwise.
+  if (difference_.squaredNorm() > 0)
+    difference_ =
+        difference_.squaredNorm() > fading_.squaredNorm() ? Vector3(difference_ - fading_) : Vector3(Vector3::Zero());
   if (arrives) {
     arrived_ = false;
     // Where the old snapshot would have had the force now: on from its last two ticks.
     difference_ += 2 * last_model_ - model_before_ - result.model.force;
     fading_ = difference_ / std::max(1.0, std::round(settings_.hand_over * settings_.rate));
-  } else if (difference_.squaredNorm() > 0) {
-    difference_ =
-        difference_.squaredNorm() > fading_.squaredNorm() ? Vector3(difference_ - fading_) : Vector3(Vector3::Zero());
   }
   model_before_ = arrives ? result.model.force : last_model_;
   last_model_ = result.model.force;

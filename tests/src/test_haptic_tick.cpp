@@ -292,6 +292,28 @@ TEST_CASE("At a new solve the force goes on from where it was and fades over in 
   CHECK(core.tick(device_at(31, deep)).force.z() == Approx(1.0));
 }
 
+TEST_CASE("Solves that come in every tick do not hold the force where it was") {
+  HapticSettings settings;
+  settings.model = ForceModelKind::hold;
+  settings.passivity = false;
+  const topology::ToolShape shape = punch;
+  HapticTick core(settings, shape, nullptr);
+  std::array<ContactSnapshot, 2> snapshots;
+  const double rise = 0.01; // N a tick
+  const double handed_over = settings.hand_over * settings.rate;
+  for (std::uint64_t tick = 0; tick < 200; ++tick) {
+    ContactSnapshot& next = snapshots[tick % 2];
+    clear(next);
+    next.force = {0, 0, rise * static_cast<double>(std::min<std::uint64_t>(tick, 100))};
+    core.arrive(next);
+    const double force = core.tick(device_at(tick, Vector3::Zero())).force.z();
+    CHECK(force <= next.force.z() + 1e-12);
+    CHECK(force >= next.force.z() - handed_over * rise - 1e-12); // as late as a hand-over takes
+    if (tick == 199)
+      CHECK(force == Approx(next.force.z()).epsilon(0.01));
+  }
+}
+
 TEST_CASE("Gain, saturation and slew hold for the force that is sent, and a device that is gone is let go") {
   HapticSettings settings;
   settings.passivity = false;
