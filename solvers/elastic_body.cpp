@@ -104,15 +104,19 @@ Sight sight_about_cut(const Problem& problem, SightRule rule, double front_radiu
 }
 
 ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor)
-    : problem_(checked(std::move(problem))),
-      spheres_(problem_.nodes.positions, problem_.nodes.spacings, rho, Basis::linear, worst_moment_condition,
-               sight_about_cut(problem_, rule, front_radius_factor)) {
+    : problem_(checked(std::move(problem))), spheres_([&] {
+        const Stopwatch watch;
+        Spheres spheres(problem_.nodes.positions, problem_.nodes.spacings, rho, Basis::linear, worst_moment_condition,
+                        sight_about_cut(problem_, rule, front_radius_factor));
+        report_.supports_seconds = watch.seconds();
+        return spheres;
+      }()) {
   const Stopwatch watch;
   supports_ = nodal_supports(spheres_);
   report_.nodes = problem_.nodes.size();
   report_.grown_supports = spheres_.grown();
   report_.worst_moment_condition = supports_.worst_moment_condition;
-  report_.supports_seconds = watch.seconds();
+  report_.supports_seconds += watch.seconds();
 }
 
 VectorX NodalSupports::displacements(const Field& field) const {

@@ -14,17 +14,8 @@ namespace {
 constexpr double side_over_radius = 0.45;
 constexpr int few_members = 16; // a cell with no more is not split
 constexpr int deepest = 12;
+constexpr int octants = 8;
 constexpr double slack = 1e-9; // of the cell's side: a point on a face may be sorted to either side of it
-
-bool touches(const Vector3& centre, double radius, const Vector3& lower, double side) {
-  const double tolerance = slack * side;
-  double squared = 0;
-  for (int a = 0; a < 3; ++a) {
-    const double outside = std::max({lower[a] - tolerance - centre[a], centre[a] - (lower[a] + side + tolerance), 0.0});
-    squared += outside * outside;
-  }
-  return squared < radius * radius;
-}
 
 } // namespace
 
@@ -32,27 +23,52 @@ struct SphereGrid::Builder {
   SphereGrid& grid;
   const std::vector<Vector3>& centres;
   const std::vector<double>& radii;
+  std::array<std::vector<int>, deepest> inside_at{}; // members of the octants of a cell, by its depth
 
-  void fill(int node, const Vector3& lower, double side, int depth, const std::vector<int>& members) {
-    if (wants_split(side, depth, members)) {
-      const int first = static_cast<int>(grid.nodes_.size());
-      grid.nodes_[node].first_child = first;
-      grid.nodes_.resize(grid.nodes_.size() + 8);
-      std::vector<int> inside;
-      for (int octant = 0; octant < 8; ++octant) {
-        const Vector3 corner = lower + 0.5 * side * Vector3(octant & 1, (octant >> 1) & 1, (octant >> 2) & 1);
-        inside.clear();
-        for (int j : members)
-          if (touches(centres[j], radii[j], corner, 0.5 * side))
-            inside.push_back(j);
-        fill(first + octant, corner, 0.5 * side, depth + 1, inside);
-      }
+  void fill(int node, const Vector3& lower, double side, int depth, std::span<const int> members) {
+    if (!wants_split(side, depth, members)) {
+      store(grid.nodes_[node], members);
       return;
     }
-    store(grid.nodes_[node], members);
+    const int first = static_cast<int>(grid.nodes_.size());
+    grid.nodes_[node].first_child = first;
+    grid.nodes_.resize(grid.nodes_.size() + octants);
+    std::vector<int>& inside = inside_at[depth];
+    inside.resize(octants * members.size());
+    const std::array<std::size_t, octants> counts = sort_into_octants(lower, side, members, inside.data());
+    for (int o = 0; o < octants; ++o)
+      fill(first + o, lower + 0.5 * side * Vector3(o & 1, o >> 1 & 1, o >> 2 & 1), 0.5 * side, depth + 1,
+           std::span(inside).subspan(static_cast<std::size_t>(o) * members.size(), counts[o]));
   }
 
-  [[nodiscard]] bool wants_split(double side, int depth, const std::vector<int>& members) const {
+  /// Octant o (bits 0, 1, 2: the upper half along x, y, z) gets the members that touch it from
+  /// inside[o * members.size()] on; returns how many.
+  [[nodiscard]] std::array<std::size_t, octants> sort_into_octants(const Vector3& lower, double side,
+                                                                   std::span<const int> members, int* inside) const {
+    const double half = 0.5 * side, tolerance = slack * half;
+    std::array<std::size_t, octants> counts{};
+    for (const int j : members) {
+      double squared[3][2]; // of the distance to either half, along each axis
+      for (int a = 0; a < 3; ++a) {
+        const double from_lower = centres[j][a] - lower[a];
+        const double below = std::max(-tolerance - from_lower, 0.0),
+                     above = std::max(from_lower - side - tolerance, 0.0);
+        const double past_middle = from_lower - half;
+        const double to_lower_half = std::max(below, past_middle - tolerance);
+        const double to_upper_half = std::max(above, -tolerance - past_middle);
+        squared[a][0] = to_lower_half * to_lower_half;
+        squared[a][1] = to_upper_half * to_upper_half;
+      }
+      const double square = radii[j] * radii[j];
+      for (int o = 0; o < octants; ++o) { // written everywhere, kept where it touches: no branches
+        inside[static_cast<std::size_t>(o) * members.size() + counts[o]] = j;
+        counts[o] += squared[0][o & 1] + squared[1][o >> 1 & 1] + squared[2][o >> 2 & 1] < square ? 1 : 0;
+      }
+    }
+    return counts;
+  }
+
+  [[nodiscard]] bool wants_split(double side, int depth, std::span<const int> members) const {
     if (depth >= deepest || std::ssize(members) <= few_members)
       return false;
     double sum = 0;
@@ -61,24 +77,37 @@ struct SphereGrid::Builder {
     return side > 1.2 * side_over_radius * sum / static_cast<double>(members.size());
   }
 
-  void store(Node& leaf, const std::vector<int>& members) const {
-    const int count = static_cast<int>(members.size());
-    const int blocks = (count + lanes - 1) / lanes;
-    leaf.count = count;
+  void store(Node& leaf, std::span<const int> members) const {
+    leaf.count = static_cast<int>(members.size());
     leaf.first_id = static_cast<int>(grid.ids_.size());
-    leaf.first_block = static_cast<int>(grid.blocks_.size());
     grid.ids_.insert(grid.ids_.end(), members.begin(), members.end());
-    grid.ids_.resize(grid.ids_.size() + blocks * lanes - count, count > 0 ? members.back() : 0);
-    grid.blocks_.resize(grid.blocks_.size() + 4 * static_cast<std::size_t>(blocks));
-    Block* block = grid.blocks_.data() + leaf.first_block;
-    const int* ids = grid.ids_.data() + leaf.first_id;
-    for (int b = 0; b < blocks; ++b)
-      for (int l = 0; l < lanes; ++l) {
-        const int k = b * lanes + l, j = ids[k];
-        for (int a = 0; a < 3; ++a)
-          block[a * blocks + b].lane[l] = centres[j][a];
-        block[3 * blocks + b].lane[l] = k < count ? 1 / (radii[j] * radii[j]) : std::numeric_limits<double>::infinity();
-      }
+    grid.ids_.resize((grid.ids_.size() + lanes - 1) / lanes * lanes, members.empty() ? 0 : members.back());
+  }
+
+  /// Once all leaves are known, so that their room is asked for once.
+  void copy_spheres() const {
+    struct Sphere {
+      double x, y, z, inverse_square_radius;
+    };
+    std::vector<Sphere> spheres(centres.size());
+    for (std::size_t j = 0; j < centres.size(); ++j)
+      spheres[j] = {centres[j].x(), centres[j].y(), centres[j].z(), 1 / (radii[j] * radii[j])};
+    grid.blocks_.reset(new Block[4 * grid.ids_.size() / lanes]);
+    for (const Node& leaf : grid.nodes_) {
+      const int blocks = (leaf.count + lanes - 1) / lanes;
+      Block* block = grid.blocks_.get() + leaf.first_block();
+      const int* ids = grid.ids_.data() + leaf.first_id;
+      for (int b = 0; b < blocks; ++b)
+        for (int l = 0; l < lanes; ++l) {
+          const Sphere& sphere = spheres[ids[b * lanes + l]];
+          block[b].lane[l] = sphere.x;
+          block[blocks + b].lane[l] = sphere.y;
+          block[2 * blocks + b].lane[l] = sphere.z;
+          block[3 * blocks + b].lane[l] = sphere.inverse_square_radius;
+        }
+      for (int k = leaf.count; k < blocks * lanes; ++k)
+        block[4 * blocks - 1].lane[k % lanes] = std::numeric_limits<double>::infinity();
+    }
   }
 };
 
@@ -155,17 +184,14 @@ SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<do
       members[next[cell]++] = run.sphere;
 
   nodes_.resize(root_count);
-  // Enough for cells that are not split, with their padding.
-  const std::size_t entries = members.size() + static_cast<std::size_t>(root_count) * lanes;
-  ids_.reserve(entries);
-  blocks_.reserve(4 * entries / lanes);
+  ids_.reserve(2 * (members.size() + static_cast<std::size_t>(root_count) * lanes));
   Builder builder{*this, centres, radii};
-  std::vector<int> inside;
   for (int r = 0; r < root_count; ++r) {
-    inside.assign(members.begin() + start[r], members.begin() + start[r + 1]);
     const int h = r % roots_[0], i = (r / roots_[0]) % roots_[1], k = r / (roots_[0] * roots_[1]);
-    builder.fill(r, origin_ + side * Vector3(h, i, k), side, 0, inside);
+    builder.fill(r, origin_ + side * Vector3(h, i, k), side, 0,
+                 std::span(members).subspan(start[r], start[r + 1] - start[r]));
   }
+  builder.copy_spheres();
 }
 
 SphereGrid::Cell SphereGrid::find(const Vector3& x) const {
@@ -189,7 +215,7 @@ SphereGrid::Cell SphereGrid::find(const Vector3& x) const {
   }
   const Node& leaf = nodes_[node];
   const int blocks = (leaf.count + lanes - 1) / lanes;
-  const Block* block = blocks_.data() + leaf.first_block;
+  const Block* block = blocks_.get() + leaf.first_block();
   if (blocks == 0)
     return {{}, nullptr, nullptr, nullptr, nullptr, 0};
   return {{ids_.data() + leaf.first_id, static_cast<std::size_t>(leaf.count)},

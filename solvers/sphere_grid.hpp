@@ -4,6 +4,7 @@
 
 #include "topology/types.hpp"
 
+#include <memory>
 #include <span>
 
 namespace spherecut::solvers {
@@ -36,8 +37,9 @@ class SphereGrid {
   struct Node {
     int first_child = -1; // eight consecutive nodes, or -1 for a leaf
     int count = 0;        // members of a leaf
-    int first_id = 0;     // into ids_
-    int first_block = 0;  // into blocks_: x, y, z, inverse square radius, one after the other
+    int first_id = 0;     // into ids_, a multiple of `lanes`
+    /// Into blocks_: x, y, z, inverse square radius, one after the other.
+    [[nodiscard]] int first_block() const { return first_id / lanes * 4; }
   };
   struct Builder;
 
@@ -46,7 +48,7 @@ class SphereGrid {
   std::array<int, 3> roots_{1, 1, 1};
   std::vector<Node> nodes_;
   std::vector<int> ids_;
-  std::vector<Block> blocks_;
+  std::shared_ptr<Block[]> blocks_; // never written again: copies of the grid share it
 };
 
 } // namespace spherecut::solvers
