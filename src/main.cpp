@@ -87,6 +87,35 @@ int default_threads(bool is_real_time) {
   return std::clamp(is_real_time ? cores - 1 : cores, 1, 16);
 }
 
+/// What a command line that cannot be read has wrong: what nobody knows comes before what is missing, which may be no
+/// more than a mistyped option.
+std::string what_is_wrong(const CLI::App& commands, int argc, char** argv, const CLI::ParseError& error) {
+  const CLI::App* at = &commands;
+  std::string path = commands.get_name();
+  for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
+    const std::vector<const CLI::App*> below = at->get_subcommands([](const CLI::App*) { return true; });
+    const auto named = [&](const CLI::App* command) { return command->get_name() == argv[i]; };
+    const auto found = std::find_if(below.begin(), below.end(), named);
+    if (below.empty())
+      break;
+    if (found == below.end())
+      return fmt::format("unknown command '{}' ({} --help)", argv[i], path);
+    at = *found;
+    path += " " + at->get_name();
+  }
+  std::string options, arguments;
+  for (const std::string& unknown : commands.remaining(true)) {
+    std::string& text = unknown.size() > 1 && unknown.front() == '-' ? options : arguments;
+    text += fmt::format("{}'{}'", text.empty() ? "" : ", ", unknown);
+  }
+  // An argument that is left over beside an unknown option may be its value.
+  if (!options.empty())
+    return fmt::format("unknown option {} ({} --help)", options, path);
+  if (!arguments.empty())
+    return fmt::format("unexpected argument {} ({} --help)", arguments, path);
+  return fmt::format("{} ({} --help)", error.what(), path);
+}
+
 int run(int argc, char** argv) {
   CLI::App commands("Spherecut: pressing, cutting and tearing of soft tissue by the method of finite spheres",
                     "spherecut");
@@ -158,20 +187,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& success) { // --help, --version
     return commands.exit(success);
   } catch (const CLI::ParseError& error) {
-    const CLI::App* at = &commands;
-    for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
-      const std::vector<const CLI::App*> below = at->get_subcommands([](const CLI::App*) { return true; });
-      const auto named = [&](const CLI::App* command) { return command->get_name() == argv[i]; };
-      const auto found = std::find_if(below.begin(), below.end(), named);
-      if (below.empty())
-        break;
-      if (found == below.end())
-        return complain(fmt::format("unknown command '{}' ({} --help)", argv[i],
-                                    at == &commands ? "spherecut" : "spherecut " + at->get_name()),
-                        status_bad_input);
-      at = *found;
-    }
-    return complain(fmt::format("{} (spherecut --help)", error.what()), status_bad_input);
+    return complain(what_is_wrong(commands, argc, argv, error), status_bad_input);
   }
 
   bool has_threads = false;

@@ -64,6 +64,32 @@ TEST_CASE("An unknown command is named") {
   CHECK_THAT(run_spherecut({"run", "a.toml"}).err, Catch::Contains("--out is required"));
 }
 
+TEST_CASE("Of a command line that lacks something too, what is unknown is named") {
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string said;
+  };
+  const std::vector<Case> cases = {
+      {{"run", "s.toml", "--otu", "x"}, "unknown option '--otu' (spherecut run --help)"},
+      {{"run", "s.toml", "--otu=x"}, "unknown option '--otu=x' (spherecut run --help)"},
+      {{"run", "s.toml", "x"}, "unexpected argument 'x' (spherecut run --help)"},
+      {{"run", "s.toml", "--otu", "--out"}, "unknown option '--otu' (spherecut run --help)"},
+      {{"check", "-q"}, "unknown option '-q' (spherecut check --help)"},
+      {{"check", "a.toml", "b.toml", "c.toml"}, "unexpected argument 'b.toml', 'c.toml' (spherecut check --help)"},
+      {{"haptics", "--virtua"}, "unknown option '--virtua' (spherecut haptics --help)"},
+      {{"serve", "--prot", "80"}, "unknown option '--prot' (spherecut serve --help)"},
+      {{"experiment", "run", "--otu", "x"}, "unknown option '--otu' (spherecut experiment run --help)"},
+      {{"experiment", "list", "hertz"}, "unexpected argument 'hertz' (spherecut experiment list --help)"},
+      {{"scenario-help", "--mark"}, "unknown option '--mark' (spherecut scenario-help --help)"},
+      {{"--loud"}, "unknown option '--loud' (spherecut --help)"},
+  };
+  for (const Case& c : cases) {
+    const ProgramResult result = run_spherecut(c.arguments);
+    CHECK(result.status == 2);
+    CHECK(result.err == "spherecut: error: " + c.said + "\n");
+  }
+}
+
 TEST_CASE("Help, version and scenario-help succeed") {
   CHECK(run_spherecut({"--help"}).status == 0);
   const ProgramResult version = run_spherecut({"--version"});
