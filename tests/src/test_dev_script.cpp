@@ -12,6 +12,11 @@ namespace {
 
 const std::filesystem::path script = std::filesystem::path(SPHERECUT_SOURCE_DIR) / "dev";
 
+void write_program(const std::filesystem::path& file, const std::string& text) {
+  write_file(file, "#!/bin/sh\n" + text);
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+}
+
 } // namespace
 
 TEST_CASE("./dev refuses arguments that it has no use for") {
@@ -37,4 +42,32 @@ TEST_CASE("./dev refuses arguments that it has no use for") {
     CHECK(result.out.empty());
   }
   CHECK(dev("--help").status == 0);
+}
+
+TEST_CASE("./dev that is interrupted says so and ends with 130") {
+  const TemporaryFolder folder;
+  std::filesystem::copy_file(script, folder.path() / "dev");
+  std::filesystem::create_directory(folder.path() / "bin");
+  const std::string waits = "trap 'exit 2' INT\nsleep 60\n"; // as ninja, which takes the signal and fails
+  write_program(folder.path() / "bin/cmake", "exit 0\n");
+  const auto dev = [&](const std::string& arguments) {
+    // timeout sends the signal to the whole group, as a terminal does
+    return run_shell("cd '" + folder.path().string() + "' && PATH=\"$PWD/bin:$PATH\" SPHERECUT_SKIP_PACKAGES=1 " +
+                     "timeout --preserve-status --signal=INT 1 ./dev " + arguments);
+  };
+  const auto says_so = [](const ProgramResult& result) {
+    INFO(result.err);
+    CHECK(result.status == 130);
+    CHECK_THAT(result.err, Contains("dev: interrupted\n") && !Contains("failed"));
+  };
+  write_program(folder.path() / "bin/ninja", waits);
+  says_so(dev("build"));
+  says_so(dev("demo"));
+  write_program(folder.path() / "bin/ninja", "exit 0\n");
+  write_program(folder.path() / "bin/ctest", waits);
+  says_so(dev("test"));
+  write_program(folder.path() / "bin/cmake", waits);
+  says_so(dev("lint"));
+  write_program(folder.path() / "bin/cmake", "exit 2\n");
+  CHECK_THAT(dev("build").err, Contains("failed") && !Contains("interrupted"));
 }
