@@ -132,22 +132,29 @@ int run(int argc, char** argv) {
                         "Threads of a solve, 1 to 256; the results do not depend on it; default " + by_default);
   };
 
+  const auto named = [](const std::string& given) {
+    return std::string(given.empty() ? "the name is empty; allowed: the name of a file or folder" : "");
+  };
+
   auto* run_command = commands.add_subcommand("run", "Run a scenario");
   add_threads(run_command, "one a core, at most 16");
-  run_command->add_option("scenario", scenario, "TOML file")->required();
-  run_command->add_option("--out", out, "Folder for the results; must not hold results yet")->required();
+  run_command->add_option("scenario", scenario, "TOML file")->required()->check(named);
+  run_command->add_option("--out", out, "Folder for the results; must not hold results yet")->required()->check(named);
 
   auto* check = commands.add_subcommand("check", "Check a scenario without running it");
-  check->add_option("scenario", scenario, "TOML file")->required();
+  check->add_option("scenario", scenario, "TOML file")->required()->check(named);
 
   app::HapticCommand haptic;
   auto* haptics = commands.add_subcommand("haptics", "Hold the tool of a scenario in real time, with a force at 1 kHz");
-  auto* held = haptics->add_option("scenario", haptic.scenario, "TOML file");
+  auto* held = haptics->add_option("scenario", haptic.scenario, "TOML file")->check(named);
   haptics
       ->add_option("--replay", haptic.replay,
                    "Run a recorded session again off line and compare; in place of a scenario")
+      ->check(named)
       ->excludes(held);
-  haptics->add_option("--out", haptic.out, "Folder for the results; must not hold results yet")->required();
+  haptics->add_option("--out", haptic.out, "Folder for the results; must not hold results yet")
+      ->required()
+      ->check(named);
   haptics->add_option("--duration", haptic.duration, "Length of the session, s; default 10");
   haptics->add_flag("--virtual", haptic.in_virtual_time,
                     "Without clock and threads: a solve every budget, the same bits every time");
@@ -158,12 +165,14 @@ int run(int argc, char** argv) {
 
   app::ServeCommand served;
   auto* serve = commands.add_subcommand("serve", "Press and cut in a browser: a live session at http://ADDRESS:PORT/");
-  serve->add_option("scenario", served.scenario, "TOML file; default liver_live.toml of those that come along");
+  serve->add_option("scenario", served.scenario, "TOML file; default liver_live.toml of those that come along")
+      ->check(named);
   serve->add_option("--port", served.port, "Port; 0: any free one; default 8080");
   serve->add_option("--address", served.address, "IP address; default 127.0.0.1, this machine alone");
   serve->add_flag("--open", served.open, "Open the page in a browser");
-  serve->add_option("--out", served.out, "Folder for recordings; default out/serve");
-  serve->add_option("--page", served.page, "Folder of the built page; default: beside the program or as installed");
+  serve->add_option("--out", served.out, "Folder for recordings; default out/serve")->check(named);
+  serve->add_option("--page", served.page, "Folder of the built page; default: beside the program or as installed")
+      ->check(named);
 
   add_threads(serve, "one a core but one, at most 16");
 
@@ -174,7 +183,8 @@ int run(int argc, char** argv) {
   auto* run_one = experiment->add_subcommand("run", "Run one experiment");
   run_one->add_option("name", name, "Name, from the list")->required();
   run_one->add_option("--out", out, "Folder for tables, figures and summary.json; must not hold results yet")
-      ->required();
+      ->required()
+      ->check(named);
   run_one->add_flag("--quick", quick, "Smaller variant");
   add_threads(run_one, "1, as times are compared");
 

@@ -90,6 +90,22 @@ TEST_CASE("Of a command line that lacks something too, what is unknown is named"
   }
 }
 
+TEST_CASE("A file or folder without a name is refused by every command") {
+  const std::vector<std::vector<std::string>> commands = {{"run", "s.toml", "--out", ""},
+                                                          {"haptics", "s.toml", "--out", ""},
+                                                          {"haptics", "--replay", "r", "--out", ""},
+                                                          {"serve", "--port", "0", "--out", ""},
+                                                          {"experiment", "run", "kink", "--out", ""}};
+  for (const auto& arguments : commands) {
+    const ProgramResult result = run_spherecut(arguments);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: --out: the name is empty;") && Contains("--help"));
+    CHECK(lines_in(result.err) == 1);
+  }
+  CHECK_THAT(run_spherecut({"check", ""}).err, StartsWith("spherecut: error: scenario: the name is empty;"));
+  CHECK_THAT(run_spherecut({"serve", "--page", ""}).err, StartsWith("spherecut: error: --page: the name is empty;"));
+}
+
 TEST_CASE("Help, version and scenario-help succeed") {
   CHECK(run_spherecut({"--help"}).status == 0);
   const ProgramResult version = run_spherecut({"--version"});
