@@ -264,6 +264,34 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("Motions that no tissue makes end a run as a numerical failure, with the rows before them") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  const auto run = [&](const std::string& text) {
+    return run_spherecut({"run", write_file(folder.path() / "case.toml", text), "--out", out});
+  };
+  const std::string allowed = "allowed: up to 0.6 m, 10 times the organ's largest extent";
+  SECTION("a cut blown up") {
+    const ProgramResult result = run(cut_block + disc_precut + "pressure = 1e9\n[output]\nfigures = false\n");
+    CHECK(result.status == 3);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: t = 0 s: ") && Contains(allowed) && Contains("fine_spacing"));
+    CHECK(lines_in(result.err) == 1);
+    CHECK(lines_in(read_file(out / "cuts.csv")) == 1);
+  }
+  SECTION("a patch pulled away") {
+    const ProgramResult result =
+        run(cut_block + "[tool]\nshape = \"grasper\"\nradius = 0.01\nstep = 0.25\n"
+                        "[[tool.path]]\ntime = 0\nposition = [0, 0, 0.03]\n"
+                        "[[tool.path]]\ntime = 1\nposition = [0, 0, 1.03]\n[output]\nfigures = false\n");
+    CHECK(result.status == 3);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: t = 0.75 s: the node at") && Contains(allowed));
+    CHECK(lines_in(read_file(out / "forces.csv")) == 4); // the columns' names, 0, 0.25 and 0.5 s
+    const auto summary = nlohmann::json::parse(read_file(out / "summary.json"));
+    CHECK(summary["status"] == "failed");
+    CHECK(summary["steps"]["done"] == 3);
+  }
+}
+
 TEST_CASE("Bad scenarios and surface files exit with 2, a clear line, and leave nothing behind") {
   const TemporaryFolder folder;
   const topology::SurfaceMesh block = small_block();
