@@ -13,8 +13,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <condition_variable>
 #include <csignal>
+#include <cstdlib>
 #include <fmt/core.h>
+#include <mutex>
 #include <thread>
 
 namespace {
@@ -51,9 +54,31 @@ void list_experiments(bool names_only) {
       fmt::print("{:<24} {}\n", experiment.name, experiment.purpose);
 }
 
+int say_interrupted(const std::string& out) {
+  fmt::print("interrupted: nothing was checked; {} has what was written before, without summary.json\n", out);
+  std::fflush(stdout);
+  return status_interrupted;
+}
+
+/// An interrupted experiment ends at its next line. Where that does not come within two seconds the program ends as it
+/// is: what is being computed knows of no interrupt.
+std::jthread end_when_interrupted(const app::InterruptWatch& watch, const std::string& out) {
+  return std::jthread([&watch, out](const std::stop_token& stop) {
+    constexpr auto look = std::chrono::milliseconds(100);
+    std::mutex mutex;
+    std::condition_variable_any wake;
+    std::unique_lock lock(mutex);
+    for (int looks = 0; looks < 20; looks += watch.interrupted() ? 1 : 0)
+      if (wake.wait_for(lock, stop, look, [&] { return stop.stop_requested(); }))
+        return;
+    std::_Exit(say_interrupted(out));
+  });
+}
+
 int run_experiment(const std::string& name, const std::string& out, bool quick) {
   struct Interrupted {};
   const app::InterruptWatch watch;
+  std::jthread impatience = end_when_interrupted(watch, out);
   const auto say = [&](const std::string& line) {
     if (watch.interrupted())
       throw Interrupted();
@@ -64,9 +89,10 @@ int run_experiment(const std::string& name, const std::string& out, bool quick) 
   try {
     checks = experiments::run_experiment(name, out, quick, say);
   } catch (const Interrupted&) {
-    fmt::print("interrupted: nothing was checked; {} has what was written before, without summary.json\n", out);
-    return status_interrupted;
+    impatience = {};
+    return say_interrupted(out);
   }
+  impatience = {};
   std::size_t width = 5;
   for (const experiments::Check& check : checks)
     width = std::max(width, check.name.size());

@@ -560,6 +560,20 @@ TEST_CASE("An interrupted experiment says so and exits with 130") {
   CHECK(!std::filesystem::exists(out / "summary.json"));
 }
 
+TEST_CASE("An experiment that comes to no next line ends all the same when it is interrupted") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  // Its first line would come after a minute in real time.
+  const ProgramResult result =
+      run_shell(spherecut_command({"experiment", "run", "haptic_loop", "--out", out}) + " & run=$!; until [ -d '" +
+                out.string() + "' ]; do kill -0 $run || break; sleep 0.05; done; kill -INT $run; wait $run");
+  INFO(result.out << result.err);
+  CHECK(result.status == 130);
+  CHECK_THAT(result.out, Contains("interrupted: nothing was checked") && Contains(out.string()));
+  CHECK(lines_in(result.out) == 1);
+  CHECK(!std::filesystem::exists(out / "summary.json"));
+}
+
 TEST_CASE("A haptic session interrupted while it is solved again off line keeps its ticks") {
   const TemporaryFolder folder;
   const auto scenario = write_file(folder.path() / "case.toml", small_scenario);
