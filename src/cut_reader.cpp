@@ -13,12 +13,10 @@ RectangleSheet rectangle(const Section& section, const std::string& name, Offenc
                        direction(section, name + ".up", "up", offences), section.number("width"),
                        section.number("height")};
   const Vector3 across = sheet.up - sheet.up.dot(sheet.normal) * sheet.normal;
-  if (across.norm() > 1e-6) {
+  if (across.norm() > 1e-6)
     sheet.up = across.normalized();
-  } else {
+  else if (!sheet.up.isZero(0)) // else that has been told
     offences.add(section.line("up"), name + ".up: lies along the normal; allowed: any other direction");
-    sheet.up = sheet.normal.unitOrthogonal();
-  }
   return sheet;
 }
 

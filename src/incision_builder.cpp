@@ -3,6 +3,7 @@
 #include "src/schedule.hpp"
 #include "topology/cut_sheets.hpp"
 #include "topology/errors.hpp"
+#include "topology/sheet_front.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -66,6 +67,10 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
     const PrecutSettings& precut = scenario.precuts[k];
     try { // one at a time, so that an unusable sheet is told with its line
       topology::SurfaceMesh sheet = sheet_of(precut, edge);
+      topology::check_sheet(sheet, "its sheet"); // before the incision does, which counts sheets from 0
+      if (!topology::reaches_inside(sheet, *domain_))
+        throw InputError(
+            fmt::format("lies outside the organ: no point of its {} triangles is inside", sheet.triangles.size()));
       if (const double share = incision_ ? share_on(*incision_, sheet, edge) : 0; share > least_share)
         throw InputError(
             fmt::format("{:.3g} % of its area lie on the precuts before it; allowed: none, sheets may only "

@@ -13,8 +13,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <condition_variable>
 #include <csignal>
+#include <cstdlib>
 #include <fmt/core.h>
+#include <mutex>
 #include <thread>
 
 namespace {
@@ -51,9 +54,31 @@ void list_experiments(bool names_only) {
       fmt::print("{:<24} {}\n", experiment.name, experiment.purpose);
 }
 
+int say_interrupted(const std::string& out) {
+  fmt::print("interrupted: nothing was checked; {} has what was written before, without summary.json\n", out);
+  std::fflush(stdout);
+  return status_interrupted;
+}
+
+/// An interrupted experiment ends at its next line. Where that does not come within two seconds the program ends as it
+/// is: what is being computed knows of no interrupt.
+std::jthread end_when_interrupted(const app::InterruptWatch& watch, const std::string& out) {
+  return std::jthread([&watch, out](const std::stop_token& stop) {
+    constexpr auto look = std::chrono::milliseconds(100);
+    std::mutex mutex;
+    std::condition_variable_any wake;
+    std::unique_lock lock(mutex);
+    for (int looks = 0; looks < 20; looks += watch.interrupted() ? 1 : 0)
+      if (wake.wait_for(lock, stop, look, [&] { return stop.stop_requested(); }))
+        return;
+    std::_Exit(say_interrupted(out));
+  });
+}
+
 int run_experiment(const std::string& name, const std::string& out, bool quick) {
   struct Interrupted {};
   const app::InterruptWatch watch;
+  std::jthread impatience = end_when_interrupted(watch, out);
   const auto say = [&](const std::string& line) {
     if (watch.interrupted())
       throw Interrupted();
@@ -64,9 +89,10 @@ int run_experiment(const std::string& name, const std::string& out, bool quick) 
   try {
     checks = experiments::run_experiment(name, out, quick, say);
   } catch (const Interrupted&) {
-    fmt::print("interrupted: nothing was checked; {} has what was written before, without summary.json\n", out);
-    return status_interrupted;
+    impatience = {};
+    return say_interrupted(out);
   }
+  impatience = {};
   std::size_t width = 5;
   for (const experiments::Check& check : checks)
     width = std::max(width, check.name.size());
@@ -87,6 +113,35 @@ int default_threads(bool is_real_time) {
   return std::clamp(is_real_time ? cores - 1 : cores, 1, 16);
 }
 
+/// What a command line that cannot be read has wrong: what nobody knows comes before what is missing, which may be no
+/// more than a mistyped option.
+std::string what_is_wrong(const CLI::App& commands, int argc, char** argv, const CLI::ParseError& error) {
+  const CLI::App* at = &commands;
+  std::string path = commands.get_name();
+  for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
+    const std::vector<const CLI::App*> below = at->get_subcommands([](const CLI::App*) { return true; });
+    const auto named = [&](const CLI::App* command) { return command->get_name() == argv[i]; };
+    const auto found = std::find_if(below.begin(), below.end(), named);
+    if (below.empty())
+      break;
+    if (found == below.end())
+      return fmt::format("unknown command '{}' ({} --help)", argv[i], path);
+    at = *found;
+    path += " " + at->get_name();
+  }
+  std::string options, arguments;
+  for (const std::string& unknown : commands.remaining(true)) {
+    std::string& text = unknown.size() > 1 && unknown.front() == '-' ? options : arguments;
+    text += fmt::format("{}'{}'", text.empty() ? "" : ", ", unknown);
+  }
+  // An argument that is left over beside an unknown option may be its value.
+  if (!options.empty())
+    return fmt::format("unknown option {} ({} --help)", options, path);
+  if (!arguments.empty())
+    return fmt::format("unexpected argument {} ({} --help)", arguments, path);
+  return fmt::format("{} ({} --help)", error.what(), path);
+}
+
 int run(int argc, char** argv) {
   CLI::App commands("Spherecut: pressing, cutting and tearing of soft tissue by the method of finite spheres",
                     "spherecut");
@@ -103,22 +158,29 @@ int run(int argc, char** argv) {
                         "Threads of a solve, 1 to 256; the results do not depend on it; default " + by_default);
   };
 
+  const auto named = [](const std::string& given) {
+    return std::string(given.empty() ? "the name is empty; allowed: the name of a file or folder" : "");
+  };
+
   auto* run_command = commands.add_subcommand("run", "Run a scenario");
   add_threads(run_command, "one a core, at most 16");
-  run_command->add_option("scenario", scenario, "TOML file")->required();
-  run_command->add_option("--out", out, "Folder for the results; must not hold results yet")->required();
+  run_command->add_option("scenario", scenario, "TOML file")->required()->check(named);
+  run_command->add_option("--out", out, "Folder for the results; must not hold results yet")->required()->check(named);
 
   auto* check = commands.add_subcommand("check", "Check a scenario without running it");
-  check->add_option("scenario", scenario, "TOML file")->required();
+  check->add_option("scenario", scenario, "TOML file")->required()->check(named);
 
   app::HapticCommand haptic;
   auto* haptics = commands.add_subcommand("haptics", "Hold the tool of a scenario in real time, with a force at 1 kHz");
-  auto* held = haptics->add_option("scenario", haptic.scenario, "TOML file");
+  auto* held = haptics->add_option("scenario", haptic.scenario, "TOML file")->check(named);
   haptics
       ->add_option("--replay", haptic.replay,
                    "Run a recorded session again off line and compare; in place of a scenario")
+      ->check(named)
       ->excludes(held);
-  haptics->add_option("--out", haptic.out, "Folder for the results; must not hold results yet")->required();
+  haptics->add_option("--out", haptic.out, "Folder for the results; must not hold results yet")
+      ->required()
+      ->check(named);
   haptics->add_option("--duration", haptic.duration, "Length of the session, s; default 10");
   haptics->add_flag("--virtual", haptic.in_virtual_time,
                     "Without clock and threads: a solve every budget, the same bits every time");
@@ -129,12 +191,14 @@ int run(int argc, char** argv) {
 
   app::ServeCommand served;
   auto* serve = commands.add_subcommand("serve", "Press and cut in a browser: a live session at http://ADDRESS:PORT/");
-  serve->add_option("scenario", served.scenario, "TOML file; default liver_live.toml of those that come along");
+  serve->add_option("scenario", served.scenario, "TOML file; default liver_live.toml of those that come along")
+      ->check(named);
   serve->add_option("--port", served.port, "Port; 0: any free one; default 8080");
   serve->add_option("--address", served.address, "IP address; default 127.0.0.1, this machine alone");
   serve->add_flag("--open", served.open, "Open the page in a browser");
-  serve->add_option("--out", served.out, "Folder for recordings; default out/serve");
-  serve->add_option("--page", served.page, "Folder of the built page; default: beside the program or as installed");
+  serve->add_option("--out", served.out, "Folder for recordings; default out/serve")->check(named);
+  serve->add_option("--page", served.page, "Folder of the built page; default: beside the program or as installed")
+      ->check(named);
 
   add_threads(serve, "one a core but one, at most 16");
 
@@ -145,7 +209,8 @@ int run(int argc, char** argv) {
   auto* run_one = experiment->add_subcommand("run", "Run one experiment");
   run_one->add_option("name", name, "Name, from the list")->required();
   run_one->add_option("--out", out, "Folder for tables, figures and summary.json; must not hold results yet")
-      ->required();
+      ->required()
+      ->check(named);
   run_one->add_flag("--quick", quick, "Smaller variant");
   add_threads(run_one, "1, as times are compared");
 
@@ -158,20 +223,7 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& success) { // --help, --version
     return commands.exit(success);
   } catch (const CLI::ParseError& error) {
-    const CLI::App* at = &commands;
-    for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
-      const std::vector<const CLI::App*> below = at->get_subcommands([](const CLI::App*) { return true; });
-      const auto named = [&](const CLI::App* command) { return command->get_name() == argv[i]; };
-      const auto found = std::find_if(below.begin(), below.end(), named);
-      if (below.empty())
-        break;
-      if (found == below.end())
-        return complain(fmt::format("unknown command '{}' ({} --help)", argv[i],
-                                    at == &commands ? "spherecut" : "spherecut " + at->get_name()),
-                        status_bad_input);
-      at = *found;
-    }
-    return complain(fmt::format("{} (spherecut --help)", error.what()), status_bad_input);
+    return complain(what_is_wrong(commands, argc, argv, error), status_bad_input);
   }
 
   bool has_threads = false;

@@ -121,7 +121,8 @@ Approach approach(const Section& section, const ToolSettings& tool, Offences& of
   Vector3 axis = tool.axis;
   if (const auto* laparoscope = std::get_if<topology::Laparoscope>(&tool.shape))
     axis = laparoscope->port - approach.target;
-  if (approach.direction.dot(axis) >= 0)
+  const bool has_directions = !approach.direction.isZero(0) && !tool.axis.isZero(0); // else that has been told
+  if (has_directions && approach.direction.dot(axis) >= 0)
     offences.add(section.line("direction"),
                  fmt::format("tool.approach.direction = {}: moves the tool backwards; allowed: more than 90 degrees "
                              "from its axis {}",

@@ -19,12 +19,24 @@ long line_of(const toml::node& node) {
   return node.source().begin.line;
 }
 
-std::string shown(const toml::node& node) {
+std::string whole_text(const toml::node& node) {
   if (node.is_table())
     return "a table";
+  if (const toml::array* array = node.as_array()) {
+    std::string text;
+    for (const toml::node& entry : *array)
+      text += (text.empty() ? "" : ", ") + whole_text(entry);
+    return "[" + text + "]";
+  }
+  if (node.is_floating_point()) // the shortest text that reads back the same, where toml++ writes 17 digits
+    return fmt::format("{}", node.value_or(0.0));
   std::ostringstream out;
   node.visit([&](const auto& value) { out << value; });
-  std::string text = out.str();
+  return out.str();
+}
+
+std::string shown(const toml::node& node) {
+  std::string text = whole_text(node);
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text.size() > 60 ? text.substr(0, 57) + "..." : text;
 }

@@ -62,7 +62,7 @@ class Section {
 };
 
 /// The value of a vector key as a unit vector, whatever its length; a zero vector is an offence (`name`: of the key in
-/// messages) and gives the z axis.
+/// messages) and stays zero, by which its reader knows to ask no more of it.
 Vector3 direction(const Section& section, std::string_view name, std::string_view key, Offences& offences);
 
 class ScenarioDocument {

@@ -144,7 +144,7 @@ Vector3 direction(const Section& section, std::string_view name, std::string_vie
   if (value.norm() > 0)
     return value.normalized();
   offences.add(section.line(key), fmt::format("{} = [0, 0, 0]: has no direction; allowed: any other vector", name));
-  return Vector3::UnitZ();
+  return Vector3::Zero();
 }
 
 } // namespace spherecut::app

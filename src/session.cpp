@@ -69,7 +69,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     incisions_ = std::make_unique<IncisionBuilder>(scenario_, organ_.domain, sheet_edge(zone_));
     model_.incision = incisions_->incision();
     incisions_->update_fields();
-    check_pieces(steps_.front().time);
+    require_pieces(incisions_->wound(), zone_.spacing);
   }
   watch_blade_way();
   make_blade_force();
@@ -89,6 +89,8 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     throw InputError(all);
   }
   static_cast<void>(fixed_nodes(scenario_, *organ_.domain, model_.sprinkling.nodes));
+  if (cuts()) // regions that hold nothing have been told by now: no piece is severed by that
+    check_held(steps_.front().time);
 }
 
 // Fine at the contact, at the fronts of the precuts, and where the blade is going to cut.

@@ -231,6 +231,7 @@ class Session {
   [[nodiscard]] std::optional<BodyModel> propose_cut(const std::vector<topology::BladePose>& poses,
                                                      const StepSample& sample, CutReport& report);
   void check_pieces(double time);
+  void check_held(double time);
   [[nodiscard]] FirstTouch find_grasp(const std::vector<ToolSample>& motion) const;
   [[nodiscard]] std::vector<int> grasped_nodes(const BodyModel& model) const;
   [[nodiscard]] bool grasped_piece_is_free() const;

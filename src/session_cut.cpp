@@ -259,8 +259,12 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
 }
 
 void Session::check_pieces(double time) {
+  require_pieces(incisions_->wound(), zone_.spacing);
+  check_held(time);
+}
+
+void Session::check_held(double time) {
   const topology::Wound& wound = incisions_->wound();
-  require_pieces(wound, zone_.spacing);
   const std::vector<int> unheld = unheld_pieces(wound, scenario_.fixed);
   if (unheld.empty())
     return;

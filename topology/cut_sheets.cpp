@@ -69,7 +69,7 @@ CornerPlane plane_of(const std::vector<Vector3>& corners) {
     throw InputError(fmt::format("sheet: a polygon of {} corners, at least 3 are needed", count));
   CornerPlane plane{Vector3::Zero(), Vector3::Zero(), {}, {}, 0};
   for (int i = 0; i < count; ++i) {
-    require_finite(corners[i], fmt::format("corner {}", i));
+    require_finite(corners[i], fmt::format("corner {}", i + 1));
     plane.origin += corners[i] / count;
   }
   for (int i = 0; i < count; ++i) {
@@ -84,11 +84,12 @@ CornerPlane plane_of(const std::vector<Vector3>& corners) {
   constexpr double flatness = 1e-6;
   for (int i = 0; i < count; ++i) {
     if (const double off = plane.normal.dot(corners[i] - plane.origin); std::abs(off) > flatness * plane.size)
-      throw InputError(fmt::format("sheet: corner {} of the polygon lies {} m off the plane of the others, at most {} "
-                                   "m are allowed",
-                                   i, std::abs(off), flatness * plane.size));
+      throw InputError(
+          fmt::format("sheet: corner {} of the polygon lies {:.3g} m off the plane of the others, at most {:.3g} "
+                      "m are allowed",
+                      i + 1, std::abs(off), flatness * plane.size));
     if (const double side = (corners[(i + 1) % count] - corners[i]).norm(); !(side > flatness * plane.size))
-      throw InputError(fmt::format("sheet: corners {} and {} of the polygon coincide", i, (i + 1) % count));
+      throw InputError(fmt::format("sheet: corners {} and {} of the polygon coincide", i + 1, (i + 1) % count + 1));
   }
   return plane;
 }

@@ -32,9 +32,9 @@ void check_elements(const SurfaceMesh& sheet, const std::string& name) {
     const double longest = std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
     constexpr double shortest_edge = 1e-9, flattest = 1e-6;
     if (!(longest >= shortest_edge) || !((b - a).cross(c - a).norm() >= flattest * longest * longest))
-      throw InputError(fmt::format("{}: triangle {} (vertices {}, {}, {}) is degenerate: longest edge {} m, area {} m2",
-                                   name, t, corners[0], corners[1], corners[2], longest,
-                                   0.5 * (b - a).cross(c - a).norm()));
+      throw InputError(
+          fmt::format("{}: triangle {} (vertices {}, {}, {}) is degenerate: longest edge {:.3g} m, area {:.3g} m2",
+                      name, t, corners[0], corners[1], corners[2], longest, 0.5 * (b - a).cross(c - a).norm()));
   }
 }
 

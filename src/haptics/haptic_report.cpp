@@ -184,17 +184,26 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
 }
 
 std::string text_of(const HapticFindings& f) {
-  std::string text = fmt::format("haptic loop: {:.1f} ticks/s, {} overruns, {}\n", f.rate, f.loop.overruns,
-                                 f.loop.fifo ? "SCHED_FIFO, spinning" : "plain scheduling");
-  text += fmt::format("  wake latency {}\n  compute time {}\n", line_of(f.latency), line_of(f.compute));
-  text += fmt::format("simulation: {:.1f} solves/s, p50 {:.2f}, p99 {:.2f}, max {:.1f} ms; {} cut increments, {} "
-                      "re-sprinkles, {} failed, coarsened to level {}{}\n",
-                      f.solve_rate, 1e3 * f.solve.p50, 1e3 * f.solve.p99, 1e3 * f.solve.largest, f.increments,
-                      f.resprinkled, f.failed, f.highest_degradation,
-                      f.highest_degradation > 0 ? fmt::format(" (rebuilds missed their budget: nodes up to {:.2g} "
-                                                              "times as far apart)",
-                                                              std::pow(coarse_per_level, f.highest_degradation))
-                                                : "");
+  const bool has_clock = f.loop.seconds > 0; // in virtual time a tick has neither lateness nor duration
+  std::string text;
+  if (has_clock)
+    text = fmt::format("haptic loop: {:.1f} ticks/s, {} overruns, {}\n  wake latency {}\n  compute time {}\n"
+                       "simulation: {:.1f} solves/s, ",
+                       f.rate, f.loop.overruns, f.loop.fifo ? "SCHED_FIFO, spinning" : "plain scheduling",
+                       line_of(f.latency), line_of(f.compute), f.solve_rate);
+  else
+    text = fmt::format(
+        "haptic loop in virtual time: {:g} ticks and {:.4g} solves a second of it\nsimulation: a solve took ", f.rate,
+        f.solve_rate);
+  text +=
+      fmt::format("p50 {:.2f}, p99 {:.2f}, max {:.1f} ms; {} cut increments, {} re-sprinkles, {} failed, coarsened to "
+                  "level {}{}\n",
+                  1e3 * f.solve.p50, 1e3 * f.solve.p99, 1e3 * f.solve.largest, f.increments, f.resprinkled, f.failed,
+                  f.highest_degradation,
+                  f.highest_degradation > 0 ? fmt::format(" (rebuilds missed their budget: nodes up to {:.2g} "
+                                                          "times as far apart)",
+                                                          std::pow(coarse_per_level, f.highest_degradation))
+                                            : "");
   text += fmt::format("force: peak {:.4g} N; largest step in a tick {:.3g} N (at hand-overs {:.3g}, onset {:.3g}, cut "
                       "increments {:.3g} N)\n",
                       f.peak, f.steps.any, f.steps.hand_over, f.steps.onset, f.steps.cut);
@@ -217,9 +226,12 @@ std::string text_of(const HapticFindings& f) {
                         "others; {} forces unsent\n",
                         f.bridge->poses, f.bridge->clients, f.bridge->lost, f.bridge->old, f.bridge->garbage,
                         f.bridge->others, f.bridge->unsent);
-  text += fmt::format("time: ticks {:.3g} s, solves {:.3g} s, {} frames {:.3g} s, of {:.3g} s; {:.3g} s to prepare",
-                      f.loop.haptic_cpu_seconds, f.loop.solve_seconds, f.loop.frames, f.loop.viewer_seconds,
-                      f.loop.seconds, f.loop.prepare_seconds);
+  if (has_clock)
+    text += fmt::format("time: ticks {:.3g} s, solves {:.3g} s, {} frames {:.3g} s, of {:.3g} s; {:.3g} s to prepare",
+                        f.loop.haptic_cpu_seconds, f.loop.solve_seconds, f.loop.frames, f.loop.viewer_seconds,
+                        f.loop.seconds, f.loop.prepare_seconds);
+  else
+    text.pop_back(); // the end of its last line
   return text;
 }
 

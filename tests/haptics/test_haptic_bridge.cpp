@@ -205,6 +205,31 @@ TEST_CASE("The first client holds the tool until it falls silent or says goodbye
   CHECK(counters.garbage == 0);
 }
 
+TEST_CASE("A pose that is not finite is counted, and the poses after it are those that were sent") {
+  BridgeDevice device(any_port(), waiting, 1000);
+  Client client(device.port());
+  client.hello();
+  tick(device, 0);
+  REQUIRE(client.listen());
+  client.pose(1, {0, 0, 0.01});
+  CHECK(tick(device, 1).position == Vector3(0, 0, 0.01));
+  const double infinite = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  client.pose(2, {nan, 0, 0});
+  client.pose(3, {0, infinite, 0});
+  client.send({BridgePacket::pose, client.token, 4, Vector3::Zero(), Eigen::Quaterniond(nan, 0, 0, 0), 1, 2});
+  const DeviceState held = tick(device, 2);
+  CHECK(held.connected);
+  CHECK(held.position == Vector3(0, 0, 0.01));
+  CHECK(held.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs());
+  CHECK(device.counters().garbage == 3);
+  REQUIRE(client.listen());
+  CHECK(client.reply.sequence == 1);
+  client.pose(2, {0, 0, 0.02}); // its number was not used up
+  CHECK(tick(device, 3).position == Vector3(0, 0, 0.02));
+  CHECK(device.counters().poses == 2);
+}
+
 TEST_CASE("A flood of garbage costs a tick so many packets and no more, and the client is heard through it") {
   BridgeDevice device(any_port(0.05), waiting, 1000);
   Client client(device.port());

@@ -64,6 +64,48 @@ TEST_CASE("An unknown command is named") {
   CHECK_THAT(run_spherecut({"run", "a.toml"}).err, Catch::Contains("--out is required"));
 }
 
+TEST_CASE("Of a command line that lacks something too, what is unknown is named") {
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string said;
+  };
+  const std::vector<Case> cases = {
+      {{"run", "s.toml", "--otu", "x"}, "unknown option '--otu' (spherecut run --help)"},
+      {{"run", "s.toml", "--otu=x"}, "unknown option '--otu=x' (spherecut run --help)"},
+      {{"run", "s.toml", "x"}, "unexpected argument 'x' (spherecut run --help)"},
+      {{"run", "s.toml", "--otu", "--out"}, "unknown option '--otu' (spherecut run --help)"},
+      {{"check", "-q"}, "unknown option '-q' (spherecut check --help)"},
+      {{"check", "a.toml", "b.toml", "c.toml"}, "unexpected argument 'b.toml', 'c.toml' (spherecut check --help)"},
+      {{"haptics", "--virtua"}, "unknown option '--virtua' (spherecut haptics --help)"},
+      {{"serve", "--prot", "80"}, "unknown option '--prot' (spherecut serve --help)"},
+      {{"experiment", "run", "--otu", "x"}, "unknown option '--otu' (spherecut experiment run --help)"},
+      {{"experiment", "list", "hertz"}, "unexpected argument 'hertz' (spherecut experiment list --help)"},
+      {{"scenario-help", "--mark"}, "unknown option '--mark' (spherecut scenario-help --help)"},
+      {{"--loud"}, "unknown option '--loud' (spherecut --help)"},
+  };
+  for (const Case& c : cases) {
+    const ProgramResult result = run_spherecut(c.arguments);
+    CHECK(result.status == 2);
+    CHECK(result.err == "spherecut: error: " + c.said + "\n");
+  }
+}
+
+TEST_CASE("A file or folder without a name is refused by every command") {
+  const std::vector<std::vector<std::string>> commands = {{"run", "s.toml", "--out", ""},
+                                                          {"haptics", "s.toml", "--out", ""},
+                                                          {"haptics", "--replay", "r", "--out", ""},
+                                                          {"serve", "--port", "0", "--out", ""},
+                                                          {"experiment", "run", "kink", "--out", ""}};
+  for (const auto& arguments : commands) {
+    const ProgramResult result = run_spherecut(arguments);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: --out: the name is empty;") && Contains("--help"));
+    CHECK(lines_in(result.err) == 1);
+  }
+  CHECK_THAT(run_spherecut({"check", ""}).err, StartsWith("spherecut: error: scenario: the name is empty;"));
+  CHECK_THAT(run_spherecut({"serve", "--page", ""}).err, StartsWith("spherecut: error: --page: the name is empty;"));
+}
+
 TEST_CASE("Help, version and scenario-help succeed") {
   CHECK(run_spherecut({"--help"}).status == 0);
   const ProgramResult version = run_spherecut({"--version"});
@@ -219,6 +261,34 @@ TEST_CASE(
     const std::string wound = read_file(out / "frames/surface_00006.vtp");
     CHECK_THAT(wound, Contains("Name=\"part\"") && Contains("Name=\"piece\"") && Contains("displacement [m]"));
     CHECK_THAT(read_file(out / "frames/incision_00006.vtp"), Contains("NumberOfLines=") && Contains("Name=\"sheet\""));
+  }
+}
+
+TEST_CASE("Motions that no tissue makes end a run as a numerical failure, with the rows before them") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  const auto run = [&](const std::string& text) {
+    return run_spherecut({"run", write_file(folder.path() / "case.toml", text), "--out", out});
+  };
+  const std::string allowed = "allowed: up to 0.6 m, 10 times the organ's largest extent";
+  SECTION("a cut blown up") {
+    const ProgramResult result = run(cut_block + disc_precut + "pressure = 1e9\n[output]\nfigures = false\n");
+    CHECK(result.status == 3);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: t = 0 s: ") && Contains(allowed) && Contains("fine_spacing"));
+    CHECK(lines_in(result.err) == 1);
+    CHECK(lines_in(read_file(out / "cuts.csv")) == 1);
+  }
+  SECTION("a patch pulled away") {
+    const ProgramResult result =
+        run(cut_block + "[tool]\nshape = \"grasper\"\nradius = 0.01\nstep = 0.25\n"
+                        "[[tool.path]]\ntime = 0\nposition = [0, 0, 0.03]\n"
+                        "[[tool.path]]\ntime = 1\nposition = [0, 0, 1.03]\n[output]\nfigures = false\n");
+    CHECK(result.status == 3);
+    CHECK_THAT(result.err, StartsWith("spherecut: error: t = 0.75 s: the node at") && Contains(allowed));
+    CHECK(lines_in(read_file(out / "forces.csv")) == 4); // the columns' names, 0, 0.25 and 0.5 s
+    const auto summary = nlohmann::json::parse(read_file(out / "summary.json"));
+    CHECK(summary["status"] == "failed");
+    CHECK(summary["steps"]["done"] == 3);
   }
 }
 
@@ -487,6 +557,20 @@ TEST_CASE("An interrupted experiment says so and exits with 130") {
   INFO(result.out << result.err);
   CHECK(result.status == 130);
   CHECK_THAT(result.out, Contains("interrupted: nothing was checked") && Contains(out.string()));
+  CHECK(!std::filesystem::exists(out / "summary.json"));
+}
+
+TEST_CASE("An experiment that comes to no next line ends all the same when it is interrupted") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  // Its first line would come after a minute in real time.
+  const ProgramResult result =
+      run_shell(spherecut_command({"experiment", "run", "haptic_loop", "--out", out}) + " & run=$!; until [ -d '" +
+                out.string() + "' ]; do kill -0 $run || break; sleep 0.05; done; kill -INT $run; wait $run");
+  INFO(result.out << result.err);
+  CHECK(result.status == 130);
+  CHECK_THAT(result.out, Contains("interrupted: nothing was checked") && Contains(out.string()));
+  CHECK(lines_in(result.out) == 1);
   CHECK(!std::filesystem::exists(out / "summary.json"));
 }
 

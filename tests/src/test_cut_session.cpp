@@ -309,7 +309,13 @@ TEST_CASE("Precuts that cannot be made are refused with file and line") {
                     Contains("precut[2]") && Contains("of its area lie on the precuts before it"));
   CHECK_NOTHROW(session_of(cut_block + disc_precut + replaced(disc_precut, "[0, 0, 1]", "[1, 0, 0]")));
   CHECK_THROWS_WITH(session_of(cut_block + replaced(disc_precut, "0.016]", "0.3]")),
-                    Contains("case.toml:15") && Contains("precut[1]") && Contains("outside"));
+                    Contains("case.toml:15") && Contains("precut[1]: lies outside the organ"));
+  CHECK_THROWS_WITH(session_of(cut_block + replaced(disc_precut, "radius = 0.01", "radius = 1e-9")),
+                    Contains("precut[1]: its sheet: triangle") && Contains("longest edge 5e-10 m") &&
+                        !Contains("incision"));
+  CHECK_THROWS_WITH(session_of(cut_block + "[[precut]]\nshape = \"polygon\"\npoints = [[0, 0, 0.01], [0.01, 0, 0.01], "
+                                           "[0.01, 0.01, 0.01], [0.01, 0.01, 0.01]]\n"),
+                    Contains("precut[1]") && Contains("corners 3 and 4"));
   const std::string flat =
       "[[precut]]\nshape = \"polygon\"\npoints = [[0, 0, 0.01], [0.01, 0, 0.01], [0.02, 0, 0.01]]\n";
   CHECK_THROWS_WITH(session_of(cut_block + disc_precut + flat), Contains("case.toml:20: precut[2]"));

@@ -227,9 +227,12 @@ TEST_CASE("The command line records a session, replays it, moves a device by it 
   const TemporaryFolder folder;
   const auto path = [&](const char* name) { return (folder.path() / name).string(); };
   write_file(folder.path() / "s.toml", small_scenario);
-  REQUIRE(run_spherecut(
-              {"haptics", path("s.toml"), "--out", path("a"), "--duration", "0.3", "--virtual", "--solved-every", "0"})
-              .status == 0);
+  const auto recorded = run_spherecut(
+      {"haptics", path("s.toml"), "--out", path("a"), "--duration", "0.3", "--virtual", "--solved-every", "0"});
+  REQUIRE(recorded.status == 0);
+  CHECK(recorded.out.find("haptic loop in virtual time: 1000 ticks and ") == 0);
+  for (const char* clocked : {"latency", "compute time", "overruns", "\ntime:", "\n\n"})
+    CHECK(recorded.out.find(clocked) == std::string::npos);
   const auto replayed = run_spherecut({"haptics", "--replay", path("a/haptic.recording"), "--out", path("b")});
   CHECK(replayed.status == 0);
   CHECK(replayed.out.find("the same, bit by bit") != std::string::npos);

@@ -141,6 +141,26 @@ TEST_CASE("All offences of a scenario are reported at once, by line") {
   CHECK(young < radius);
 }
 
+TEST_CASE("A direction of no length is one offence, without what follows from it") {
+  const auto is_alone = [](const std::string& said, const std::string& name) {
+    INFO(said);
+    CHECK_THAT(said, Contains(name + " = [0, 0, 0]: has no direction"));
+    CHECK(std::count(said.begin(), said.end(), '\n') == 0);
+  };
+  is_alone(complaint_after("direction = [0, 0, -1]", "direction = [0, 0, 0]"), "tool.approach.direction");
+  is_alone(complaint(replaced(replaced(small_scenario, "step = 0.25", "axis = [0, 0, 0]\nstep = 0.25"),
+                              "direction = [0, 0, -1]", "direction = [0, 0, 1]")),
+           "tool.axis");
+  const auto sheet = [](const std::string& normal, const std::string& up) {
+    return complaint(cut_block + rectangle_precut("[0, 0, 0.02]", normal, up, "0.02", "0.01"));
+  };
+  is_alone(sheet("[0, 0, 1]", "[0, 0, 0]"), "precut[1].up");
+  is_alone(sheet("[0, 0, 0]", "[0, 0, 1]"), "precut[1].normal");
+  is_alone(complaint(cut_block + disc_precut +
+                     "[[fixed]]\nregion = \"half_space\"\npoint = [0, 0, 0]\nnormal = [0, 0, 0]\n"),
+           "fixed[2].normal");
+}
+
 TEST_CASE("Nothing fixed is refused by the reader") {
   const std::string region = "[[fixed]]\nname = \"base\"\nregion = \"box\"\nlower = [-1, -1, -0.001]\n"
                              "upper = [1, 1, 0.001]\n";

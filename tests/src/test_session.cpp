@@ -97,6 +97,18 @@ TEST_CASE("A fixed region without nodes is refused with its name and line") {
   CHECK_THROWS_WITH(session_of(text), Contains("case.toml:9") && Contains("'base'") && Contains("no surface node"));
 }
 
+TEST_CASE("Where regions hold nothing, no piece of a precut organ is called severed before that is said") {
+  const std::string text = replaced(cut_block, "lower = [-1, -1, -0.001]\nupper = [1, 1, 0.001]",
+                                    "lower = [-1, -1, -2]\nupper = [1, 1, -1]") +
+                           disc_precut + "[cut]\nunheld = ";
+  for (const std::string unheld : {"\"hold\"", "\"drop\"", "\"refuse\""}) {
+    std::string said;
+    CHECK_THROWS_WITH(Session(scenario_of(text + unheld), [&](const std::string& line) { said += line; }),
+                      Contains("no surface node") && !Contains("severed"));
+    CHECK(said.empty());
+  }
+}
+
 TEST_CASE("Too few nodes are refused with the limit") {
   const std::string text = replaced(replaced(small_scenario, "fine_spacing = 0.004", "fine_spacing = 0.5"),
                                     "coarse_spacing = 0.012", "coarse_spacing = 0.5");

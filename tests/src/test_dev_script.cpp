@@ -1,0 +1,73 @@
+// ./dev as a user meets it, in a folder of its own beside programs that stand in for cmake and ninja.
+#include "tests/support/run_program.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace spherecut;
+using namespace spherecut::tests;
+using Catch::Contains;
+
+namespace {
+
+const std::filesystem::path script = std::filesystem::path(SPHERECUT_SOURCE_DIR) / "dev";
+
+void write_program(const std::filesystem::path& file, const std::string& text) {
+  write_file(file, "#!/bin/sh\n" + text);
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+}
+
+} // namespace
+
+TEST_CASE("./dev refuses arguments that it has no use for") {
+  const TemporaryFolder folder;
+  std::filesystem::copy_file(script, folder.path() / "dev");
+  const auto dev = [&](const std::string& arguments) {
+    return run_shell("'" + (folder.path() / "dev").string() + "' " + arguments);
+  };
+  struct Case {
+    std::string arguments, said;
+  };
+  const std::vector<Case> cases = {
+      {"demo extra", "dev: demo: unexpected argument 'extra'; allowed: none\n"},
+      {"demo --out here", "dev: demo: unexpected argument '--out'; allowed: none\n"},
+      {"lint --dep", "dev: lint: unexpected argument '--dep'; allowed: --deep\n"},
+      {"lint --deep topology", "dev: lint: unexpected argument 'topology'; allowed: --deep\n"},
+      {"--help demo", "dev: --help: unexpected argument 'demo'; allowed: none\n"},
+  };
+  for (const Case& c : cases) {
+    const ProgramResult result = dev(c.arguments);
+    CHECK(result.status == 2);
+    CHECK(result.err == c.said);
+    CHECK(result.out.empty());
+  }
+  CHECK(dev("--help").status == 0);
+}
+
+TEST_CASE("./dev that is interrupted says so and ends with 130") {
+  const TemporaryFolder folder;
+  std::filesystem::copy_file(script, folder.path() / "dev");
+  std::filesystem::create_directory(folder.path() / "bin");
+  const std::string waits = "trap 'exit 2' INT\nsleep 60\n"; // as ninja, which takes the signal and fails
+  write_program(folder.path() / "bin/cmake", "exit 0\n");
+  const auto dev = [&](const std::string& arguments) {
+    // timeout sends the signal to the whole group, as a terminal does
+    return run_shell("cd '" + folder.path().string() + "' && PATH=\"$PWD/bin:$PATH\" SPHERECUT_SKIP_PACKAGES=1 " +
+                     "timeout --preserve-status --signal=INT 1 ./dev " + arguments);
+  };
+  const auto says_so = [](const ProgramResult& result) {
+    INFO(result.err);
+    CHECK(result.status == 130);
+    CHECK_THAT(result.err, Contains("dev: interrupted\n") && !Contains("failed"));
+  };
+  write_program(folder.path() / "bin/ninja", waits);
+  says_so(dev("build"));
+  says_so(dev("demo"));
+  write_program(folder.path() / "bin/ninja", "exit 0\n");
+  write_program(folder.path() / "bin/ctest", waits);
+  says_so(dev("test"));
+  write_program(folder.path() / "bin/cmake", waits);
+  says_so(dev("lint"));
+  write_program(folder.path() / "bin/cmake", "exit 2\n");
+  CHECK_THAT(dev("build").err, Contains("failed") && !Contains("interrupted"));
+}
