@@ -20,6 +20,7 @@ constexpr double due_reach = 3;         // node spacings ahead in which the next
 constexpr int stroke_parts = 4;         // over which the forces are taken to change evenly
 constexpr double lip_tolerance = 1e-6;  // m
 constexpr double open_reach = 0.3;      // node spacings from a sheet: a place there lies in the cut
+constexpr int way_parts = 32;           // of a motion that is looked at for tissue
 
 Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
   return pose.orientation * point + pose.position;
@@ -127,6 +128,41 @@ void BladeForce::meet_again(const BodyModel& now) {
   press(now);
   ledger_.excess += stored - (state_ ? state_->stored : 0); // the tear has taken it
   ledger_.stored = state_ ? state_->stored : 0;
+}
+
+// Ahead of its contact where it pressed; else, in a motion that came from outside, whatever lies between.
+double BladeForce::passed_uncut(const BodyModel& body) const {
+  if (way_.size() < 2)
+    return 0;
+  const topology::BladePose &from = way_[way_.size() - 2], &to = way_.back();
+  const topology::RestMap to_rest = map_of_(body);
+  double most = 0;
+  const auto length_inside = [&](int parts, double part, const auto& place) {
+    int inside = 0;
+    for (int k = 0; k < parts; ++k)
+      inside += domain_->signed_distance(place((k + 0.5) / parts)) < 0 ? 1 : 0;
+    most = std::max(most, inside * part);
+  };
+  for (int piece = 0; piece < std::ssize(edge_); ++piece) {
+    const Vector3& point = edge_[static_cast<std::size_t>(piece)].point;
+    const Vector3 start = placed(from, point), end = placed(to, point), motion = end - start;
+    const auto met = std::find(meeting_.pieces.begin(), meeting_.pieces.end(), piece);
+    if (met != meeting_.pieces.end()) {
+      const solvers::EdgeContact& contact =
+          meeting_.patch.contacts[static_cast<std::size_t>(met - meeting_.pieces.begin())];
+      const double gone = contact.push.dot(end - contact.point);
+      if (gone > 0 && contact.push.dot(motion) > 0.5 * motion.norm())
+        length_inside(way_parts, gone / way_parts,
+                      [&](double share) { return Vector3(contact.point + share * gone * contact.push); });
+    } else if (signed_distance(*domain_, to_rest, start) >= 0) {
+      length_inside(way_parts, motion.norm() / way_parts, [&](double share) {
+        const Vector3 x = start + share * motion;
+        const bool is_cut = body.incision != nullptr && body.incision->closest(x, open_reach * spacing_);
+        return is_cut ? end : x;
+      });
+    }
+  }
+  return most > least_increment * spacing_ ? most : 0;
 }
 
 void BladeForce::leave() {

@@ -48,6 +48,9 @@ class BladeForce {
   [[nodiscard]] bool has_place() const { return !way_.empty(); }
   /// The blade goes on to a pose. `body` is solved, without blade.
   void go_to(const topology::BladePose& pose, const BodyModel& body);
+  /// Once its last motion has brought the whole edge out of `body`: how much tissue a piece of the edge has gone
+  /// through and not cut on it, m; 0: none, or it was drawn back.
+  [[nodiscard]] double passed_uncut(const BodyModel& body) const;
   /// The blade has left the body: its way starts anew from where it is.
   void leave();
 

@@ -194,6 +194,8 @@ StepResult Session::step(const StepSample& sample) {
     if (recondensing_on_ && sample.blade)
       watch_window(sample, last_blade, result);
     evaluate(result);
+  } else if (blade_force_ != nullptr && sample.blade) {
+    press_blade(sample, *result.cut); // it is outside: from here on its way goes into the tissue
   }
   result.resprinkled = result.resprinkled || std::exchange(followed_aside_, false);
   result.rebuild = std::exchange(rebuild_, Rebuild::none);

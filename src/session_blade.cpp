@@ -80,6 +80,14 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
   const bool placed = blade_force_->has_place();
   blade_force_->go_to(*sample.blade, model_);
   if (!blade_force_->inside(*sample.blade, model_)) {
+    if (const double uncut = blade_force_->passed_uncut(model_); uncut > 0)
+      warn("bridge",
+           fmt::format("by t = {:g} s the blade has left the organ past up to {:.2g} mm of tissue that it has "
+                       "not cut. Nearer than a node spacing ({:.2g} mm) to a surface or a fixed region the "
+                       "nodes do not tell what its edge releases: finer ones (nodes.fine_spacing, "
+                       "cut.front_spacing) cut farther; what it passes within a step it does not meet: a "
+                       "smaller blade.step does",
+                       sample.time, 1e3 * uncut, 1e3 * zone_.spacing.fine));
     blade_force_->leave();
     drop_blade_proposal();
     incisions_->place(*sample.blade, to_rest);

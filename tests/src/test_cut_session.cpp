@@ -43,6 +43,10 @@ double total(const std::vector<double>& values) {
 
 constexpr double block_volume = 0.06 * 0.06 * 0.03;
 
+bool tells_of_uncut_tissue(const std::string& warning) {
+  return warning.find("tissue that it has not cut") != std::string::npos;
+}
+
 } // namespace
 
 TEST_CASE("A cut that is put off is the same cut in fewer increments") {
@@ -489,6 +493,7 @@ TEST_CASE(
     CHECK(result.residual < 1e-8);
   }
   REQUIRE(cut);
+  CHECK(session.incision()->front_length() == Approx(width).epsilon(0.01)); // from the surface on: none is buried
   const double swept = width * 0.018;
   CHECK(area < swept);
   CHECK(area > 0.5 * swept);
@@ -508,6 +513,32 @@ TEST_CASE("A blade that is pressed too little does not cut, and leaves nothing b
   CHECK(results[2].cut->blade.force.z() > 0);
   CHECK(results.back().cut->blade.force.norm() == 0);
   CHECK(session.at({0.004, 0, 0.029}).displacement.norm() < 1e-12);
+  CHECK(std::none_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
+}
+
+TEST_CASE("Tissue that a resisted blade has gone through without cutting it is told") {
+  const std::string tough = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 20000");
+  SECTION("where it presses too little to cut, and comes out at the other side") {
+    Session session =
+        session_of(tough + blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.028]", "[0.004, 0, -0.005]"}, 0.04, "0.5"));
+    run(session);
+    CHECK(session.incision() == nullptr);
+    CHECK(std::any_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
+  }
+  SECTION("where it goes from outside to outside in one step") {
+    Session session = session_of(tough + blade({"[0.004, 0, 0.031]", "[0.004, 0, -0.005]"}, 0.04, "1"));
+    run(session);
+    REQUIRE(session.incision() == nullptr);
+    const auto told = std::find_if(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue);
+    REQUIRE(told != session.warnings().end());
+    CHECK_THAT(*told, Contains("up to 30 mm") && Contains("blade.step"));
+  }
+  SECTION("but not where it goes by") {
+    Session session =
+        session_of(tough + blade({"[0.004, 0, 0.031]", "[0.2, 0, 0.031]", "[0.2, 0, -0.005]"}, 0.04, "0.5"));
+    run(session);
+    CHECK(std::none_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
+  }
 }
 
 TEST_CASE("A blade that tissue resists cuts on in steps between which its last cut added nothing to the sheet") {
