@@ -348,6 +348,29 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
   return patch;
 }
 
+ContactState among(const ContactPatch& patch, const ContactState& state, const std::vector<int>& nodes) {
+  ContactState result = state;
+  const std::size_t count = nodes.size();
+  result.nodal_forces.assign(count, Vector3::Zero());
+  result.active.assign(count, 0);
+  result.along.assign(count, Vector3::Zero());
+  result.bond.assign(count, Vector3::Zero());
+  result.displacement = VectorX::Zero(3 * static_cast<Eigen::Index>(count));
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto known = std::find(patch.nodes.begin(), patch.nodes.end(), nodes[k]);
+    if (known == patch.nodes.end())
+      continue;
+    const auto c = known - patch.nodes.begin();
+    const auto at = static_cast<std::size_t>(c);
+    result.nodal_forces[k] = state.nodal_forces[at];
+    result.active[k] = state.active[at];
+    result.along[k] = state.along[at];
+    result.bond[k] = state.bond[at];
+    result.displacement.segment<3>(3 * static_cast<Eigen::Index>(k)) = state.displacement.segment<3>(3 * c);
+  }
+  return result;
+}
+
 ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
                    const ContactOptions& options, const ContactState* previous) {
   const bool frictional = options.condition == ContactCondition::frictional;

@@ -73,6 +73,10 @@ struct ContactState {
   bool converged = true;
 };
 
+/// `state` of `patch` on other candidates of the same body, ascending: what both have keeps its force, bond and place,
+/// the others are free. To go on from, by press(): the sums over the patch are not made again.
+ContactState among(const ContactPatch& patch, const ContactState& state, const std::vector<int>& nodes);
+
 /// Finds the active set and the forces: no penetration, no tension. Frictionless: forces along the tool's normals.
 /// Frictional: besides, forces along the tool's surface of at most `friction` times the normal force; below that limit
 /// a node keeps its place on the tool, at it the node slips against the force. Bonded: a node that has been touched

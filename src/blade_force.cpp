@@ -353,7 +353,12 @@ std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
     return {};
   const double share = needed() / pressed.release; // of its advance that the edge can keep
   double remaining = share * way;
-  bool near = way - remaining >= least_increment * spacing_;
+  // A cut of the least length is due when the edge has as much to spare before it as it lacks after it: half of that
+  // length farther on.
+  const double least = least_increment * spacing_;
+  bool near = way - remaining >= 0.5 * least;
+  if (way - remaining < least)
+    remaining = std::max(0.0, way - least);
   if (first_cut(coming)) {
     near = first_trigger * share <= 1;
     remaining = (1 - first_trigger * share) * std::min(pressed.advance, way);
@@ -486,11 +491,15 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
             meeting_.patch, {state_->advance, onward(meeting_, state_->advance, reach)}, proposal_->meeting.patch,
             {coming, onward(proposal_->meeting, coming, reach)}, needed_for_proposal(), friction))
       grip.due = std::max(grip.edge, -edge_after(*share * reach).dot(grip.along));
-  } else if (now.incision != nullptr && !first_cut(*state_)) {
+  } else {
     double length = 0;
     for (const solvers::EdgeContact& contact : meeting_.patch.contacts)
       length += contact.length;
-    grip.due = std::max(grip.edge, needed() * length);
+    // Where nothing is cut yet it is not known: twice what proposes a first cut, or what there is, is as far as a solve
+    // may be gone on from.
+    const double least = needed() * length;
+    grip.due = now.incision != nullptr && !first_cut(*state_) ? std::max(grip.edge, least)
+                                                              : 2 * std::max(grip.edge, first_trigger * least);
   }
   return grip;
 }

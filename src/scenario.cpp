@@ -186,7 +186,11 @@ ToolSettings tool(const Section& section, Offences& offences) {
 }
 
 HeldDevice held_device(const std::string& name) {
-  return name == "script" ? HeldDevice::script : name == "recording" ? HeldDevice::recording : HeldDevice::hand;
+  if (name == "script")
+    return HeldDevice::script;
+  if (name == "recording")
+    return HeldDevice::recording;
+  return name == "bridge" ? HeldDevice::bridge : HeldDevice::hand;
 }
 
 HapticSettings haptics(const Section& section, const std::filesystem::path& scenario, Offences& offences) {

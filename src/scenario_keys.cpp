@@ -187,7 +187,7 @@ constexpr std::array keys = {
                 {},
                 "",
                 "shape = sphere_tip, flat_punch, grasper"},
-    ScenarioKey{"tool.step", number, "s", "", "Time step; left out: 1/20 of the duration.", above(0)},
+    ScenarioKey{"tool.step", number, "s", "", "Time step; left out: 1/20 of the duration. Every pose of a path is a step, too.", above(0)},
     ScenarioKey{"tool.approach", table, "", "",
                 "A straight press: the tool starts outside, touches, and goes on to a depth. This or path."},
     ScenarioKey{"tool.approach.target", vector, "m", "required", "Point that the line of motion runs through."},

@@ -57,14 +57,13 @@ std::vector<double> blade_times(const Scenario& scenario, double stride, double 
                     "allowed: {} in memory and {} steps. Give a longer step, a shorter way, or a coarser "
                     "cut.front_spacing",
                     scenario.file.string(), blade.line, travel, wanted, triangles, most_triangles, most_steps));
-  // A last step shorter than a millionth of the others is rounding, not a step.
   const auto whole = static_cast<long>(std::floor(wanted * (1 + 1e-9)));
-  std::vector<double> times;
+  std::vector<double> times, corners;
   for (long i = 0; i <= whole; ++i)
     times.push_back(start + std::min(duration, duration * static_cast<double>(i) / wanted));
-  if (start + duration - times.back() > 1e-6 * duration / wanted)
-    times.push_back(start + duration);
-  return times;
+  for (const BladePoint& corner : blade.path)
+    corners.push_back(corner.time);
+  return with_corners(std::move(times), corners, duration / wanted);
 }
 
 topology::ToolPose tool_pose(const ToolSettings& tool, const std::vector<ToolSample>& motion, double time) {

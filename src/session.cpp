@@ -374,7 +374,11 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
     std::vector<int> grown = model.patch.nodes;
     grown.insert(grown.end(), missed.begin(), missed.end());
     std::sort(grown.begin(), grown.end());
+    std::optional<solvers::CutContactState> bonded;
+    if (scenario_.contact.condition == solvers::ContactCondition::bonded) // what is held goes on being held
+      bonded = solvers::CutContactState{solvers::among(model.patch, model.state->tool, grown), model.state->lips};
     condense(grown, model);
+    model.state = std::move(bonded);
   }
   warn("patch", "the tool reaches surface nodes beyond its candidate patch; give a larger contact.candidate_radius");
 }

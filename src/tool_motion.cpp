@@ -62,21 +62,31 @@ std::string text_of(const Vector3& v) {
 
 } // namespace
 
+std::vector<double> with_corners(std::vector<double> times, const std::vector<double>& corners, double step) {
+  constexpr double same = 1e-6; // of a step: a shorter one is rounding, not a step
+  for (const double corner : corners) {
+    const auto after = std::lower_bound(times.begin(), times.end(), corner - same * step);
+    if (after == times.end() || *after > corner + same * step)
+      times.insert(after, corner);
+  }
+  return times;
+}
+
 std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::ContactQuery& organ,
                                     const topology::Domain& domain) {
   const std::vector<PathPoint> path = waypoints(tool, organ, domain.bounds());
   const double start = path.front().time;
   const double duration = path.back().time - start;
   const double step = tool.step > 0 ? tool.step : duration / default_steps;
-  // A last step shorter than a millionth of the others is rounding, not a step.
   const auto whole = static_cast<long>(std::floor(duration / step * (1 + 1e-9)));
+  std::vector<double> times, corners;
+  for (long i = 0; i <= whole; ++i)
+    times.push_back(start + std::min(duration, static_cast<double>(i) * step));
+  for (const PathPoint& corner : path)
+    corners.push_back(corner.time);
   std::vector<ToolSample> motion;
-  for (long i = 0; i <= whole; ++i) {
-    const double time = start + std::min(duration, static_cast<double>(i) * step);
+  for (const double time : with_corners(std::move(times), corners, step))
     motion.push_back({time, pose_of(tool, position_at(path, time))});
-  }
-  if (path.back().time - motion.back().time > 1e-6 * step)
-    motion.push_back({path.back().time, pose_of(tool, path.back().position)});
 
   if (tool.grasp)
     return motion;

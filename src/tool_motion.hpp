@@ -11,9 +11,12 @@ struct ToolSample {
   topology::ToolPose pose;
 };
 
-/// Poses from the start to the end of the motion, every ToolSettings::step seconds (0: 20 steps) and at the end. An
-/// approach is placed by its first touch of the surface at rest; when its line misses the organ it runs past the target
-/// instead. Throws InputError, with the key, when the tool touches or is inside the organ at the start.
+/// Ascending `times`, every `step`, with those of `corners` that are not among them: no corner of a way is cut off.
+std::vector<double> with_corners(std::vector<double> times, const std::vector<double>& corners, double step);
+
+/// Poses from the start to the end of the motion, every ToolSettings::step seconds (0: 20 steps) and at every pose of
+/// its path. An approach is placed by its first touch of the surface at rest; when its line misses the organ it runs
+/// past the target instead. Throws InputError, with the key, when the tool touches or is inside the organ at the start.
 std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::ContactQuery& organ,
                                     const topology::Domain& domain);
 

@@ -516,6 +516,37 @@ TEST_CASE("A blade that is pressed too little does not cut, and leaves nothing b
   CHECK(std::none_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
 }
 
+TEST_CASE("A resisted blade's steady force is toughness times width in short steps, too") {
+  Session session = session_of(R"([organ]
+shape = "block"
+size = [0.06, 0.06, 0.03]
+edge = 0.003
+[material]
+young_modulus = 1e4
+poisson_ratio = 0.3
+toughness = 5
+[[fixed]]
+region = "half_space"
+point = [0, 0, 0.0005]
+normal = [0, 0, 1]
+[nodes]
+coarse_spacing = 0.012
+[cut]
+front_spacing = 0.004
+)" + blade({"[0.001, 0, 0.0325]", "[0.001, 0, 0.0225]"}, 0.04, "0.025"));
+  double sum = 0;
+  int steps = 0;
+  const std::vector<StepResult> results = run(session);
+  for (const StepResult& result : results)
+    if (result.time > 0.6) {
+      sum += result.cut->blade.force.z();
+      ++steps;
+    }
+  const solvers::BladeLedger ledger = results.back().cut->blade.ledger;
+  CHECK(ledger.excess < 0.1 * ledger.surface);
+  CHECK(sum / steps == Approx(5 * 0.06).epsilon(0.2));
+}
+
 TEST_CASE("Tissue that a resisted blade has gone through without cutting it is told") {
   const std::string tough = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 20000");
   SECTION("where it presses too little to cut, and comes out at the other side") {

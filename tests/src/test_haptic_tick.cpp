@@ -292,6 +292,13 @@ TEST_CASE("At a new solve the force goes on from where it was and fades over in 
   CHECK(core.tick(device_at(31, deep)).force.z() == Approx(1.0));
 }
 
+TEST_CASE("The device of a scenario is the one that it names") {
+  const std::vector<std::pair<std::string, HeldDevice>> devices = {
+      {"script", HeldDevice::script}, {"hand", HeldDevice::hand}, {"bridge", HeldDevice::bridge}};
+  for (const auto& [name, device] : devices)
+    CHECK(scenario_of(small_scenario + "[haptics]\ndevice = \"" + name + "\"\n").haptics.device == device);
+}
+
 TEST_CASE("Solves that come in every tick do not hold the force where it was") {
   HapticSettings settings;
   settings.model = ForceModelKind::hold;

@@ -190,7 +190,7 @@ position = [0.003, 0, 0.012]
 )");
   session.prepare(session.steps().front());
   for (const StepSample& sample : session.steps()) {
-    failing_condensations = 1;
+    failing_condensations = 1000; // however often a shorter or a longer cut is tried within the step
     const StepResult result = session.step(sample);
     if (!result.cut->refused)
       continue;

@@ -5,7 +5,9 @@
 #include "tests/support/temporary_folder.hpp"
 #include "topology/errors.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 
 using namespace spherecut;
 using namespace spherecut::app;
@@ -165,6 +167,77 @@ TEST_CASE("A deep tip between nodes too coarse for it is told") {
                                        "coarse_spacing = 0.012", "coarse_spacing = 0.02"));
   run(coarse);
   CHECK_THAT(told(coarse), Contains("too coarse for a tip of 0.01 m") && Contains("nodes.fine_spacing"));
+}
+
+TEST_CASE("A tool and a blade come to the corners of their ways, whatever the step") {
+  const auto comes_to = [](const Session& session, const Vector3& place, double time) {
+    return std::any_of(session.steps().begin(), session.steps().end(), [&](const StepSample& sample) {
+      const Vector3 at = sample.tool ? sample.tool->point : sample.blade->position;
+      return std::abs(sample.time - time) < 1e-9 && (at - place).norm() < 1e-9;
+    });
+  };
+  const Session pressed = session_of(path({{0, "[0, 0, 0.032]"}, {0.37, "[0, 0, 0.028]"}, {1, "[0, 0, 0.032]"}}));
+  CHECK(comes_to(pressed, {0, 0, 0.028}, 0.37));
+  CHECK(comes_to(pressed, {0, 0, 0.032}, 1));
+  const Session cut = session_of(cut_block + R"([blade]
+edge = [[0, -0.006, 0], [0, 0.006, 0]]
+step = 0.25
+[[blade.path]]
+time = 0
+position = [0, 0, 0.033]
+[[blade.path]]
+time = 0.4
+position = [0, 0, 0.02]
+[[blade.path]]
+time = 1
+position = [0, 0, 0.033]
+)");
+  CHECK(comes_to(cut, {0, 0, 0.02}, 0.4));
+  REQUIRE(cut.steps().size() == 6); // 0, 0.25, 0.4, 0.5, 0.75, 1
+}
+
+TEST_CASE("What is bonded to a tool stays so when the tool comes to more nodes than were candidates") {
+  const auto last_force = [](const std::string& candidates) {
+    Session session = session_of(R"([organ]
+shape = "block"
+size = [0.06, 0.06, 0.03]
+edge = 0.003
+[material]
+young_modulus = 1e4
+poisson_ratio = 0.45
+[[fixed]]
+region = "half_space"
+point = [0, 0, 0.0005]
+normal = [0, 0, 1]
+[nodes]
+fine_spacing = 0.003
+coarse_spacing = 0.012
+fine_radius = 0.009
+[tool]
+shape = "sphere_tip"
+radius = 0.006
+step = 0.05
+[[tool.path]]
+time = 0
+position = [0, 0, 0.0305]
+[[tool.path]]
+time = 0.2
+position = [0, 0, 0.0285]
+[[tool.path]]
+time = 0.8
+position = [0.004, 0, 0.0285]
+[[tool.path]]
+time = 1
+position = [0.006, 0, 0.025]
+[contact]
+condition = "bonded"
+candidate_radius = )" + candidates +
+                                 "\n");
+    return run(session).back().force;
+  };
+  const Vector3 few = last_force("0.005"), many = last_force("0.03");
+  CHECK(many.x() < -0.3);
+  CHECK((few - many).norm() < 0.02 * many.norm());
 }
 
 TEST_CASE("Gravity alone bends the organ by its weight") {
