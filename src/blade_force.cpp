@@ -245,7 +245,11 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front) c
     add_contact(body, to_rest, front, piece, meeting, contacts);
   if (contacts.empty())
     return meeting;
-  const solvers::ForcePattern flanks = drag(body, contacts);
+  Vector3 course = Vector3::Zero();
+  for (const solvers::EdgeContact& contact : contacts)
+    course += contact.length * contact.push;
+  meeting.drawn_back = (way_.back().position - way_[way_.size() - 2].position).dot(course) < 0;
+  const solvers::ForcePattern flanks = drag(body, contacts, meeting.drawn_back ? Vector3(-course) : course);
   const solvers::Field base = without_lips(body);
   std::vector<solvers::LipPair> pairs;
   std::vector<char> used(body.pairs.size(), 0);
@@ -267,14 +271,10 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front) c
   return meeting;
 }
 
-// Faces of the cut near the edge, behind it.
-solvers::ForcePattern BladeForce::drag(const BodyModel& body, const std::vector<solvers::EdgeContact>& contacts) const {
-  if (settings_.friction == 0 || settings_.flank == 0 || body.incision == nullptr)
-    return {};
-  Vector3 way = Vector3::Zero();
-  for (const solvers::EdgeContact& contact : contacts)
-    way += contact.length * contact.push;
-  if (way.norm() == 0)
+// Faces of the cut near the edge, behind it, against a motion along `way`.
+solvers::ForcePattern BladeForce::drag(const BodyModel& body, const std::vector<solvers::EdgeContact>& contacts,
+                                       const Vector3& way) const {
+  if (settings_.friction == 0 || settings_.flank == 0 || body.incision == nullptr || way.norm() == 0)
     return {};
   std::vector<solvers::FlankPoint> flanks;
   for (const topology::SurfaceMesh& sheet : body.incision->sheets())
@@ -469,7 +469,7 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
   grip.contacts = static_cast<int>(meeting_.pieces.size());
   grip.force = state_->blade_force;
   grip.edge = here.edge_force;
-  grip.drag = state_->blade_force - state_->edge_force;
+  grip.drag = (meeting_.drawn_back ? -1.0 : 1.0) * (state_->blade_force - state_->edge_force);
   grip.stored = state_->stored;
   grip.release = here.release;
   const double friction = meeting_.patch.dragged ? 1 : 0;

@@ -94,7 +94,8 @@ class BladeForce {
     solvers::BladePatch patch;
     int on_surface = 0; // contacts where nothing is cut yet
     std::vector<char> surface;
-    double area = 0; // m2 cut
+    double area = 0;         // m2 cut
+    bool drawn_back = false; // the blade goes back: its flanks drag the other way
   };
   struct Proposal {
     BodyModel body;
@@ -108,8 +109,8 @@ class BladeForce {
   void add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
                    Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const;
   [[nodiscard]] VectorX advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const;
-  [[nodiscard]] solvers::ForcePattern drag(const BodyModel& body,
-                                           const std::vector<solvers::EdgeContact>& contacts) const;
+  [[nodiscard]] solvers::ForcePattern drag(const BodyModel& body, const std::vector<solvers::EdgeContact>& contacts,
+                                           const Vector3& way) const;
   [[nodiscard]] double toughness_of(const Meeting& meeting) const;
   [[nodiscard]] double needed() const { return toughness_of(meeting_) / settings_.sharpness; } // J/m2
   [[nodiscard]] double needed_for_proposal() const;                                            // J

@@ -547,6 +547,29 @@ front_spacing = 0.004
   CHECK(sum / steps == Approx(5 * 0.06).epsilon(0.2));
 }
 
+TEST_CASE("The flanks of a blade drag against its motion, forwards and back") {
+  Session session =
+      session_of(replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
+                 "[cut]\nfront_spacing = 0.004\n" +
+                 replaced(blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.015]", "[0.004, 0, 0.035]"}, 0.04, "0.1"),
+                          "[blade]\n", "[blade]\nfriction = 500\nflank = 0.006\n"));
+  double work = 0;
+  int back = 0;
+  for (const StepResult& result : run(session)) {
+    const BladeReport& blade = result.cut->blade;
+    CHECK(blade.ledger.work >= work - 1e-12);
+    work = blade.ledger.work;
+    const double drag = blade.force.z() - blade.edge_force;
+    if (result.time > 0.6 && result.time < 0.95)
+      CHECK(drag > 0.05); // N, upwards on a blade that goes down
+    if (result.time > 1.15 && blade.force.norm() > 0) {
+      CHECK(blade.force.z() < -0.05);
+      ++back;
+    }
+  }
+  CHECK(back > 0);
+}
+
 TEST_CASE("Tissue that a resisted blade has gone through without cutting it is told") {
   const std::string tough = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 20000");
   SECTION("where it presses too little to cut, and comes out at the other side") {
