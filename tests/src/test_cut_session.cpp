@@ -517,23 +517,9 @@ TEST_CASE("A blade that is pressed too little does not cut, and leaves nothing b
 }
 
 TEST_CASE("A resisted blade's steady force is toughness times width in short steps, too") {
-  Session session = session_of(R"([organ]
-shape = "block"
-size = [0.06, 0.06, 0.03]
-edge = 0.003
-[material]
-young_modulus = 1e4
-poisson_ratio = 0.3
-toughness = 5
-[[fixed]]
-region = "half_space"
-point = [0, 0, 0.0005]
-normal = [0, 0, 1]
-[nodes]
-coarse_spacing = 0.012
-[cut]
-front_spacing = 0.004
-)" + blade({"[0.001, 0, 0.0325]", "[0.001, 0, 0.0225]"}, 0.04, "0.025"));
+  Session session =
+      session_of(replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 5") +
+                 "[cut]\nfront_spacing = 0.004\n" + blade({"[0.001, 0, 0.0325]", "[0.001, 0, 0.0225]"}, 0.04, "0.025"));
   double sum = 0;
   int steps = 0;
   const std::vector<StepResult> results = run(session);

@@ -93,6 +93,19 @@ TEST_CASE("While the edge sticks, its force between solves is that of a solve") 
   }
 }
 
+TEST_CASE("Where an edge has cut nothing yet, its force at most doubles until the next solve") {
+  HapticSimulation simulation(blade_down(1000));
+  simulation.prepare(at_height(0, 0.031));
+  ContactSnapshot snapshot;
+  simulation.solve(at_height(0, 0.031), 0, snapshot);
+  simulation.solve(at_height(10, 0.029), 0, snapshot);
+  REQUIRE(snapshot.blade.contacts > 0);
+  REQUIRE(snapshot.blade.edge > 0);
+  const double first_cut = 1.2 * 1000 * 0.06; // N, at which one is proposed
+  CHECK(snapshot.blade.due <= 2 * std::max(snapshot.blade.edge, first_cut) * (1 + 1e-9));
+  CHECK(snapshot.blade.due >= 2 * snapshot.blade.edge);
+}
+
 TEST_CASE("The hand feels a blade indent and cut at toughness times width, without steps") {
   const Scenario scenario = blade_down(10);
   HapticSettings settings;

@@ -197,42 +197,10 @@ position = [0, 0, 0.033]
 }
 
 TEST_CASE("What is bonded to a tool stays so when the tool comes to more nodes than were candidates") {
-  const auto last_force = [](const std::string& candidates) {
-    Session session = session_of(R"([organ]
-shape = "block"
-size = [0.06, 0.06, 0.03]
-edge = 0.003
-[material]
-young_modulus = 1e4
-poisson_ratio = 0.45
-[[fixed]]
-region = "half_space"
-point = [0, 0, 0.0005]
-normal = [0, 0, 1]
-[nodes]
-fine_spacing = 0.003
-coarse_spacing = 0.012
-fine_radius = 0.009
-[tool]
-shape = "sphere_tip"
-radius = 0.006
-step = 0.05
-[[tool.path]]
-time = 0
-position = [0, 0, 0.0305]
-[[tool.path]]
-time = 0.2
-position = [0, 0, 0.0285]
-[[tool.path]]
-time = 0.8
-position = [0.004, 0, 0.0285]
-[[tool.path]]
-time = 1
-position = [0.006, 0, 0.025]
-[contact]
-condition = "bonded"
-candidate_radius = )" + candidates +
-                                 "\n");
+  const std::string drag =
+      path({{0, "[0, 0, 0.0305]"}, {1, "[0, 0, 0.0285]"}, {3, "[0.004, 0, 0.0285]"}, {4, "[0.006, 0, 0.025]"}});
+  const auto last_force = [&](const std::string& candidates) {
+    Session session = session_of(drag + "[contact]\ncondition = \"bonded\"\ncandidate_radius = " + candidates + "\n");
     return run(session).back().force;
   };
   const Vector3 few = last_force("0.005"), many = last_force("0.03");
