@@ -10,6 +10,7 @@
 #include "solvers/linear_complementarity.hpp"
 #include "topology/errors.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
@@ -93,8 +94,34 @@ ForcePattern drag_pattern(const std::vector<FlankPoint>& flanks, double shear, c
   return pattern;
 }
 
+namespace {
+
+/// Entry of `known` for every one of a patch, -1 where it has none.
+std::vector<Eigen::Index> entries_in(const BladePatch& known, const BladePatch& patch) {
+  std::vector<Eigen::Index> entries;
+  const auto add = [&](const auto& of_known, Eigen::Index first, const auto& is_same) {
+    const auto found = std::find_if(of_known.begin(), of_known.end(), is_same);
+    entries.push_back(found == of_known.end() ? -1 : first + (found - of_known.begin()));
+  };
+  for (const EdgeContact& contact : patch.contacts)
+    add(known.contacts, 0, [&](const EdgeContact& other) { return other == contact; });
+  for (const LipPair& pair : patch.pairs)
+    add(known.pairs, count(known), [&](const LipPair& other) {
+      return other.plus == pair.plus && other.minus == pair.minus && other.normal == pair.normal;
+    });
+  if (patch.dragged) {
+    const bool is_same =
+        known.dragged && known.flanks.points == patch.flanks.points && known.flanks.forces == patch.flanks.forces;
+    entries.push_back(is_same ? unilateral(known) : -1);
+  }
+  return entries;
+}
+
+} // namespace
+
 BladePatch condense_blade(const Discretisation& body, const Field& base, const std::vector<EdgeContact>& contacts,
-                          double half_width, const std::vector<LipPair>& pairs, const ForcePattern& drag) {
+                          double half_width, const std::vector<LipPair>& pairs, const ForcePattern& drag,
+                          const BladePatch* known) {
   if (contacts.empty())
     throw InputError("a blade without contacts has nothing to condense");
   BladePatch patch;
@@ -109,12 +136,33 @@ BladePatch condense_blade(const Discretisation& body, const Field& base, const s
     patterns.push_back(pair_pattern(body, pair));
   if (patch.dragged) {
     patterns.push_back(drag);
+    patch.flanks = drag;
     for (const Vector3& force : drag.forces)
       patch.drag += force;
   }
-  patch.responses = body.pattern_responses(patterns);
-  const MatrixX compliance = body.pattern_displacements(patterns, patch.responses);
-  patch.compliance = 0.5 * (compliance + compliance.transpose());
+  const BladePatch none;
+  const BladePatch& before = known == nullptr ? none : *known;
+  const std::vector<Eigen::Index> entries = entries_in(before, patch);
+  std::vector<ForcePattern> unknown;
+  bool is_same = entries.size() == before.responses.size();
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    is_same = is_same && entries[i] == static_cast<Eigen::Index>(i);
+    if (entries[i] < 0)
+      unknown.push_back(patterns[i]);
+  }
+  std::vector<Field> found = unknown.empty() ? std::vector<Field>{} : body.pattern_responses(unknown);
+  auto next = found.begin();
+  for (const Eigen::Index entry : entries)
+    if (entry < 0)
+      patch.responses.push_back(std::move(*next++));
+    else
+      patch.responses.push_back(before.responses[static_cast<std::size_t>(entry)]);
+  if (is_same) {
+    patch.compliance = before.compliance;
+  } else {
+    const MatrixX compliance = body.pattern_displacements(patterns, patch.responses);
+    patch.compliance = 0.5 * (compliance + compliance.transpose());
+  }
   patch.base = body.pattern_displacements(patterns, {base}).col(0);
   if (!patch.compliance.allFinite())
     throw NumericalError(fmt::format("the compliance under {} contacts of a blade is not finite", contacts.size()));

@@ -43,6 +43,7 @@ struct EdgeContact {
   Vector3 push = -Vector3::UnitZ();  // unit, its way, across the edge
   Vector3 normal = Vector3::UnitX(); // unit, of the sheet that it makes; across `push`
   double length = 0;                 // m, of edge
+  bool operator==(const EdgeContact&) const = default;
 };
 
 /// One newton along `push`, spread over the half disc of radius `half_width` ahead of the contact with the weight
@@ -66,6 +67,7 @@ struct BladePatch {
   std::vector<EdgeContact> contacts;
   std::vector<LipPair> pairs; // whose faces may touch; empty: they are left open
   bool dragged = false;
+  ForcePattern flanks;            // of the drag
   Vector3 drag = Vector3::Zero(); // N, on the tissue at amplitude 1
   MatrixX compliance;
   VectorX base;
@@ -73,9 +75,11 @@ struct BladePatch {
 };
 
 /// Condenses onto contacts, pairs (may be empty) and drag (may hold no points). `base` is the field without blade.
-/// Throws InputError without contacts.
+/// `known` (may be null): a patch of the same body and half width, whose responses are taken over where contacts, pairs
+/// and drag are its own. Throws InputError without contacts.
 BladePatch condense_blade(const Discretisation& body, const Field& base, const std::vector<EdgeContact>& contacts,
-                          double half_width, const std::vector<LipPair>& pairs = {}, const ForcePattern& drag = {});
+                          double half_width, const std::vector<LipPair>& pairs = {}, const ForcePattern& drag = {},
+                          const BladePatch* known = nullptr);
 
 /// Tissue under the blade.
 struct BladeState {

@@ -21,6 +21,11 @@ constexpr int stroke_parts = 4;         // over which the forces are taken to ch
 constexpr double lip_tolerance = 1e-6;  // m
 constexpr double open_reach = 0.3;      // node spacings from a sheet: a place there lies in the cut
 constexpr int way_parts = 32;           // of a motion that is looked at for tissue
+constexpr double same_contact = 1e-4;   // of the node spacing, and of one: what has not moved
+constexpr double least_motion = 1e-3;   // of the node spacing, that tells a direction
+constexpr double same_pose = 1e-6;      // of the way from one pose to the next: no other pose
+constexpr int wait_steps = 20;          // halvings towards the place where a cut is due
+constexpr double stop_distance = 0.1; // node spacings: poses nearer to each other are one, of a way that is made up for
 
 Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
   return pose.orientation * point + pose.position;
@@ -86,9 +91,9 @@ void BladeForce::go_to(const topology::BladePose& pose, const BodyModel& body) {
     at_ = pose;
   way_.push_back(pose);
   pass_open_cut(body);
-  meeting_ = meet(body, 0);
+  meeting_ = meet(body, 0, meeting_);
   if (proposal_)
-    proposal_->meeting = meet(proposal_->body, proposal_->poses);
+    proposal_->meeting = meet(proposal_->body, proposal_->poses, proposal_->meeting);
   press(body);
 }
 
@@ -124,7 +129,7 @@ void BladeForce::meet_again(const BodyModel& now) {
   proposal_.reset();
   pass_open_cut(now);
   const double stored = state_ ? state_->stored : 0;
-  meeting_ = meet(now, 0);
+  meeting_ = meet(now, 0, meeting_);
   press(now);
   ledger_.excess += stored - (state_ ? state_->stored : 0); // the tear has taken it
   ledger_.stored = state_ ? state_->stored : 0;
@@ -210,9 +215,13 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
     }
     met = pose_between(way_[leg], way_[leg + 1], in);
   }
+  // Solves may come so often that from one pose to the next there is hardly any motion.
   const Vector3 along = met.orientation * part.along;
-  const Vector3 motion = placed(way_[leg + 1], part.point) - placed(way_[leg], part.point);
-  const Vector3 across = motion - motion.dot(along) * along;
+  Vector3 across = Vector3::Zero();
+  for (std::size_t next = leg + 1; next < way_.size() && across.norm() < least_motion * spacing_; ++next) {
+    const Vector3 motion = placed(way_[next], part.point) - placed(way_[leg], part.point);
+    across = motion - motion.dot(along) * along;
+  }
   if (across.norm() < 1e-6 * spacing_)
     return;
   solvers::EdgeContact contact;
@@ -234,7 +243,8 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
   meeting.surface.push_back(on_surface ? 1 : 0);
 }
 
-BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front) const {
+// What is as it was in the `last` meeting need not be solved for again.
+BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front, const Meeting& last) const {
   Meeting meeting;
   meeting.area = body.incision != nullptr ? body.incision->area() : 0;
   if (front + 1 >= way_.size())
@@ -245,6 +255,19 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front) c
     add_contact(body, to_rest, front, piece, meeting, contacts);
   if (contacts.empty())
     return meeting;
+  const solvers::BladePatch* known = last.is_with(body) ? &last.patch : nullptr;
+  meeting.body = body.body.get();
+  meeting.incision = body.incision;
+  meeting.nodes = body.sprinkling.nodes.positions;
+  for (std::size_t c = 0; known != nullptr && c < contacts.size(); ++c) { // rounding moves them from step to step
+    const auto found = std::find(last.pieces.begin(), last.pieces.end(), meeting.pieces[c]);
+    if (found == last.pieces.end() || last.surface[found - last.pieces.begin()] != meeting.surface[c])
+      continue;
+    const solvers::EdgeContact& there = known->contacts[found - last.pieces.begin()];
+    if ((there.point - contacts[c].point).norm() < same_contact * spacing_ &&
+        (there.push - contacts[c].push).norm() < same_contact)
+      contacts[c] = there;
+  }
   Vector3 course = Vector3::Zero();
   for (const solvers::EdgeContact& contact : contacts)
     course += contact.length * contact.push;
@@ -253,8 +276,15 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front) c
   const solvers::Field base = without_lips(body);
   std::vector<solvers::LipPair> pairs;
   std::vector<char> used(body.pairs.size(), 0);
+  for (std::size_t p = 0; known != nullptr && p < body.pairs.size(); ++p)
+    if (std::any_of(known->pairs.begin(), known->pairs.end(),
+                    [&](const solvers::LipPair& pair) { return pair.plus == body.pairs[p].plus; })) {
+      used[p] = 1;
+      pairs.push_back(body.pairs[p]);
+    }
   for (int round = 0; round < 3; ++round) { // pairs that the blade would press through one another, and no others
-    meeting.patch = solvers::condense_blade(*body.body, base, contacts, half_width_, pairs, flanks);
+    meeting.patch = solvers::condense_blade(*body.body, base, contacts, half_width_, pairs, flanks, known);
+    known = &meeting.patch;
     if (lips_ == solvers::LipCondition::open || body.pairs.empty())
       break;
     const solvers::BladeState state = solvers::push_blade(meeting.patch, advances(meeting, body, way_.back()));
@@ -323,12 +353,15 @@ double BladeForce::travel(std::size_t from, std::size_t to) const {
   return sum / static_cast<double>(edge_.size());
 }
 
-// Poses after way_[front] up to the place from which the blade has `remaining` m to go; that becomes a pose of way_.
-std::vector<topology::BladePose> BladeForce::poses_up_to(std::size_t front, double remaining) {
-  std::size_t leg = way_.size() - 1;
-  while (leg > front && remaining > 0) {
+// Poses after way_[front] up to the place from which there are `remaining` m to way_[last]; that becomes a pose of
+// way_.
+std::vector<topology::BladePose> BladeForce::poses_up_to(std::size_t front, std::size_t last, double remaining) {
+  std::size_t leg = last;
+  while (leg > front) {
     const double length = travel(leg - 1, leg);
-    if (remaining < (1 - 1e-6) * length) {
+    if (remaining <= same_pose * length)
+      break;
+    if (remaining < (1 - same_pose) * length) {
       const topology::BladePose stop = pose_between(way_[leg - 1], way_[leg], 1 - remaining / length);
       way_.insert(way_.begin() + static_cast<std::ptrdiff_t>(leg), stop);
       break;
@@ -342,13 +375,22 @@ std::vector<topology::BladePose> BladeForce::poses_up_to(std::size_t front, doub
 std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
   if (meeting_.pieces.empty() || way_.size() < 2)
     return {};
-  const std::size_t last = way_.size() - 1;
+  // Where the edge is pressed most of what lies ahead of it: that is its pose, or a place before it comes out.
+  std::size_t last = 0;
+  solvers::BladeState coming;
+  BladeReport pressed;
+  for (const std::size_t stop : stops()) {
+    solvers::BladeState there =
+        solvers::push_blade(meeting_.patch, advances(meeting_, now, way_[stop]), meeting_.patch.dragged ? 1 : 0);
+    if (const BladeReport report = report_of(there); last == 0 || report.release > pressed.release) {
+      last = stop;
+      coming = std::move(there);
+      pressed = report;
+    }
+  }
   const double way = travel(0, last);
   if (proposal_ && way < longer_proposal * proposal_->way)
     return {};
-  const solvers::BladeState coming =
-      solvers::push_blade(meeting_.patch, advances(meeting_, now, way_.back()), meeting_.patch.dragged ? 1 : 0);
-  const BladeReport pressed = report_of(coming);
   if (!(pressed.release > needed()))
     return {};
   const double share = needed() / pressed.release; // of its advance that the edge can keep
@@ -364,7 +406,60 @@ std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
     remaining = (1 - first_trigger * share) * std::min(pressed.advance, way);
   }
   const std::size_t front = proposal_ ? proposal_->poses : 0;
-  return near && remaining < travel(front, last) ? poses_up_to(front, remaining) : std::vector<topology::BladePose>{};
+  if (!near || front >= last || !(remaining < travel(front, last)))
+    return {};
+  return poses_up_to(front, last, remaining);
+}
+
+// Poses on the way that the blade has still to go, not too near to each other; the last is among them.
+std::vector<std::size_t> BladeForce::stops() const {
+  std::vector<std::size_t> stops;
+  const std::size_t last = way_.size() - 1;
+  std::size_t next = last;
+  while (next > 0 && way_[next - 1].time > at_.time)
+    --next;
+  topology::BladePose from = at_;
+  for (; next < last; ++next)
+    if (edge_travel(settings_.edge, from, way_[next]) > stop_distance * spacing_) {
+      stops.push_back(next);
+      from = way_[next];
+    }
+  stops.push_back(last);
+  return stops;
+}
+
+bool BladeForce::is_past_due(const VectorX& advance) const {
+  const solvers::BladeState state = solvers::push_blade(meeting_.patch, advance, meeting_.patch.dragged ? 1 : 0);
+  return !first_cut(state) && report_of(state).release > needed();
+}
+
+bool BladeForce::is_overdue(const BodyModel& now) const {
+  if (proposal_ || !state_)
+    return false;
+  const std::vector<std::size_t> ahead = stops();
+  return std::any_of(ahead.begin(), ahead.end(),
+                     [&](std::size_t stop) { return is_past_due(advances(meeting_, now, way_[stop])); });
+}
+
+void BladeForce::wait(const BodyModel& now) {
+  if (!state_) {
+    advance(now);
+    return;
+  }
+  for (const std::size_t stop : stops()) {
+    const VectorX start = state_->advance, end = advances(meeting_, now, way_[stop]);
+    if (!is_past_due(end)) {
+      stroke(now, way_[stop], 1);
+      continue;
+    }
+    double low = 0, high = 1;
+    for (int k = 0; k < wait_steps; ++k) {
+      const double middle = 0.5 * (low + high);
+      (is_past_due(start + middle * (end - start)) ? high : low) = middle;
+    }
+    stroke(now, way_[stop], low);
+    return;
+  }
 }
 
 // Where the edge stands; the same everywhere without layers.
@@ -394,42 +489,52 @@ void BladeForce::propose(BodyModel body, std::size_t poses, double drawn) {
   next.poses = poses + (proposal_ ? proposal_->poses : 0);
   next.body = std::move(body);
   proposal_ = std::move(next);
-  proposal_->meeting = meet(proposal_->body, proposal_->poses);
+  proposal_->meeting = meet(proposal_->body, proposal_->poses, {});
 }
 
 void BladeForce::pass(std::size_t poses, const BodyModel& now) {
   way_.erase(way_.begin(), way_.begin() + static_cast<std::ptrdiff_t>(poses));
-  meeting_ = meet(now, 0);
+  meeting_ = meet(now, 0, meeting_);
   press(now);
 }
 
 bool BladeForce::advance(const BodyModel& now) {
-  const topology::BladePose target = way_.back();
   if (!state_) {
-    at_ = target;
+    at_ = way_.back();
     press(now);
     if (state_)
       ledger_.stored = state_->stored;
     return false;
   }
   const double friction = meeting_.patch.dragged ? 1 : 0;
-  std::optional<double> share;
-  if (proposal_ && !proposal_->meeting.pieces.empty())
-    share = solvers::cutting_share(
-        meeting_.patch, {state_->advance, advances(meeting_, now, target)}, proposal_->meeting.patch,
-        {advances(proposal_->meeting, proposal_->body, at_), advances(proposal_->meeting, proposal_->body, target)},
-        needed_for_proposal(), friction);
+  for (const std::size_t stop : stops()) {
+    const topology::BladePose target = way_[stop];
+    std::optional<double> share;
+    if (proposal_ && !proposal_->meeting.pieces.empty())
+      share = solvers::cutting_share(
+          meeting_.patch, {state_->advance, advances(meeting_, now, target)}, proposal_->meeting.patch,
+          {advances(proposal_->meeting, proposal_->body, at_), advances(proposal_->meeting, proposal_->body, target)},
+          needed_for_proposal(), friction);
+    stroke(now, target, share.value_or(1));
+    if (share)
+      return true;
+  }
+  return false;
+}
+
+// A share of the blade's motion to a pose, straight.
+void BladeForce::stroke(const BodyModel& now, const topology::BladePose& target, double share) {
   const topology::BladePose from = at_;
   const VectorX start = state_->advance, end = advances(meeting_, now, target);
-  const double reached = share.value_or(1), slide = (target.position - from.position).norm();
+  const double slide = (target.position - from.position).norm();
   for (int k = 1; k <= stroke_parts; ++k) {
-    const double part = reached * k / stroke_parts;
-    const solvers::BladeState next = solvers::push_blade(meeting_.patch, start + part * (end - start), friction);
-    ledger_.move(meeting_.patch, *state_, next, slide * reached / stroke_parts);
+    const double part = share * k / stroke_parts;
+    const solvers::BladeState next =
+        solvers::push_blade(meeting_.patch, start + part * (end - start), meeting_.patch.dragged ? 1 : 0);
+    ledger_.move(meeting_.patch, *state_, next, slide * share / stroke_parts);
     state_ = next;
   }
-  at_ = share ? pose_between(from, target, *share) : target;
-  return share.has_value();
+  at_ = share < 1 ? pose_between(from, target, share) : target;
 }
 
 BodyModel BladeForce::take() {

@@ -63,6 +63,8 @@ class BladeForce {
   /// The body with the way cut through these poses. `drawn`, J: what loads other than the blade release by that cut;
   /// the edge has the rest to pay.
   void propose(BodyModel body, std::size_t poses, double drawn = 0);
+  /// Nothing is proposed any more.
+  void withdraw() { proposal_.reset(); }
   /// Energy of the surface that the proposal makes, J.
   [[nodiscard]] double proposed_surface() const;
   /// The cut has grown otherwise: the blade meets the body `now`, and nothing is proposed. Poses of its way that lie in
@@ -71,6 +73,13 @@ class BladeForce {
   /// There was nothing to cut through these poses, or it cannot be: the front goes on without a cut.
   void pass(std::size_t poses, const BodyModel& now);
   [[nodiscard]] bool proposed() const { return proposal_.has_value(); }
+  /// Whether the edge, with nothing proposed, would be pushed past the force of steady cutting on its way to its pose.
+  /// Not of a first cut, which takes more.
+  [[nodiscard]] bool is_overdue(const BodyModel& now) const;
+  /// Moves the blade on while its next cut is being made: as far as that force, or to its pose.
+  void wait(const BodyModel& now);
+  /// m, from the front of the cut to the blade's pose; 0: it has been nowhere.
+  [[nodiscard]] double way_left() const { return way_.empty() ? 0 : travel(0, way_.size() - 1); }
 
   /// Moves the blade on until the proposal is due (true) or it has reached its pose.
   bool advance(const BodyModel& now);
@@ -92,10 +101,16 @@ class BladeForce {
   struct Meeting {
     std::vector<int> pieces; // of the edge, one a contact
     solvers::BladePatch patch;
-    int on_surface = 0; // contacts where nothing is cut yet
-    std::vector<char> surface;
-    double area = 0;         // m2 cut
-    bool drawn_back = false; // the blade goes back: its flanks drag the other way
+    std::vector<char> surface; // contacts where nothing is cut yet
+    double area = 0;           // m2 cut
+    bool drawn_back = false;   // the blade goes back: its flanks drag the other way
+    // The body, whose patch serves for the next meeting as well.
+    const solvers::Discretisation* body = nullptr;
+    std::shared_ptr<const topology::Incision> incision;
+    std::vector<Vector3> nodes; // m
+    [[nodiscard]] bool is_with(const BodyModel& model) const {
+      return body == model.body.get() && incision == model.incision && nodes == model.sprinkling.nodes.positions;
+    }
   };
   struct Proposal {
     BodyModel body;
@@ -105,7 +120,7 @@ class BladeForce {
     double drawn = 0; // J, released by other loads
   };
 
-  [[nodiscard]] Meeting meet(const BodyModel& body, std::size_t front) const;
+  [[nodiscard]] Meeting meet(const BodyModel& body, std::size_t front, const Meeting& last) const;
   void add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
                    Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const;
   [[nodiscard]] VectorX advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const;
@@ -116,8 +131,11 @@ class BladeForce {
   [[nodiscard]] double needed_for_proposal() const;                                            // J
   void pass_open_cut(const BodyModel& now);
   [[nodiscard]] bool first_cut(const solvers::BladeState& state) const;
+  [[nodiscard]] bool is_past_due(const VectorX& advance) const;
+  void stroke(const BodyModel& now, const topology::BladePose& target, double share);
   [[nodiscard]] double travel(std::size_t from, std::size_t to) const;
-  [[nodiscard]] std::vector<topology::BladePose> poses_up_to(std::size_t front, double remaining);
+  [[nodiscard]] std::vector<topology::BladePose> poses_up_to(std::size_t front, std::size_t last, double remaining);
+  [[nodiscard]] std::vector<std::size_t> stops() const;
   [[nodiscard]] BladeReport report_of(const solvers::BladeState& state) const;
   void press(const BodyModel& now);
 

@@ -126,17 +126,20 @@ class Session {
   /// so are those that follow a cut which was put off (blade.advance), or which the blade has left off at rest. It
   /// takes over at swap_body(), or, after waiting for it, once the contact has left the fine zone that it would
   /// replace, or the blade has gone most_advances times blade.advance since; until then cut and wound are those of the
-  /// body. When it begins, and what it becomes, depends on the steps alone.
+  /// body. When it begins, and what it becomes, depends on the steps alone. So is what a blade that the tissue resists
+  /// proposes to cut, for which it is waited when the blade leaves the body, too.
   void set_following_aside(bool on);
 
   /// Whether a cut is put off that the next step would have made if the blade rested.
   [[nodiscard]] bool has_put_off() const { return put_off_ > 0 && follows_cuts_aside() && !cuts_aside(); }
 
   /// Whether the blade has gone where the body has not followed it yet.
-  [[nodiscard]] bool lags_behind_blade() const { return put_off_ > 0 || cuts_aside(); }
+  [[nodiscard]] bool lags_behind_blade() const {
+    return put_off_ > 0 || cuts_aside() || (proposing_ && blade_force_->is_overdue(model_));
+  }
 
   /// Whether a body is under way beside the steps; and whether it is there and has followed all that was cut meanwhile.
-  [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr || following_; }
+  [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr || following_ || proposing_; }
   [[nodiscard]] bool recondensed() const;
   /// Takes it over, after waiting for it where need be; the next step solves with it. False: there is none, or it could
   /// not follow. Throws what making nodes and body anew throws.
@@ -218,6 +221,9 @@ class Session {
   [[nodiscard]] bool ends(const StepSample& sample) const { return !goes_on_ && sample.time == steps_.back().time; }
   [[nodiscard]] bool may_cut_aside(const StepSample& sample) const;
   [[nodiscard]] bool cuts_aside() const { return following_ && !following_->centre; }
+  struct MadeAside;
+  [[nodiscard]] std::future<MadeAside> make_beside(std::shared_ptr<const topology::Incision> incision,
+                                                   const char* reason);
   void begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report);
   void take_following();
   void take_cut();
@@ -227,7 +233,12 @@ class Session {
   [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
   void make_blade_force();
   [[nodiscard]] bool blade_enters(const StepSample& sample) const;
+  [[nodiscard]] bool proposes_aside() const;
   double press_blade(const StepSample& sample, CutReport& report);
+  double cut_on(const StepSample& sample, bool aside, CutReport& report);
+  bool sweep_proposal(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
+  bool begin_proposal(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
+  void take_proposal(const StepSample& sample, CutReport& report);
   [[nodiscard]] std::optional<BodyModel> propose_cut(const std::vector<topology::BladePose>& poses,
                                                      const StepSample& sample, CutReport& report);
   void check_pieces(double time);
@@ -269,6 +280,15 @@ class Session {
     std::optional<topology::SurfaceContact> centre; // of its fine zone; empty: it follows a cut
     double time = 0;                                // s, of the step that made the cut
     int triangles = 0;                              // of the cut
+    std::future<MadeAside> made;
+  };
+  /// What a blade that is resisted will cut next.
+  struct Proposing {
+    std::size_t poses = 0;
+    double time = 0;      // s, of the step that began it
+    double way_left = 0;  // m, of the blade then
+    int triangles = 0;    // of the cut
+    bool arrived = false; // it is to be taken by the next step
     std::future<MadeAside> made;
   };
   /// Tissue in a grasper's jaws.
@@ -344,6 +364,7 @@ class Session {
   std::optional<CutReport> aside_cut_; // whose body has taken over since the last step, or which was refused
   std::future<MadeAside> unwanted_;    // one that nobody will take
   std::optional<Following> following_; // empty: none; its thread uses the above
+  std::optional<Proposing> proposing_; // the same
 };
 
 } // namespace spherecut::app

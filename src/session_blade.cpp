@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <stdexcept>
+#include <utility>
 
 namespace spherecut::app {
 
@@ -46,8 +48,11 @@ bool Session::blade_enters(const StepSample& sample) const {
   return blade_force_ != nullptr && sample.blade && blade_force_->inside(*sample.blade, model_);
 }
 
-// The proposal is not taken any more.
+// The proposal is not taken any more, and none that is under way.
 void Session::drop_blade_proposal() {
+  if (proposing_)
+    unwanted_ = std::move(proposing_->made);
+  proposing_.reset();
   if (mark_)
     incisions_->go_back(*mark_);
   mark_.reset();
@@ -73,11 +78,25 @@ double Session::drawn_open(const BodyModel& model, const topology::Incision& aft
   return weights > 0 ? release / weights * std::max(0.0, after.area() - model.incision->area()) : 0;
 }
 
-// A cut is built when it comes near, beside the body, and the body becomes it when it is due. The energy of the
-// surface that it makes, J.
+// Where nothing but the blade changes the tissue.
+bool Session::proposes_aside() const {
+  return following_aside_ && blade_force_ != nullptr && !scenario_.blade->advance && !tears() &&
+         !(scenario_.tool && scenario_.tool->grasp);
+}
+
+// The energy of the surface that the blade makes on its way to the sample's pose, J.
 double Session::press_blade(const StepSample& sample, CutReport& report) {
   const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
   const bool placed = blade_force_->has_place();
+  double surface = 0;
+  if (proposes_aside() && placed) {
+    const bool leaves = !blade_force_->inside(*sample.blade, model_);
+    const double far = most_advances * aside_advance * zone_.spacing.fine;
+    if (proposing_ && (proposing_->arrived || leaves || blade_force_->way_left() - proposing_->way_left > far))
+      take_proposal(sample, report);
+    if (leaves && (blade_force_->proposed() || blade_force_->is_overdue(model_))) // what it has come to is cut before
+      surface += cut_on(sample, false, report);
+  }
   blade_force_->go_to(*sample.blade, model_);
   if (!blade_force_->inside(*sample.blade, model_)) {
     if (const double uncut = blade_force_->passed_uncut(model_); uncut > 0)
@@ -91,28 +110,54 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
     blade_force_->leave();
     drop_blade_proposal();
     incisions_->place(*sample.blade, to_rest);
-    return 0;
+    return surface;
   }
   if (!placed)
     incisions_->place(*sample.blade, to_rest);
-  int triangles = 0;
+  return surface + cut_on(sample, proposes_aside(), report);
+}
+
+// A cut is built when it comes near, beside the body, and the body becomes it when it is due. Where it is built beside
+// the steps the blade waits at the force of steady cutting: what it does is then what it would have done, only later.
+// The energy of the surface, J.
+double Session::cut_on(const StepSample& sample, bool aside, CutReport& report) {
+  const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
+  int triangles = report.triangles;
   double surface = 0;
+  bool waits = false; // what takes a body over leaves the next one to the next step
   for (;;) {
-    if (const std::vector<topology::BladePose> poses = blade_force_->wanted(model_); !poses.empty()) {
+    waits = waits || proposing_;
+    if (const std::vector<topology::BladePose> poses =
+            waits ? std::vector<topology::BladePose>{} : blade_force_->wanted(model_);
+        !poses.empty()) {
       if (!mark_) {
         mark_ = incisions_->mark();
         shown_wound_ = incisions_->wound();
       }
-      if (std::optional<BodyModel> next = propose_cut(poses, sample, report)) {
+      if (aside && blade_force_->proposed()) { // a longer cut in its place
+        blade_force_->withdraw();
+        incisions_->go_back(*mark_);
+        continue;
+      }
+      std::optional<BodyModel> next;
+      if (aside)
+        begin_proposal(poses, sample, report);
+      else
+        next = propose_cut(poses, sample, report);
+      if (next) {
         triangles += report.triangles;
         const double drawn = drawn_open(model_, *next->incision);
         blade_force_->propose(std::move(*next), poses.size(), drawn);
-      } else if (!blade_force_->proposed()) {
+      } else if (!blade_force_->proposed() && !proposing_) {
         mark_.reset();
         shown_wound_.reset();
         blade_force_->pass(poses.size(), model_);
         continue;
       }
+    }
+    if ((waits || proposing_) && !blade_force_->proposed()) {
+      blade_force_->wait(model_);
+      break;
     }
     if (!blade_force_->advance(model_))
       break;
@@ -121,63 +166,119 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
     lead_recondensing(sample, to_rest);
     mark_.reset();
     shown_wound_.reset();
+    waits = aside;
   }
   report.triangles = triangles;
   return surface;
+}
+
+// The incision with what the blade cuts through these poses; false: that is nothing, and it is as it was.
+bool Session::sweep_proposal(const std::vector<topology::BladePose>& poses, const StepSample& sample,
+                             CutReport& report) {
+  const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
+  const IncisionBuilder::Mark before = incisions_->mark();
+  topology::SweepResult swept;
+  report.triangles = 0;
+  {
+    const StageTimer timer(report.seconds.topology);
+    for (std::size_t k = 0; k + 1 < poses.size(); ++k)
+      incisions_->put_off(poses[k]); // a step has many where solves are many
+    swept = incisions_->move_to(poses.back(), to_rest);
+    report.triangles = swept.triangles;
+  }
+  if (report.triangles == 0) {
+    report.reason = swept.refused;
+    if (blade_force_->proposed()) // these poses are asked for again, with those after them
+      incisions_->go_back(before);
+    return false;
+  }
+  require_clear_of_tool(*incisions_->incision(), model_, scenario_.contact.condition);
+  check_pieces(sample.time);
+  if (hand_led_)
+    zone_.spacing.segments = solvers::front_segments(*incisions_->incision(), zone_.spacing.fine);
+  const StageTimer timer(report.seconds.level_sets);
+  incisions_->update_fields();
+  return true;
 }
 
 // The body with the cut that the blade makes through these poses, built and solved; none when it cuts nothing or is
 // refused, and then incision and wound are as they were.
 std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladePose>& poses, const StepSample& sample,
                                               CutReport& report) {
-  const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
   const IncisionBuilder::Mark before = incisions_->mark();
   const BodyUpdate last = report; // by an earlier cut of the same step
+  const auto refuse = [&](const char* why) {
+    refuse_cut(sample.time, why, report);
+    report.update = last.update;
+    report.update_reason = last.update_reason;
+    report.nodes = last.nodes;
+    report.kept_nodes = last.kept_nodes;
+    incisions_->go_back(before);
+    return std::nullopt;
+  };
   try {
-    topology::SweepResult swept;
-    report.triangles = 0;
-    {
-      const StageTimer timer(report.seconds.topology);
-      for (const topology::BladePose& pose : poses) {
-        swept = incisions_->move_to(pose, to_rest);
-        report.triangles += swept.triangles;
-      }
-    }
-    if (report.triangles == 0) {
-      report.reason = swept.refused;
-      if (blade_force_->proposed()) // these poses are asked for again, with those after them
-        incisions_->go_back(before);
+    if (!sweep_proposal(poses, sample, report))
       return std::nullopt;
-    }
     BodyModel next;
     next.incision = incisions_->incision();
-    require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
-    check_pieces(sample.time);
-    if (hand_led_)
-      zone_.spacing.segments = solvers::front_segments(*next.incision, zone_.spacing.fine);
-    {
-      const StageTimer timer(report.seconds.level_sets);
-      incisions_->update_fields();
-    }
     rebuild_ = Rebuild::in_step;
+    const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
     build_cut({.way_ahead = [&] { return way_of_blade(sample, to_rest); }, .beside = true}, next, report);
     const StageTimer timer(report.seconds.solve);
     solve(sample, next);
     return next;
   } catch (const InputError& error) {
-    report.reason = error.what();
+    return refuse(error.what());
   } catch (const NumericalError& error) {
-    report.reason = error.what();
+    return refuse(error.what());
   }
-  report.triangles = 0;
-  report.refused = true;
-  report.update = last.update;
-  report.update_reason = last.update_reason;
-  report.nodes = last.nodes;
-  report.kept_nodes = last.kept_nodes;
-  warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", sample.time, report.reason));
-  incisions_->go_back(before);
-  return std::nullopt;
+}
+
+// The same, built beside the steps; false where it is not.
+bool Session::begin_proposal(const std::vector<topology::BladePose>& poses, const StepSample& sample,
+                             CutReport& report) {
+  try {
+    if (!sweep_proposal(poses, sample, report))
+      return false;
+    proposing_ = Proposing{poses.size(),
+                           sample.time,
+                           blade_force_->way_left(),
+                           std::exchange(report.triangles, 0),
+                           false,
+                           make_beside(incisions_->incision(), "the blade is resisted")};
+    return true;
+  } catch (const InputError& error) {
+    refuse_cut(sample.time, error.what(), report);
+  } catch (const NumericalError& error) {
+    refuse_cut(sample.time, error.what(), report);
+  }
+  incisions_->go_back(*mark_);
+  return false;
+}
+
+// It is solved and becomes the blade's; where it could not be made its way is passed without a cut.
+void Session::take_proposal(const StepSample& sample, CutReport& report) {
+  Proposing made = std::move(*proposing_);
+  proposing_.reset();
+  rebuild_ = made.arrived ? Rebuild::aside : Rebuild::in_step;
+  try {
+    MadeAside aside = made.made.get();
+    static_cast<BodyUpdate&>(report) = std::move(aside.report);
+    report.update = SystemUpdate::taken_over;
+    report.triangles += made.triangles;
+    profile_.sprinkle += report.seconds.sprinkling;
+    profile_.discretise += report.seconds.assembly + report.seconds.visibility;
+    profile_.condense += report.seconds.solve;
+    const StageTimer timer(report.seconds.solve);
+    solve(sample, aside.model);
+    blade_force_->propose(std::move(aside.model), made.poses);
+  } catch (const std::runtime_error& error) {
+    refuse_cut(made.time, error.what(), report);
+    incisions_->go_back(*mark_);
+    mark_.reset();
+    shown_wound_.reset();
+    blade_force_->pass(made.poses, model_);
+  }
 }
 
 } // namespace spherecut::app

@@ -26,6 +26,8 @@ void Session::set_following_aside(bool on) {
     return;
   if (cuts_aside())
     take_cut();
+  if (proposing_)
+    drop_blade_proposal();
   drop_following();
 }
 
@@ -83,8 +85,9 @@ bool Session::may_cut_aside(const StepSample& sample) const {
   return follows_cuts_aside() && model_.state && !ends(sample);
 }
 
-// On the nodes that a step would have made, rebuilt: no window pays that serves one increment.
-void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report) {
+// The body with this cut, on the nodes that a step would have made, rebuilt: no window pays that serves one increment.
+std::future<Session::MadeAside> Session::make_beside(std::shared_ptr<const topology::Incision> incision,
+                                                     const char* reason) {
   BodyModel next;
   next.incision = std::move(incision);
   const bool touches = tool_in_reach();
@@ -93,9 +96,9 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
           ? "the spacing has changed"
           : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
   auto make = [&scenario = scenario_, domain = organ_.domain, how = sprinkle_options(next),
-               incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, coarseness = coarseness_,
-               centre = touches ? zone_contact_ : std::nullopt, reach = zone_.candidate_radius,
-               waits_for = std::move(unwanted_)]() mutable {
+               incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, reason,
+               coarseness = coarseness_, centre = touches ? zone_contact_ : std::nullopt,
+               reach = zone_.candidate_radius, waits_for = std::move(unwanted_)]() mutable {
     yield_to_steps();
     if (waits_for.valid())
       waits_for.wait();
@@ -131,7 +134,7 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
     if (renewed.empty())
       try {
         build([&] { exchange_nodes(*domain, how, before, model.sprinkling); });
-        update.update_reason = "the cut was put off";
+        update.update_reason = reason;
       } catch (const std::runtime_error& error) { // with all nodes made anew it may go
         update.update_reason = error.what();
         model.body.reset();
@@ -142,8 +145,12 @@ void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, 
     update.seconds.solve += condensing;
     return made;
   };
+  return std::async(std::launch::async, std::move(make));
+}
+
+void Session::begin_cutting(std::shared_ptr<const topology::Incision> incision, double time, CutReport& report) {
   following_ = Following{std::nullopt, time, std::exchange(report.triangles, 0),
-                         std::async(std::launch::async, std::move(make))};
+                         make_beside(std::move(incision), "the cut was put off")};
 }
 
 // Waits for it where need be. A failure leaves the body as it is: of a cut, that is refused; else it throws.

@@ -60,7 +60,7 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
                            StepResult& result) {
   if (recondensing_ != nullptr || model_.coarseness != coarseness_ || !result.cut || tears())
     return;
-  if (follows_cuts_aside()) // rebuilt: they need no window
+  if (follows_cuts_aside() || blade_force_ != nullptr) // rebuilt: they need no window
     return;
   const double fine = zone_.spacing.fine;
   const auto to_rest = [this](const Vector3& x) { return rest_position(x); };
@@ -146,14 +146,24 @@ bool Session::take_recondensed(BodyModel& into, solvers::ContactPatch& patch) {
 }
 
 bool Session::recondensed() const {
-  return following_ ? following_->made.wait_for(std::chrono::seconds(0)) == std::future_status::ready
-                    : recondensing_ != nullptr && recondensing_->ready();
+  const auto is_there = [](const std::future<MadeAside>& made) {
+    return made.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  };
+  if (following_)
+    return is_there(following_->made);
+  if (proposing_)
+    return is_there(proposing_->made);
+  return recondensing_ != nullptr && recondensing_->ready();
 }
 
 bool Session::swap_body() {
   if (following_) {
     take_following();
     return !(aside_cut_ && aside_cut_->refused);
+  }
+  if (proposing_) { // becomes the blade's once a step has solved it
+    proposing_->made.wait();
+    return proposing_->arrived = true;
   }
   if (recondensing_ == nullptr)
     return false;

@@ -20,6 +20,9 @@ namespace spherecut::app {
 namespace {
 
 constexpr long long second = 1'000'000'000; // ns
+// At most so many a second while a body is made beside them, which may have no other core: it is wanted sooner than more
+// solves of the one that is there.
+constexpr int solves_beside = 200;
 
 long long clock_now(clockid_t clock) {
   timespec time{};
@@ -111,7 +114,7 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
   const auto interval = options.most_solves > 0 ? static_cast<long long>(second / options.most_solves) : 0; // ns
   long long next = 0;                                                                                       // solve
   const Session& session = simulation.session();
-  const bool aside = options.follow_aside || (session.scenario().blade && session.blade() == nullptr);
+  const bool aside = options.follow_aside || session.scenario().blade;
   while (!shared.done.load(std::memory_order_acquire)) {
     if (!shared.poses.fetch()) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
@@ -130,7 +133,7 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
       std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(next - began, second / 1000)));
       continue;
     }
-    next = began + interval;
+    next = began + (session.recondensing() ? std::max(interval, second / solves_beside) : interval);
     solved = state;
     const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level(), simulation.recondensed(), aside};
     ContactSnapshot& snapshot = shared.snapshots.back();

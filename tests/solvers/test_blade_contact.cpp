@@ -220,6 +220,26 @@ TEST_CASE("On a body the edge meets what it asks for, and the held surface carri
     const VectorX met = body->pattern_displacements(patterns, {field}).col(0);
     // Symmetrised where the method is not symmetric: to its discretisation error.
     CHECK((met - advance).norm() < (method == Method::galerkin ? 1e-9 : 0.03) * advance.norm());
+    // What another patch of the body knows need not be solved for again, whatever its order.
+    const ForcePattern drag = drag_pattern({{frame.origin - 0.1 * frame.ahead, frame.normal, 0.01}}, 0.1, frame.ahead,
+                                           problem.nodes.spacings.front());
+    const std::vector<EdgeContact> fewer{contacts[2], contacts[0]};
+    const BladePatch fresh = condense_blade(*body, base, fewer, 0.15, {}, drag),
+                     dragged = condense_blade(*body, base, contacts, 0.15, {}, drag);
+    for (const BladePatch* known : {&patch, &dragged, &fresh}) {
+      const BladePatch again = condense_blade(*body, base, fewer, 0.15, {}, drag, known);
+      CHECK((again.compliance - fresh.compliance).norm() < 1e-12 * fresh.compliance.norm());
+      CHECK(again.base == fresh.base);
+      CHECK(again.drag == fresh.drag);
+      for (std::size_t k = 0; k < 3; ++k)
+        CHECK((again.responses[k].coefficients - fresh.responses[k].coefficients).norm() <
+              1e-12 * fresh.responses[k].coefficients.norm());
+    }
+    std::vector<EdgeContact> moved = fewer;
+    moved[0].point += 0.01 * frame.ahead;
+    CHECK((condense_blade(*body, base, moved, 0.15, {}, drag, &fresh).compliance -
+           condense_blade(*body, base, moved, 0.15, {}, drag).compliance)
+              .norm() < 1e-12 * fresh.compliance.norm());
     Vector3 held = Vector3::Zero();
     for (const Vector3& force : body->constraint_forces(field))
       held += force;

@@ -4,6 +4,7 @@
 #include "src/haptics/haptic_tick.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
+#include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -175,4 +176,37 @@ TEST_CASE("With the controller on, a contact stiffer than the device is rendered
   CHECK(run(false, 2000).first == Approx(2000).epsilon(0.02));
   CHECK(run(true, 400).first == Approx(400).epsilon(0.02));
   CHECK(run(true, 400).second == 1);
+}
+
+TEST_CASE("A resisted blade that is solved at even steps cuts what a run does, and nothing is refused") {
+  const std::string text = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.45\ntoughness = 10") +
+                           R"([cut]
+front_spacing = 0.005
+[blade]
+edge = [[0, -0.04, 0], [0, 0.04, 0]]
+step = 0.02
+[[blade.path]]
+time = 0
+position = [0.0021, 0, 0.033]
+[[blade.path]]
+time = 0.4
+position = [0.0021, 0, 0.013]
+)";
+  const Scenario scenario = spherecut::tests::scenario_of(
+      replaced(text, "fine_spacing = 0.005\ncoarse_spacing = 0.012", "random_seed = 7\ncoarse_spacing = 0.012"));
+  Session off_line(scenario);
+  const double area = spherecut::tests::run(off_line).back().cut->area;
+  REQUIRE(area > 9e-4);
+  const std::uint64_t period = GENERATE(10, 3);
+  HapticSimulation simulation(scenario);
+  ScriptedPath device(simulation.path(), 1000);
+  ContactSnapshot snapshot;
+  simulation.prepare(device.read(0));
+  for (std::uint64_t tick = 0; tick <= 450; tick += period) { // the last at rest
+    simulation.solve(device.read(std::min<std::uint64_t>(tick, 400)), 0, snapshot);
+    CHECK_FALSE(simulation.result().cut->refused);
+    if (tick > 400) // it is not left standing before a cut that it does not take
+      CHECK(snapshot.blade.edge < 1.5 * 10 * 0.06);
+  }
+  CHECK(simulation.result().cut->area == Approx(area).epsilon(0.02));
 }

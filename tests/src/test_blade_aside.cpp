@@ -1,0 +1,131 @@
+// What a blade that the tissue resists proposes to cut, made beside the steps.
+#include "tests/src/scenario_session.hpp"
+#include "tests/src/scenario_text.hpp"
+#include "tests/src/virtual_session.hpp"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+
+namespace {
+
+constexpr double toughness = 10; // J/m2
+
+// An upright edge, 12 mm of it in the tissue, that goes through a corner of a block of 60 mm: 20 mm of way in 0.25 s. The
+// last of the corner bends away.
+const std::string through_a_corner = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
+                                     R"([blade]
+edge = [[0, 0, 0], [0, 0, 0.016]]
+step = 0.01
+[[blade.path]]
+time = 0
+position = [0.012, -0.034, 0.018]
+[[blade.path]]
+time = 0.4
+position = [0.034, -0.012, 0.018]
+)";
+
+// Steps beside which bodies are made; each is there at the third step after it was begun. `look` sees every step.
+void go(Session& session, const std::function<void(const StepResult&)>& look) {
+  session.set_following_aside(true);
+  int since = 0;
+  for (const StepSample& sample : session.steps()) {
+    since = session.recondensing() ? since + 1 : 0;
+    if (since == 3)
+      session.swap_body();
+    look(session.step(sample));
+  }
+}
+
+} // namespace
+
+TEST_CASE("A resisted blade whose cuts are made beside the steps waits at the force of steady cutting and cuts all") {
+  const Scenario scenario = scenario_of(through_a_corner);
+  Session in_step(scenario);
+  const double area = run(in_step).back().cut->area;
+  REQUIRE(area > 0.75 * 0.012 * 0.0198);
+
+  Session aside(scenario);
+  int waited = 0, taken = 0, in_the_step = 0;
+  double shown = 0, last = 0, force = 0;
+  std::uint64_t hash = 0;
+  StepResult end;
+  go(aside, [&](const StepResult& step) {
+    CHECK_FALSE(step.cut->refused);
+    CHECK(step.cut->area >= last);
+    taken += step.rebuild == Rebuild::aside ? 1 : 0;
+    in_the_step += step.rebuild == Rebuild::in_step ? 1 : 0;
+    if (aside.recondensing() && step.cut->area > 0) { // what is shown and felt is the body that is there
+      ++waited;
+      if (step.cut->area == shown)
+        CHECK(step.cut->surface_hash == hash);
+      shown = step.cut->area;
+      hash = step.cut->surface_hash;
+      CHECK(step.cut->blade.release <= std::max(toughness, force) * (1 + 1e-4)); // it does not rise
+      CHECK(aside.lags_behind_blade() == aside.blade()->is_overdue(aside.model()));
+    }
+    last = step.cut->area;
+    force = step.cut->blade.release;
+    end = step;
+  });
+  CHECK(waited > 5);
+  CHECK(taken > 4);
+  CHECK(in_the_step <= 2); // when it leaves
+  CHECK_FALSE(aside.recondensing());
+  CHECK(end.cut->area == Approx(area).epsilon(0.02));
+  CHECK(end.cut->pieces == 1);
+  const solvers::BladeLedger& ledger = end.cut->blade.ledger;
+  CHECK(ledger.surface == Approx(toughness * end.cut->area).epsilon(1e-9));
+  CHECK(ledger.imbalance() < 0.02);
+  CHECK(end.cut->blade.force.norm() == 0);
+}
+
+TEST_CASE("A session whose resisted blade is followed beside the steps comes out the same twice") {
+  const LoopRecords records = run_twice(scenario_of(through_a_corner), solves_aside(400, 10, 10), 400);
+  CHECK(records.solves.back().cut_area > 1e-4);
+  CHECK(std::count_if(records.solves.begin(), records.solves.end(),
+                      [](const SolveRecord& solve) { return solve.update == "taken over"; }) > 4);
+}
+
+TEST_CASE("A proposal under way is dropped with the blade, or where steps are to make it again") {
+  const Scenario scenario = scenario_of(through_a_corner);
+  const bool is_lifted = GENERATE(true, false);
+  Session session(scenario);
+  session.set_following_aside(true);
+  std::size_t i = 0;
+  double area = 0;
+  for (; i < session.steps().size() && !(session.recondensing() && area > 0); ++i) {
+    if (session.recondensing())
+      session.swap_body();
+    area = session.step(session.steps()[i]).cut->area;
+  }
+  REQUIRE(i < session.steps().size());
+  const std::uint64_t hash = topology::surface_hash(session.wound()->surface);
+  if (is_lifted)
+    session.lift_blade();
+  else
+    session.set_following_aside(false);
+  CHECK_FALSE(session.recondensing());
+  CHECK_FALSE(session.swap_body());
+  CHECK(topology::surface_hash(session.wound()->surface) == hash);
+  CHECK(session.incision()->area() == area);
+  StepResult step;
+  for (; i < session.steps().size(); ++i)
+    step = session.step(session.steps()[i]);
+  CHECK_FALSE(step.cut->refused);
+  if (!is_lifted)
+    CHECK(step.cut->area > 0.75 * 0.012 * 0.0198);
+}
+
+TEST_CASE("With blade.advance = 0 a resisted blade's cuts are made in the steps") {
+  Session session = session_of(replaced(through_a_corner, "step = 0.01", "step = 0.04\nadvance = 0"));
+  int cuts = 0;
+  go(session, [&](const StepResult& step) {
+    CHECK_FALSE(session.recondensing());
+    cuts += step.rebuild == Rebuild::in_step ? 1 : 0;
+  });
+  CHECK(cuts > 2);
+}
