@@ -22,6 +22,7 @@ constexpr double lip_tolerance = 1e-6;  // m
 constexpr double open_reach = 0.3;      // node spacings from a sheet: a place there lies in the cut
 constexpr int way_parts = 32;           // of a motion that is looked at for tissue
 constexpr double same_contact = 1e-4;   // of the node spacing, and of one: what has not moved
+constexpr double in_sheet = 0.1;        // node spacings from a sheet: a place there is in it
 constexpr double least_motion = 1e-3;   // of the node spacing, that tells a direction
 constexpr double same_pose = 1e-6;      // of the way from one pose to the next: no other pose
 constexpr int wait_steps = 20;          // halvings towards the place where a cut is due
@@ -95,6 +96,11 @@ void BladeForce::go_to(const topology::BladePose& pose, const BodyModel& body) {
   if (proposal_)
     proposal_->meeting = meet(proposal_->body, proposal_->poses, proposal_->meeting);
   press(body);
+}
+
+void BladeForce::go_to(std::span<const topology::BladePose> poses, const BodyModel& body) {
+  pass_by(poses.first(poses.size() - 1));
+  go_to(poses.back(), body);
 }
 
 // Where a tear has run ahead of the blade, its edge is in the open cut and meets nothing until it comes to the front.
@@ -193,6 +199,16 @@ void BladeForce::press(const BodyModel& now) {
     state_ = solvers::push_blade(meeting_.patch, advances(meeting_, now, at_), meeting_.patch.dragged ? 1 : 0);
 }
 
+// Whether material that is now at x was at rest on a sheet.
+bool BladeForce::lies_in(const topology::Incision& cut, const topology::RestMap& to_rest, const Vector3& x) const {
+  try {
+    const auto on = cut.closest(to_rest(x), in_sheet * spacing_);
+    return on && !on->on_border;
+  } catch (const NumericalError&) {
+    return false;
+  }
+}
+
 // The edge piece stands against the front, or against the surface where it came in after the front was left behind.
 void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
                              Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const {
@@ -215,12 +231,22 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
     }
     met = pose_between(way_[leg], way_[leg + 1], in);
   }
-  // Solves may come so often that from one pose to the next there is hardly any motion.
-  const Vector3 along = met.orientation * part.along;
-  Vector3 across = Vector3::Zero();
-  for (std::size_t next = leg + 1; next < way_.size() && across.norm() < least_motion * spacing_; ++next) {
-    const Vector3 motion = placed(way_[next], part.point) - placed(way_[leg], part.point);
-    across = motion - motion.dot(along) * along;
+  // Its way from there: to where it is clear of its start and, past a turn, of the cut that is there already, on whose
+  // faces it does not push when it goes back.
+  const Vector3 along = met.orientation * part.along, start = placed(way_[leg], part.point);
+  Vector3 across = Vector3::Zero(), looked_at = start;
+  for (std::size_t next = leg + 1; next < way_.size(); ++next) {
+    const Vector3 x = placed(way_[next], part.point);
+    const Vector3 way = x - start - (x - start).dot(along) * along;
+    if (across.norm() < least_motion * spacing_)
+      across = way;
+    if (way.norm() < least_increment * spacing_ || (x - looked_at).norm() < least_increment * spacing_)
+      continue;
+    looked_at = x;
+    if (on_surface || body.incision == nullptr || !lies_in(*body.incision, to_rest, x)) {
+      across = way;
+      break;
+    }
   }
   if (across.norm() < 1e-6 * spacing_)
     return;

@@ -13,6 +13,7 @@
 
 #include <deque>
 #include <functional>
+#include <span>
 
 namespace spherecut::app {
 
@@ -46,8 +47,11 @@ class BladeForce {
 
   /// Whether it has been anywhere yet.
   [[nodiscard]] bool has_place() const { return !way_.empty(); }
-  /// The blade goes on to a pose. `body` is solved, without blade.
+  /// The blade goes on to a pose, or through several to the last. `body` is solved, without blade.
   void go_to(const topology::BladePose& pose, const BodyModel& body);
+  void go_to(std::span<const topology::BladePose> poses, const BodyModel& body);
+  /// Poses on its way to the next that it goes on to.
+  void pass_by(std::span<const topology::BladePose> poses) { way_.insert(way_.end(), poses.begin(), poses.end()); }
   /// Once its last motion has brought the whole edge out of `body`: how much tissue a piece of the edge has gone
   /// through and not cut on it, m; 0: none, or it was drawn back.
   [[nodiscard]] double passed_uncut(const BodyModel& body) const;
@@ -120,6 +124,7 @@ class BladeForce {
     double drawn = 0; // J, released by other loads
   };
 
+  [[nodiscard]] bool lies_in(const topology::Incision& cut, const topology::RestMap& to_rest, const Vector3& x) const;
   [[nodiscard]] Meeting meet(const BodyModel& body, std::size_t front, const Meeting& last) const;
   void add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
                    Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const;

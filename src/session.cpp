@@ -199,6 +199,7 @@ StepResult Session::step(const StepSample& sample) {
   }
   result.resprinkled = result.resprinkled || std::exchange(followed_aside_, false);
   result.rebuild = std::exchange(rebuild_, Rebuild::none);
+  passed_.clear();
   if (result.cut)
     report_cut(*result.cut);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -288,7 +289,7 @@ solvers::SprinkleOptions Session::sprinkle_options(const BodyModel& model) const
     options.seeds = grasp_->nodes;
   else if (zone_contact_)
     options.seeds = contact_seeds(scenario_, *organ_.domain, *zone_contact_, zone_.spacing.fine);
-  if (scenario_.tool && scenario_.tool->grasp && model.incision != nullptr)
+  if (model.incision != nullptr) // nodes on it belong to one of its faces
     std::erase_if(options.seeds, [&](const solvers::SeedNode& seed) {
       return model.incision->closest(seed.position, crowded_by_sheet * zone_.spacing.fine).has_value();
     });

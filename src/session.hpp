@@ -86,6 +86,12 @@ class Session {
   /// contact need not. `sample`: where the tool is. Does nothing when nothing ever touches or cuts.
   void prepare(const StepSample& sample);
 
+  /// Poses that the blade has passed since the last step, in order, before the one of the next: its way leads through
+  /// them.
+  void pass_blade(std::vector<topology::BladePose> poses) { passed_ = std::move(poses); }
+  /// Where it was in the last step that had one.
+  [[nodiscard]] const std::optional<topology::BladePose>& last_blade() const { return last_blade_; }
+
   /// The blade leaves the tissue where it is, and the next step that has one only places it: its way does not cut in
   /// between. From now on its way is not taken to be the scenario's: nodes are fine at the front of the cut.
   void lift_blade();
@@ -335,6 +341,7 @@ class Session {
   std::optional<topology::SurfaceContact> last_contact_;
   double put_off_ = 0;                            // m the edge has gone since the body last followed its cut
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
+  std::vector<topology::BladePose> passed_;       // since then
   double blade_moved_ = 0;                        // s, when it last did
   bool blade_rests_ = true;                       // or there is none
   bool blade_lifted_ = false;                     // its next pose places it

@@ -89,12 +89,20 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
   const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
   const bool placed = blade_force_->has_place();
   double surface = 0;
-  if (proposes_aside() && placed) {
+  if (placed) {
     const bool leaves = !blade_force_->inside(*sample.blade, model_);
+    while (leaves && !passed_.empty() && !blade_force_->inside(passed_.back(), model_))
+      passed_.pop_back();
+    const bool goes_on = leaves && !passed_.empty(); // before it leaves
+    if (goes_on)
+      blade_force_->go_to(passed_, model_);
+    else
+      blade_force_->pass_by(passed_);
     const double far = most_advances * aside_advance * zone_.spacing.fine;
     if (proposing_ && (proposing_->arrived || leaves || blade_force_->way_left() - proposing_->way_left > far))
       take_proposal(sample, report);
-    if (leaves && (blade_force_->proposed() || blade_force_->is_overdue(model_))) // what it has come to is cut before
+    const bool lags = proposes_aside() && (blade_force_->proposed() || blade_force_->is_overdue(model_));
+    if (goes_on || (leaves && lags)) // what it has come to is cut before
       surface += cut_on(sample, false, report);
   }
   blade_force_->go_to(*sample.blade, model_);

@@ -158,12 +158,22 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
     if (!sample.blade)
       return solved;
   }
+  double way = 0;
+  if (last_blade_ && !blade_lifted_) {
+    topology::BladePose from = *last_blade_;
+    for (const topology::BladePose& pose : passed_) {
+      way += edge_travel(scenario_.blade->edge, from, pose);
+      incisions_->put_off(pose);
+      from = pose;
+    }
+    way += edge_travel(scenario_.blade->edge, from, *sample.blade);
+  }
   if (last_blade_ && !blade_lifted_ && !ends(sample)) {
     const bool leaves_off = follows_cuts_aside() && blade_rests_ && put_off_ > 0;
     if (follows_cuts_aside() && !leaves_off && blade_moved_ != sample.time) // it is where it was
       return solved;
     if (advance() > 0) {
-      put_off_ += edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade);
+      put_off_ += way;
       topology::RestMap to_rest;
       if (model_.state)
         to_rest = [this](const Vector3& x) { return rest_position(x); };

@@ -20,8 +20,8 @@ namespace spherecut::app {
 namespace {
 
 constexpr long long second = 1'000'000'000; // ns
-// At most so many a second while a body is made beside them, which may have no other core: it is wanted sooner than more
-// solves of the one that is there.
+// At most so many a second while a body is made beside them, which may have no other core: it is wanted sooner than
+// more solves of the one that is there.
 constexpr int solves_beside = 200;
 
 long long clock_now(clockid_t clock) {
@@ -45,8 +45,10 @@ bool ask_for_fifo() {
 constexpr std::size_t solve_slots = 1U << 14U; // waiting for the viewer's thread
 
 struct Shared {
-  explicit Shared(double rate) : ticks(static_cast<std::size_t>(std::ceil(ring_seconds * rate))), solves(solve_slots) {}
+  explicit Shared(double rate)
+      : way(static_cast<std::size_t>(std::ceil(ring_seconds * rate))), ticks(way.slots()), solves(solve_slots) {}
   TripleBuffer<DeviceState> poses;
+  Ring<DeviceState> way; // the same, every one of them, written before
   TripleBuffer<ContactSnapshot> snapshots;
   Ring<TickRecord> ticks;   // haptic thread to viewer
   Ring<SolveRecord> solves; // simulation thread to viewer
@@ -80,6 +82,7 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
       began = clock_now(CLOCK_MONOTONIC);
     const long long cpu = clock_now(CLOCK_THREAD_CPUTIME_ID);
     const DeviceState state = tick == 0 ? first : device.read(tick);
+    lost += shared.way.push(state) ? 0 : 1;
     shared.poses.back() = state;
     shared.poses.publish();
     const bool arrives = shared.snapshots.waiting();
@@ -121,6 +124,8 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
       continue;
     }
     const DeviceState state = shared.poses.front();
+    for (; shared.way.waiting() > 0 && shared.way.front().tick < state.tick; shared.way.pop())
+      simulation.pass(shared.way.front());
     if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved) && !simulation.recondensed() &&
         !simulation.has_put_off()) {
       feed.offer_again(simulation);

@@ -23,6 +23,8 @@ class Ring {
     return true;
   }
 
+  [[nodiscard]] std::size_t slots() const noexcept { return slots_.size(); }
+
   /// Reader: how many values wait.
   [[nodiscard]] std::size_t waiting() const noexcept {
     return written_.load(std::memory_order_acquire) - read_.load(std::memory_order_relaxed);

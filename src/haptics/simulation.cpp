@@ -7,9 +7,12 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
+
+constexpr double pass_distance = 0.1; // fine spacings between poses that the blade passes
 
 // FNV-1a over words: equal bits, equal hash.
 class Hash {
@@ -120,8 +123,22 @@ void HapticSimulation::prepare(const DeviceState& device) {
   session_.prepare(sample(device));
 }
 
+void HapticSimulation::pass(const DeviceState& device) {
+  if (!session_.scenario().blade || !last_time_ || device.tick <= last_tick_ ||
+      static_cast<HandMode>(device.mode) != mode_ || !device.position.allFinite() ||
+      !device.orientation.coeffs().allFinite())
+    return;
+  const std::optional<topology::BladePose> pose = sample(device).blade;
+  const std::optional<topology::BladePose> last = passed_.empty() ? session_.last_blade() : passed_.back();
+  if (pose && last && pose->time > last->time &&
+      edge_travel(session_.scenario().blade->edge, *last, *pose) > pass_distance * session_.zone().spacing.fine)
+    passed_.push_back(*pose);
+}
+
 void HapticSimulation::solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot) {
   const auto start = std::chrono::steady_clock::now();
+  std::vector<topology::BladePose> passed = std::exchange(passed_, {});
+  last_tick_ = device.tick;
   if (degradation != degradation_) {
     session_.coarsen(std::pow(coarse_per_level, degradation));
     degradation_ = degradation;
@@ -129,9 +146,11 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   if (const auto mode = static_cast<HandMode>(device.mode); mode != mode_) {
     session_.lift_blade();
     mode_ = mode;
+    passed.clear();
   }
   if (mode_ != HandMode::usual)
     session_.set_grip(mode_ == HandMode::grasper && (device.buttons & 1U) != 0);
+  session_.pass_blade(std::move(passed));
   result_ = session_.step(sample(device));
   last_time_ = device.time;
   const BodyModel& model = session_.model();

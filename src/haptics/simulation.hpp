@@ -40,6 +40,10 @@ class HapticSimulation {
   /// Builds and condenses the body at the device's first pose.
   void prepare(const DeviceState& device);
 
+  /// A tick that is not solved: the blade's way to the next solve leads through its pose. Ticks come in order, each
+  /// once, with those that are solved in between.
+  void pass(const DeviceState& device);
+
   /// Solves at the pose and time of `device` and fills the snapshot; its sequence is the caller's. Throws
   /// NumericalError or InputError as Session::step; the snapshot is then as before.
   void solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot);
@@ -73,7 +77,9 @@ class HapticSimulation {
   StepResult result_;
   std::shared_ptr<const CondensedContact> condensed_; // handed over last
   std::optional<topology::ToolPose> parked_;
-  std::optional<double> last_time_; // s, of the device in the last solve
+  std::optional<double> last_time_;         // s, of the device in the last solve
+  std::uint64_t last_tick_ = 0;             // of that
+  std::vector<topology::BladePose> passed_; // by the blade since then, some way apart
   int degradation_ = 0;
   HandMode mode_ = HandMode::usual; // of the last solve
 };

@@ -125,6 +125,8 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
       for (const auto& core : cores)
         core->start(state);
     }
+    if (next == events.end() || next->pose_tick > tick)
+      simulation.pass(state);
     for (; next != events.end() && next->pose_tick <= tick; ++next) {
       ContactSnapshot& snapshot = flights.launch(*next);
       solves.push_back(solve_recording(simulation, state, *next, snapshot));
@@ -161,6 +163,8 @@ std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std:
   for (std::size_t i = 0; i < ticks.size() && !(stop && stop()); i += stride) {
     if (i == 0)
       simulation.prepare(ticks[0].device);
+    for (std::size_t k = i < stride ? i : i - stride + 1; k < i; ++k)
+      simulation.pass(ticks[k].device);
     simulation.solve(ticks[i].device, 0, snapshot);
     forces.push_back({ticks[i].device.tick, snapshot.force, simulation.result().resprinkled, snapshot.cut_triangles,
                       simulation.result().active_nodes});
