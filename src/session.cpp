@@ -25,7 +25,7 @@ constexpr double rest_delay = 0.1;          // s without motion after which it i
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
-constexpr double crowded_by_sheet = 0.3;    // of the fine spacing: nearer to a sheet no node of a grasp is put
+constexpr double crowded_by_sheet = 0.3;    // of the fine spacing: nearer to a sheet no node of a contact is put
 
 Organ timed_organ(const OrganSettings& settings, double& seconds) {
   const StageTimer timer(seconds);

@@ -277,6 +277,31 @@ position = [0, 0, 0.028]
   CHECK(cut.back().force.z() == Approx(refused.back().force.z()).epsilon(0.05)); // a shallow cut two radii away
 }
 
+TEST_CASE("A blade cuts through the place where a tool has pressed, once that is lifted") {
+  const std::string presses = R"([tool]
+shape = "sphere_tip"
+radius = 0.01
+step = 0.25
+[[tool.path]]
+time = 0
+position = [0, 0, 0.031]
+[[tool.path]]
+time = 0.5
+position = [0, 0, 0.028]
+[[tool.path]]
+time = 1
+position = [0, 0, 0.05]
+)";
+  const std::string cuts = replaced(
+      replaced(blade({"[0, 0, 0.034]", "[0, 0, 0.02]"}, 0.02, "0.25"), "time = 1", "time = 3"), "time = 0", "time = 2");
+  Session session = session_of(cut_block + presses + cuts);
+  const std::vector<StepResult> results = run(session);
+  for (const StepResult& result : results)
+    CHECK_FALSE(result.cut->refused);
+  CHECK(results.back().cut->area == Approx(0.04 * 0.01).epsilon(0.02));
+  CHECK(std::any_of(results.begin(), results.end(), [](const StepResult& result) { return result.force.z() > 0; }));
+}
+
 TEST_CASE("A blade that misses the organ, or starts inside it, is told") {
   const auto told = [](const std::string& positions_from, const std::string& positions_to) {
     const Session session = session_of(cut_block + blade({positions_from, positions_to}, 0.01, "0.5"));

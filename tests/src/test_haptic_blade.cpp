@@ -252,5 +252,5 @@ position = [0.012, -0.034, 0.018]
     return simulation.session().incision() != nullptr ? simulation.session().incision()->area() : 0;
   };
   CHECK(area_when(true) == Approx(area).epsilon(is_resisted ? 0.06 : 0.03)); // which leaves the last of its way uncut
-  CHECK(area_when(false) < 0.95 * area); // corners are cut off
+  CHECK(area_when(false) < 0.95 * area);                                     // corners are cut off
 }
