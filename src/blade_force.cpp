@@ -459,12 +459,8 @@ bool BladeForce::is_past_due(const VectorX& advance) const {
   return !first_cut(state) && report_of(state).release > needed();
 }
 
-bool BladeForce::is_overdue(const BodyModel& now) const {
-  if (proposal_ || !state_)
-    return false;
-  const std::vector<std::size_t> ahead = stops();
-  return std::any_of(ahead.begin(), ahead.end(),
-                     [&](std::size_t stop) { return is_past_due(advances(meeting_, now, way_[stop])); });
+bool BladeForce::lags() const {
+  return state_ && edge_travel(settings_.edge, at_, way_.back()) > 0.5 * least_increment * spacing_;
 }
 
 void BladeForce::wait(const BodyModel& now) {

@@ -77,11 +77,11 @@ class BladeForce {
   /// There was nothing to cut through these poses, or it cannot be: the front goes on without a cut.
   void pass(std::size_t poses, const BodyModel& now);
   [[nodiscard]] bool proposed() const { return proposal_.has_value(); }
-  /// Whether the edge, with nothing proposed, would be pushed past the force of steady cutting on its way to its pose.
-  /// Not of a first cut, which takes more.
-  [[nodiscard]] bool is_overdue(const BodyModel& now) const;
-  /// Moves the blade on while its next cut is being made: as far as that force, or to its pose.
+  /// Moves the blade on while its next cut is being made: as far as the force of steady cutting, but in a first cut,
+  /// which takes more, or to its pose.
   void wait(const BodyModel& now);
+  /// Whether it has been left so far behind its pose that there is a cut to come.
+  [[nodiscard]] bool lags() const;
   /// m, from the front of the cut to the blade's pose; 0: it has been nowhere.
   [[nodiscard]] double way_left() const { return way_.empty() ? 0 : travel(0, way_.size() - 1); }
 

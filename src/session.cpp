@@ -187,8 +187,14 @@ StepResult Session::step(const StepSample& sample) {
       }
     }
     Loading loading{.releases = released};
-    if (blade_force_ != nullptr && sample.blade)
+    if (blade_force_ != nullptr && sample.blade) {
       loading.cut_surface = press_blade(sample, *result.cut);
+    } else if (last_blade_ && (proposing_ || (proposes_aside() && blade_force_->lags()))) {
+      StepSample left = sample; // at the end of its path, with a cut still to come
+      left.blade = last_blade_;
+      left.blade->time = sample.time;
+      loading.cut_surface = press_blade(left, *result.cut);
+    }
     if (tears())
       tear(sample, loading, result);
     if (recondensing_on_ && sample.blade)

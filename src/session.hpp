@@ -141,7 +141,7 @@ class Session {
 
   /// Whether the blade has gone where the body has not followed it yet.
   [[nodiscard]] bool lags_behind_blade() const {
-    return put_off_ > 0 || cuts_aside() || (proposing_ && blade_force_->is_overdue(model_));
+    return put_off_ > 0 || cuts_aside() || (proposes_aside() && blade_force_->lags());
   }
 
   /// Whether a body is under way beside the steps; and whether it is there and has followed all that was cut meanwhile.

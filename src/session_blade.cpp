@@ -101,7 +101,7 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
     const double far = most_advances * aside_advance * zone_.spacing.fine;
     if (proposing_ && (proposing_->arrived || leaves || blade_force_->way_left() - proposing_->way_left > far))
       take_proposal(sample, report);
-    const bool lags = proposes_aside() && (blade_force_->proposed() || blade_force_->is_overdue(model_));
+    const bool lags = proposes_aside() && (blade_force_->proposed() || blade_force_->lags());
     if (goes_on || (leaves && lags)) // what it has come to is cut before
       surface += cut_on(sample, false, report);
   }

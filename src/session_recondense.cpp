@@ -152,7 +152,7 @@ bool Session::recondensed() const {
   if (following_)
     return is_there(following_->made);
   if (proposing_)
-    return is_there(proposing_->made);
+    return !proposing_->arrived && is_there(proposing_->made);
   return recondensing_ != nullptr && recondensing_->ready();
 }
 
