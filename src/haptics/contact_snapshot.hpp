@@ -38,6 +38,7 @@ struct ContactSnapshot {
   std::uint64_t pose_tick = 0;      // tick of the device pose that was solved
   double time = 0;                  // s, of that tick
   std::uint16_t mode = 0;           // DeviceState::mode of that tick
+  bool without_tool = false;        // of the scenario: HandMode::usual holds the blade
   topology::ToolPose pose;          // of the tool in the solve
   Vector3 force = Vector3::Zero();  // N, of the body on tool or blade in the hand, of the solve as it is
   topology::SurfaceContact contact; // deepest point on the surface at rest

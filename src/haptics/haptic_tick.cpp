@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
@@ -11,8 +12,18 @@ constexpr double hardening = 2;  // the same as it rises
 constexpr double rim = 0.8;      // of the candidates' reach: a contact beyond it takes the patch along
 
 // A grasper's force is that of the last solve, held.
-bool holds_force(const DeviceState& device) {
-  return device.mode >= static_cast<std::uint16_t>(HandMode::grasper);
+bool holds_force(const ContactSnapshot& snapshot) {
+  return snapshot.mode >= static_cast<std::uint16_t>(HandMode::grasper);
+}
+
+bool holds_blade(std::uint16_t mode, const ContactSnapshot& snapshot) {
+  return mode == static_cast<std::uint16_t>(HandMode::blade) ||
+         (mode == static_cast<std::uint16_t>(HandMode::usual) && snapshot.without_tool);
+}
+
+// Whether the hand holds what the snapshot was solved for, in whatever mode.
+bool same_thing(const DeviceState& device, const ContactSnapshot& snapshot) {
+  return holds_blade(device.mode, snapshot) == holds_blade(snapshot.mode, snapshot);
 }
 
 bool follows_surface(const DeviceState& device) {
@@ -47,7 +58,7 @@ void HapticTick::locate(const DeviceState& device) noexcept {
   const topology::ToolPose pose = tool_pose(tool_, device);
   contact_ = organ_->walk(tool_, pose, contact_);
   // A tool that was put elsewhere leaves the walk behind; the solve has looked at the whole surface.
-  if (fresh_ && snapshot_->mode == device.mode) {
+  if (fresh_ && same_thing(device, *snapshot_)) {
     const topology::SurfaceContact there = organ_->walk(tool_, pose, snapshot_->contact);
     if (there.depth > contact_.depth)
       contact_ = there;
@@ -56,19 +67,25 @@ void HapticTick::locate(const DeviceState& device) noexcept {
   located_ = device.tick + 1;
 }
 
+HapticTick::Origin HapticTick::origin(const DeviceState& device) const noexcept {
+  if (snapshot_ == nullptr || !same_thing(device, *snapshot_))
+    return Origin::none;
+  if (holds_force(*snapshot_))
+    return Origin::grasper;
+  return holds_blade(device.mode, *snapshot_) ? Origin::blade : Origin::tool;
+}
+
 ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
   outside = false;
-  if (snapshot_ != nullptr && snapshot_->mode != device.mode) // solved for what the hand held before
+  if (origin_ == Origin::none)
     return {};
-  if (holds_force(device)) {
+  if (origin_ == Origin::grasper) {
     ModelForce held;
-    if (snapshot_ != nullptr)
-      held.force = snapshot_->force;
+    held.force = snapshot_->force;
     return held;
   }
   topology::ToolPose pose = tool_pose(tool_, device);
-  if (follows_surface(device) && organ_ != nullptr && snapshot_ != nullptr && snapshot_->count > 0 &&
-      contact_.depth > 0) {
+  if (follows_surface(device) && organ_ != nullptr && snapshot_->count > 0 && contact_.depth > 0) {
     Vector3 away = contact_.point - snapshot_->contact.point;
     away -= away.dot(contact_.normal) * contact_.normal;
     const double distance = away.norm();
@@ -91,7 +108,7 @@ void HapticTick::soften(const ModelForce& model) noexcept {
 }
 
 void HapticTick::arrive(const ContactSnapshot& snapshot) noexcept {
-  arrived_ = !model_->solved(snapshot) || snapshot.mode >= static_cast<std::uint16_t>(HandMode::grasper) || arrived_;
+  arrived_ = !model_->solved(snapshot) || holds_force(snapshot) || arrived_;
   fresh_ = true;
   snapshot_ = &snapshot;
 }
@@ -100,15 +117,15 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   TickResult result;
   locate(device);
   result.contact = contact_;
+  const Origin before = std::exchange(origin_, origin(device));
+  const bool arrives = std::exchange(arrived_, false) || before != origin_;
   result.model = ask(device, result.outside);
-  const bool arrives = arrived_;
   // On at a solve too: solves that come in every tick would hold the force where it was otherwise.
   if (difference_.squaredNorm() > 0)
     difference_ =
         difference_.squaredNorm() > fading_.squaredNorm() ? Vector3(difference_ - fading_) : Vector3(Vector3::Zero());
   if (arrives) {
-    arrived_ = false;
-    // Where the old snapshot would have had the force now: on from its last two ticks.
+    // Where the force would have been now: on from its last two ticks.
     difference_ += 2 * last_model_ - model_before_ - result.model.force;
     fading_ = difference_ / std::max(1.0, std::round(settings_.hand_over * settings_.rate));
   }

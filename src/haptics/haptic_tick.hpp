@@ -32,8 +32,9 @@ struct TickResult {
 /// is added and fades linearly within HapticSettings::hand_over. Energy behind a blade, and behind what a tool holds,
 /// counts as stored once the hand has put it in: a solve that finds more of it is no reason to damp. When the contact
 /// leaves the candidates, the patch is taken along with the tool: the model is asked as if the tool were still at their
-/// rim. Of a grasper the force is that of the last solve; just after the hand has changed what it holds there is none.
-/// A device that does not answer brings the force to zero at the slew limit.
+/// rim. Of a grasper the force is that of the last solve. A mode that leaves the tool in the hand changes nothing
+/// before its first solve; where tool and blade change places there is no force until then. Both are handed over as a
+/// solve is. A device that does not answer brings the force to zero at the slew limit.
 class HapticTick {
  public:
   /// `organ` follows the contact on the surface at rest; null: not followed. Tool and organ must outlive this.
@@ -47,6 +48,8 @@ class HapticTick {
   [[nodiscard]] const PassivityControl& passivity() const { return passivity_; }
 
  private:
+  enum class Origin { none, tool, grasper, blade }; // of the force
+  [[nodiscard]] Origin origin(const DeviceState& device) const noexcept;
   [[nodiscard]] ModelForce ask(const DeviceState& device, bool& outside) noexcept;
   void locate(const DeviceState& device) noexcept;
   void soften(const ModelForce& model) noexcept;
@@ -58,9 +61,10 @@ class HapticTick {
   PassivityControl passivity_;
   const ContactSnapshot* snapshot_ = nullptr;
   topology::SurfaceContact contact_;
-  std::uint64_t located_ = 0; // tick after which contact_ was found, plus one; 0: never
-  bool arrived_ = false;      // a snapshot that changes the force has come since the last tick
-  bool fresh_ = false;        // any snapshot has
+  std::uint64_t located_ = 0;    // tick after which contact_ was found, plus one; 0: never
+  bool arrived_ = false;         // a snapshot that changes the force has come since the last tick
+  bool fresh_ = false;           // any snapshot has
+  Origin origin_ = Origin::none; // in the last tick
   Vector3 last_model_ = Vector3::Zero(), model_before_ = Vector3::Zero(); // N, of the last two ticks
   Vector3 difference_ = Vector3::Zero();                                  // N, still to fade
   Vector3 fading_ = Vector3::Zero();                                      // N, per tick

@@ -182,6 +182,7 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   }
   snapshot.pose_tick = device.tick;
   snapshot.mode = device.mode;
+  snapshot.without_tool = !session_.scenario().tool;
   snapshot.time = device.time;
   snapshot.resprinkled = result_.resprinkled;
   snapshot.cut_triangles = result_.cut ? result_.cut->triangles : 0;

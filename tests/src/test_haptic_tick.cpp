@@ -292,6 +292,52 @@ TEST_CASE("At a new solve the force goes on from where it was and fades over in 
   CHECK(core.tick(device_at(31, deep)).force.z() == Approx(1.0));
 }
 
+TEST_CASE("A mode that leaves the tool in the hand leaves the force, another hands it over") {
+  const auto of = [](HandMode mode) { return static_cast<std::uint16_t>(mode); };
+  const auto [from, to] = GENERATE(table<HandMode, HandMode>({{HandMode::usual, HandMode::probe},
+                                                              {HandMode::probe, HandMode::usual},
+                                                              {HandMode::probe, HandMode::grasper},
+                                                              {HandMode::grasper, HandMode::probe},
+                                                              {HandMode::usual, HandMode::blade},
+                                                              {HandMode::blade, HandMode::usual}}));
+  const auto late = GENERATE(as<std::uint64_t>(), 0, 1, 2, 7); // ticks, a solve
+  const double stiffness = 100;
+  const Vector3 deep(0, 0, -2e-3);
+  const topology::ToolShape shape = punch;
+  const HapticSettings settings;
+  HapticTick core(settings, shape, nullptr);
+  ContactSnapshot pressed;
+  spring(stiffness, Vector3::Zero(), pressed);
+  pressed.force = -stiffness * deep;
+  std::array<ContactSnapshot, 2> snapshots;
+  const std::uint64_t change = 600;
+  const auto mode_at = [&](std::uint64_t tick) { return tick < change ? from : to; };
+  const auto force_in = [&](HandMode mode) { return mode == HandMode::blade ? 0.0 : 0.2; };
+  for (std::uint64_t tick = 0; tick < change + 100; ++tick) {
+    DeviceState device = device_at(tick, deep);
+    device.mode = of(mode_at(tick));
+    if (tick >= late) { // a solve of the pose so many ticks ago
+      ContactSnapshot& next = snapshots[tick % 2];
+      const HandMode solved = mode_at(tick - late);
+      next = pressed;
+      if (solved == HandMode::blade)
+        clear(next);
+      next.mode = of(solved);
+      core.arrive(next);
+    }
+    const double force = core.tick(device).force.z();
+    if (tick == change - 1 || tick == change + 99)
+      CHECK(force == Approx(force_in(mode_at(tick))).margin(1e-9));
+    if (tick < change)
+      continue;
+    const auto since = static_cast<double>(tick - change);
+    const double faded = std::min(1.0, (since + 1) / (settings.hand_over * settings.rate));
+    const double soonest = force_in(from) + faded * (force_in(to) - force_in(from));
+    CHECK(force >= std::min(force_in(from), soonest) - 1e-9);
+    CHECK(force <= std::max(force_in(from), soonest) + 1e-9);
+  }
+}
+
 TEST_CASE("The device of a scenario is the one that it names") {
   const std::vector<std::pair<std::string, HeldDevice>> devices = {
       {"script", HeldDevice::script}, {"hand", HeldDevice::hand}, {"bridge", HeldDevice::bridge}};
