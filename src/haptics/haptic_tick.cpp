@@ -107,6 +107,10 @@ void HapticTick::soften(const ModelForce& model) noexcept {
   softened_ += std::clamp(share - softened_, -softening / settings_.rate, hardening / settings_.rate);
 }
 
+bool HapticTick::jumps(const DeviceState& device) const noexcept {
+  return (device.position - position_).norm() * settings_.rate > fastest_hand;
+}
+
 void HapticTick::arrive(const ContactSnapshot& snapshot) noexcept {
   arrived_ = !model_->solved(snapshot) || holds_force(snapshot) || arrived_;
   fresh_ = true;
@@ -117,16 +121,32 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   TickResult result;
   locate(device);
   result.contact = contact_;
+  const bool taken_up = device.connected && !connected_;
+  connected_ = device.connected;
+  const bool placed = taken_up || jumps(device);
+  if (placed) {
+    position_ = device.position;
+    placed_ = device.tick;
+    finds_ = true;
+    passivity_.place();
+  }
   const Origin before = std::exchange(origin_, origin(device));
-  const bool arrives = std::exchange(arrived_, false) || before != origin_;
+  const bool turns = before != origin_;
+  const bool found = finds_ && snapshot_ != nullptr && snapshot_->pose_tick >= placed_;
+  if (turns || found)
+    passivity_.find();
+  finds_ = finds_ && !found;
+  const bool arrives = std::exchange(arrived_, false) || turns || placed;
   result.model = ask(device, result.outside);
   // On at a solve too: solves that come in every tick would hold the force where it was otherwise.
   if (difference_.squaredNorm() > 0)
     difference_ =
         difference_.squaredNorm() > fading_.squaredNorm() ? Vector3(difference_ - fading_) : Vector3(Vector3::Zero());
   if (arrives) {
-    // Where the force would have been now: on from its last two ticks.
+    // Where the force would have been now: on from its last two ticks. In nobody's hand there was none.
     difference_ += 2 * last_model_ - model_before_ - result.model.force;
+    if (taken_up)
+      difference_ = -result.model.force;
     fading_ = difference_ / std::max(1.0, std::round(settings_.hand_over * settings_.rate));
   }
   model_before_ = arrives ? result.model.force : last_model_;

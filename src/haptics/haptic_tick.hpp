@@ -9,6 +9,10 @@
 
 namespace spherecut::app {
 
+/// m/s. From one tick to the next no hand moves a tool faster than this: with instruments hands stay below 0.5 m/s.
+/// What does is no motion, the tool has been placed anew.
+inline constexpr double fastest_hand = 1.5;
+
 /// Pose of a tool that a device holds; an instrument's axis points to its port.
 topology::ToolPose tool_pose(const topology::ToolShape& tool, const DeviceState& device) noexcept;
 
@@ -35,6 +39,10 @@ struct TickResult {
 /// rim. Of a grasper the force is that of the last solve. A mode that leaves the tool in the hand changes nothing
 /// before its first solve; where tool and blade change places there is no force until then. Both are handed over as a
 /// solve is. A device that does not answer brings the force to zero at the slew limit.
+///
+/// A tool that has moved faster than fastest_hand is placed anew, and so is one that somebody has just taken up: no
+/// work is counted for the way there, nothing is owed for what was before, and what energy it meets there, also by the
+/// first solve from there, has been found. The force is handed over, from none where nobody held the tool.
 class HapticTick {
  public:
   /// `organ` follows the contact on the surface at rest; null: not followed. Tool and organ must outlive this.
@@ -53,6 +61,7 @@ class HapticTick {
   [[nodiscard]] ModelForce ask(const DeviceState& device, bool& outside) noexcept;
   void locate(const DeviceState& device) noexcept;
   void soften(const ModelForce& model) noexcept;
+  [[nodiscard]] bool jumps(const DeviceState& device) const noexcept;
 
   HapticSettings settings_;
   const topology::ToolShape& tool_;
@@ -70,6 +79,9 @@ class HapticTick {
   Vector3 fading_ = Vector3::Zero();                                      // N, per tick
   double paid_ = 0;                    // J, of what is stored behind a force that solves find: put in by the hand
   Vector3 position_ = Vector3::Zero(); // m, of the last tick
+  bool connected_ = false;             // in the last tick
+  bool finds_ = false;                 // no solve has come from where the tool was placed last,
+  std::uint64_t placed_ = 0;           // at this tick
   double softened_ = 1;
   Vector3 sent_ = Vector3::Zero();
 };

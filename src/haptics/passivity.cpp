@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
@@ -29,6 +30,13 @@ void PassivityControl::sent(const Vector3& force) noexcept {
   sent_[0] = force;
 }
 
+void PassivityControl::place() noexcept {
+  ticks_ = 0;
+  surplus_ = 0;
+  damping_ = 0;
+  finds_ = true;
+}
+
 double PassivityControl::sampling_allowance() const {
   return std::sqrt(3.0) * limits_.force * limits_.resolution;
 }
@@ -36,10 +44,10 @@ double PassivityControl::sampling_allowance() const {
 Vector3 PassivityControl::control(const Vector3& position, const Vector3& wanted,
                                   std::optional<double> stored) noexcept {
   const double now = stored.value_or(0);
-  if (ticks_ == 0) {
+  if (ticks_ == 0)
     positions_.fill(position);
+  if (std::exchange(finds_, false))
     stored_ = now;
-  }
   const Vector3 step = position - positions_[(ticks_ + window - 1) % window];
   const Vector3 velocity = (position - positions_[ticks_ % window]) * (rate_ / static_cast<double>(window));
   positions_[ticks_ % window] = position;

@@ -25,6 +25,11 @@ class PassivityControl {
   [[nodiscard]] Vector3 control(const Vector3& position, const Vector3& wanted, std::optional<double> stored) noexcept;
   void sent(const Vector3& force) noexcept;
 
+  /// The next position is where the tool is taken up anew: no motion has led there, nothing is owed and nothing stored.
+  void place() noexcept;
+  /// The energy behind the next force has been found there, not put in: the change does not count.
+  void find() noexcept { finds_ = true; }
+
   /// Energy that the hand has put in since the start, J.
   [[nodiscard]] double energy() const { return energy_; }
   [[nodiscard]] double lowest_energy() const { return lowest_; }
@@ -46,6 +51,7 @@ class PassivityControl {
   std::array<Vector3, longest_delay + 1> sent_, damping_forces_; // N, newest first
   double energy_ = 0, lowest_ = 0, damped_ = 0;
   double damping_ = 0;              // N s/m, added now
+  bool finds_ = true;               // at the next force
   double surplus_ = 0, stored_ = 0; // J: D, and U at the last tick
 };
 

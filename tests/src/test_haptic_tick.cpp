@@ -395,6 +395,134 @@ TEST_CASE("Gain, saturation and slew hold for the force that is sent, and a devi
   CHECK(last == 0);
 }
 
+namespace {
+
+/// A session on a spring at the origin, or on a snapshot of the test's own.
+struct Held {
+  topology::ToolShape shape = punch;
+  HapticTick core;
+  ContactSnapshot contact;
+  std::uint64_t tick = 0;
+  TickResult last;
+
+  explicit Held(const HapticSettings& settings = {}) : core(settings, shape, nullptr) {
+    spring(100, Vector3::Zero(), contact);
+    core.arrive(contact);
+  }
+  Vector3 move(const Vector3& to, bool connected = true) {
+    DeviceState device = device_at(tick++, to);
+    device.connected = connected;
+    last = core.tick(device);
+    return last.force;
+  }
+  /// At 30 mm/s. How far the force has been from that of the spring at most, N.
+  double lead(double from, double to) {
+    double worst = 0;
+    const int count = static_cast<int>(std::ceil(std::abs(to - from) / 3e-5));
+    for (int i = 0; i <= count; ++i) {
+      const double z = from + (to - from) * i / count;
+      worst = std::max(worst, std::abs(move({0, 0, z}).z() - 100 * std::max(0.0, -z)));
+    }
+    return worst;
+  }
+};
+
+} // namespace
+
+TEST_CASE("A pose that jumps is no motion: it does no work and leaves no drag") {
+  Held held;
+  held.lead(1e-3, -3e-3);
+  CHECK(held.last.force.z() == Approx(0.3));
+  const double energy = held.last.energy;
+  CHECK(energy > 0);
+  SECTION("into free air, for good") {
+    double last = 0.304;           // it would have gone on rising for a tick
+    for (int i = 0; i < 25; ++i) { // handed over
+      const double force = held.move({0, 0, 0.1}).z();
+      CHECK(force >= std::max(0.0, 0.3 - 0.0151 * (i + 1)));
+      CHECK(force <= last + 1e-12);
+      last = force;
+    }
+    CHECK(held.last.energy == energy);
+    CHECK(last == 0);
+    for (int i = 0; i < 1000; ++i)
+      CHECK(held.move({0.008 * std::sin(0.006 * i), 0, 0.1}).norm() < 1e-12);
+  }
+  SECTION("for a tick, into the air or in deep") {
+    const double by = GENERATE(-0.03, -0.002, 0.002, 0.0035, 0.01, 0.03);
+    const double wrong = held.move({0, 0, -3e-3 + by}).z();
+    CHECK(std::abs(wrong - 0.3) < 0.2 + 0.05 * 100 * std::abs(by));
+    for (int i = 0; i < 25; ++i)
+      held.move({0, 0, -3e-3});
+    CHECK(held.last.energy == energy);
+    CHECK(held.last.force.z() == Approx(0.3));
+    CHECK(held.lead(-3e-3, 1e-3) < 0.02); // that of sampling alone
+  }
+  SECTION("through the body and back") {
+    for (int i = 0; i < 100; ++i)
+      held.move({0, 0, -0.1});
+    for (int i = 0; i < 25; ++i)
+      held.move({0, 0, 0.01});
+    CHECK(held.last.energy == energy);
+    for (int i = 0; i < 1000; ++i)
+      CHECK(held.move({0.008 * std::sin(0.006 * i), 0, 0.01}).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("What a hand can do is a motion") {
+  Held held;
+  held.lead(1e-3, -3e-3);
+  const double energy = held.last.energy;
+  const double step = 0.99e-3 * fastest_hand;
+  held.move({0, 0, -3e-3 + step});
+  CHECK(held.last.energy == Approx(energy - 0.3 * step));
+}
+
+TEST_CASE("Who takes the tool up owes nothing for what was before") {
+  HapticSettings settings;
+  settings.model = ForceModelKind::hold;
+  Held held(settings);
+  clear(held.contact);
+  held.contact.force = {0, 0, 0.5};
+  held.core.arrive(held.contact);
+  for (int i = 0; i < 200; ++i) // the force pulls the tool along: the hand gets energy
+    held.move({0, 0, 5e-5 * i});
+  CHECK(held.last.energy < -1e-3);
+  CHECK(held.last.force.z() < 0.4);
+  ContactSnapshot nothing;
+  held.core.arrive(nothing);
+  const Vector3 waiting(0, 0, 0.01);
+  for (int i = 0; i < 40; ++i)
+    held.move(waiting, false);
+  CHECK(held.last.force.norm() == 0);
+  for (int i = 0; i < 300; ++i)
+    CHECK(held.move(waiting + Vector3(3e-5 * i, 0, 0)).norm() < 1e-12);
+}
+
+TEST_CASE("A tool that is taken up within the tissue gets its force by and by, and what it finds is not owed") {
+  Held held;
+  const bool before = GENERATE(true, false); // whether the tissue there has been solved
+  const Vector3 deep(0, 0, -3e-3);
+  ContactSnapshot elsewhere;
+  if (!before)
+    held.core.arrive(elsewhere);
+  for (int i = 0; i < 10; ++i)
+    CHECK(held.move(deep, false).norm() == 0);
+  double last = 0;
+  for (int i = 0; i < 60; ++i) {
+    if (!before && i == 12) {
+      held.contact.pose_tick = 11;
+      held.core.arrive(held.contact);
+    }
+    const double force = held.move(deep).z();
+    CHECK(force - last < 0.0151);
+    CHECK(force >= last - 1e-12);
+    last = force;
+  }
+  CHECK(last == Approx(0.3));
+  CHECK(held.lead(-3e-3, 1e-3) < 0.02); // that of sampling alone
+}
+
 TEST_CASE("The observer counts the work of a force that is constant between ticks") {
   PassivityControl control({}, 1000, false);
   Vector3 position(0, 0, 0);
