@@ -31,7 +31,7 @@ void PassivityControl::sent(const Vector3& force) noexcept {
 }
 
 void PassivityControl::place() noexcept {
-  ticks_ = 0;
+  placed_ = true;
   surplus_ = 0;
   damping_ = 0;
   finds_ = true;
@@ -41,17 +41,36 @@ double PassivityControl::sampling_allowance() const {
   return std::sqrt(3.0) * limits_.force * limits_.resolution;
 }
 
+Vector3 PassivityControl::velocity() const noexcept {
+  const double tolerance = limits_.resolution * (1 + 1e-9);
+  std::size_t length = 1; // ticks
+  for (bool straight = true; straight && length + 1 < window;) {
+    const std::size_t longer = length + 1;
+    const Vector3 slope = (positions_[longer] - positions_[0]) / static_cast<double>(longer);
+    for (std::size_t i = 1; i < longer && straight; ++i)
+      straight =
+          (positions_[0] + static_cast<double>(i) * slope - positions_[i]).lpNorm<Eigen::Infinity>() <= tolerance;
+    if (straight)
+      length = longer;
+  }
+  // Least squares over the ticks 0 to length back.
+  const auto n = static_cast<double>(length);
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t i = 0; i <= length; ++i)
+    sum += (0.5 * n - static_cast<double>(i)) * positions_[i];
+  return 12 * rate_ / (n * (n + 1) * (n + 2)) * sum;
+}
+
 Vector3 PassivityControl::control(const Vector3& position, const Vector3& wanted,
                                   std::optional<double> stored) noexcept {
   const double now = stored.value_or(0);
-  if (ticks_ == 0)
+  if (std::exchange(placed_, false))
     positions_.fill(position);
   if (std::exchange(finds_, false))
     stored_ = now;
-  const Vector3 step = position - positions_[(ticks_ + window - 1) % window];
-  const Vector3 velocity = (position - positions_[ticks_ % window]) * (rate_ / static_cast<double>(window));
-  positions_[ticks_ % window] = position;
-  ++ticks_;
+  const Vector3 step = position - positions_[0];
+  std::copy_backward(positions_.begin(), positions_.end() - 1, positions_.end());
+  positions_[0] = position;
   const auto late = static_cast<std::size_t>(limits_.delay);
   const double gained = -sent_[late].dot(step);
   energy_ += gained;
@@ -64,6 +83,7 @@ Vector3 PassivityControl::control(const Vector3& position, const Vector3& wanted
   if (!active_)
     return wanted;
   const double deficit = -surplus_ - std::sqrt(3.0) * wanted.norm() * limits_.resolution;
+  const Vector3 velocity = this->velocity();
   const double power = velocity.squaredNorm();
   const double needed = deficit > 0 && power > 0 ? std::min(deficit / (power * make_up), limits_.damping) : 0;
   damping_ += smoothing * (needed - damping_);

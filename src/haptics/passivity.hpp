@@ -15,6 +15,9 @@ namespace spherecut::app {
 /// - U >= 0. When D falls below zero, damping opposes the motion until it is made up, by at most DeviceLimits::damping.
 /// D above a small reserve is forgotten, so that energy lost in one place (friction, cutting) does not pay for energy
 /// gained in another.
+///
+/// The velocity is the slope of the longest stretch of readings, up to a window, that an even motion explains to the
+/// sensor's step [Janabi-Sharifi, Hayward and Chen 2000]: a fast tool that stops has none from the next reading on.
 class PassivityControl {
  public:
   /// `rate` in ticks per second; `active` false: observes only.
@@ -41,12 +44,14 @@ class PassivityControl {
   [[nodiscard]] double sampling_allowance() const;
 
  private:
-  static constexpr std::size_t window = 8; // ticks over which the velocity is taken
+  [[nodiscard]] Vector3 velocity() const noexcept;
+
+  static constexpr std::size_t window = 11; // readings over which the velocity is taken at most
   DeviceLimits limits_;
   double rate_;
   bool active_;
-  std::array<Vector3, window> positions_;
-  std::size_t ticks_ = 0;
+  std::array<Vector3, window> positions_; // m, newest first
+  bool placed_ = true;                    // the next position is the first
   static constexpr std::size_t longest_delay = 15;
   std::array<Vector3, longest_delay + 1> sent_, damping_forces_; // N, newest first
   double energy_ = 0, lowest_ = 0, damped_ = 0;

@@ -523,6 +523,46 @@ TEST_CASE("A tool that is taken up within the tissue gets its force by and by, a
   CHECK(held.lead(-3e-3, 1e-3) < 0.02); // that of sampling alone
 }
 
+TEST_CASE("A tool that stands still is not damped") {
+  HapticSettings settings;
+  settings.model = ForceModelKind::hold;
+  Held held(settings);
+  clear(held.contact);
+  held.contact.force = {0, 0, 0.5};
+  held.core.arrive(held.contact);
+  for (int i = 0; i <= 200; ++i)
+    held.move({0, 0, 3e-4 * i});
+  CHECK(held.last.force.z() < 0.1);
+  for (int i = 0; i < 20; ++i) {
+    held.move({0, 0, 0.06});
+    if (i >= 5) // slew
+      CHECK(held.last.force.z() == Approx(0.5));
+  }
+}
+
+TEST_CASE("Between two steps of the sensor a slow tool is damped on") {
+  HapticSettings settings;
+  settings.model = ForceModelKind::hold;
+  Held held(settings);
+  clear(held.contact);
+  held.contact.force = {0, 0, 0.5};
+  held.core.arrive(held.contact);
+  const double step = DeviceLimits{}.resolution;
+  double largest = 0;
+  double last = 0.5;
+  double damping = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const double force = held.move({0, 0, step * std::round(6.1e-6 * i / step)}).z(); // a step in nine ticks
+    if (i >= 500) {
+      largest = std::max(largest, std::abs(force - last));
+      damping = std::max(damping, 0.5 - force);
+    }
+    last = force;
+  }
+  CHECK(damping > 0.02);
+  CHECK(largest < 0.4 * damping);
+}
+
 TEST_CASE("The observer counts the work of a force that is constant between ticks") {
   PassivityControl control({}, 1000, false);
   Vector3 position(0, 0, 0);
