@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <sys/socket.h>
 #include <thread>
 #include <unistd.h>
@@ -46,7 +45,7 @@ int main(int argc, char** argv) {
     return 1;
   Pose pose;
   Force force;
-  double start[3] = {}, peak = 0;
+  double start[3] = {}, offset[3] = {}, peak = 0;
   const double none[3] = {};
   long ticks = 0, heard = 0, silent = 0;
   std::uint64_t session = 0; // the token of the last one
@@ -55,8 +54,9 @@ int main(int argc, char** argv) {
     std::this_thread::sleep_until(due += std::chrono::milliseconds(1));
     for (Force next; recv(link, &next, sizeof next, MSG_DONTWAIT) == sizeof next;)
       if (next.magic == pose.magic && next.version == 1 && next.kind == 4) {
-        if (next.token != session) // a new session: the tool is moved on from where it waits
-          std::memcpy(start, next.position, sizeof start);
+        for (int axis = 0; axis < 3 && next.token != session; ++axis)
+          start[axis] =
+              next.position[axis] - offset[axis]; // a new session: on from where the tool waits, device and all
         pose.token = session = next.token;
         force = next;
         silent = 0;
@@ -66,7 +66,6 @@ int main(int argc, char** argv) {
       pose.token = 0;
     drive_device(pose.token != 0 ? force.force : none);
     peak = std::fmax(peak, std::hypot(force.force[0], force.force[1], force.force[2]));
-    double offset[3];
     read_device(1e-3 * ticks, offset);
     for (int axis = 0; axis < 3; ++axis)
       pose.position[axis] = start[axis] + offset[axis];

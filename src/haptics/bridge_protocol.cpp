@@ -86,9 +86,10 @@ bool read_packet(std::span<const std::byte> bytes, BridgeRequest& request) noexc
     request.orientation.coeffs()[i] = in.get<double>();
   request.mode = in.get<std::uint16_t>();
   request.buttons = in.get<std::uint16_t>();
+  const bool ends = in.get<std::uint32_t>() == 0;
   const double length = request.orientation.norm();
   if (!(request.position.cwiseAbs().maxCoeff() <= bridge_farthest) || !request.position.allFinite() ||
-      !(std::abs(length - 1) < 1e-3) || request.mode > bridge_last_mode)
+      !(std::abs(length - 1) < 1e-3) || request.mode > bridge_last_mode || !ends)
     return false;
   request.orientation.coeffs() /= length;
   return true;

@@ -103,6 +103,11 @@ TEST_CASE("Packets come back as they went, and nothing else is taken for one") {
   CHECK(std::to_integer<int>(bytes[16]) == 5);
   for (std::size_t size = 0; size < bytes.size(); ++size)
     CHECK_FALSE(read_packet(std::span<const std::byte>(bytes.data(), size), in));
+  for (std::size_t last = bridge_body - 4; last < bridge_body; ++last) { // zero, the page says
+    Bytes other = bytes;
+    other[last] = std::byte{1};
+    CHECK_FALSE(read_packet(other, in));
+  }
   const auto refused = [&](const Vector3& position, const Eigen::Quaterniond& orientation) {
     out.position = position;
     out.orientation = orientation;
