@@ -322,7 +322,8 @@ constexpr std::array keys = {
         "Fine spacings that the edge goes before wound and body follow its cut; 0: they do in every step. What is "
         "put off is cut by the way that the edge took, at the latest when it leaves the body or the run ends. "
         "It tells where steps are shorter than that: in real time, or with a small blade.step. Left out: 0.5 in real "
-        "time, where the body then follows beside the steps, and 0 elsewhere. Above 0 not with material.toughness.",
+        "time, where the body then follows beside the steps, and 0 elsewhere. Above 0 not with material.toughness, "
+        "which in real time lets the blade cut beside the steps as well where this is left out.",
         from(0, 1)},
     ScenarioKey{"blade.path", array_of_tables, "", "required",
                 "Poses of the blade, between which it moves evenly; at least two. It cuts whatever its edge sweeps."},

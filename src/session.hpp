@@ -136,8 +136,11 @@ class Session {
   /// proposes to cut, for which it is waited when the blade leaves the body, too.
   void set_following_aside(bool on);
 
-  /// Whether a cut is put off that the next step would have made if the blade rested.
-  [[nodiscard]] bool has_put_off() const { return put_off_ > 0 && follows_cuts_aside() && !cuts_aside(); }
+  /// Whether a cut is put off that the next step would make if the blade rested.
+  [[nodiscard]] bool has_put_off() const {
+    return (put_off_ > 0 && follows_cuts_aside() && !cuts_aside()) ||
+           (proposes_aside() && !proposing_ && blade_force_->lags());
+  }
 
   /// Whether the blade has gone where the body has not followed it yet.
   [[nodiscard]] bool lags_behind_blade() const {

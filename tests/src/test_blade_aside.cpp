@@ -140,7 +140,7 @@ TEST_CASE("A resisted blade that is left in the tissue still cuts what it has co
   REQUIRE(session.lags_behind_blade());
   const double left_at = last->time;
   last->blade.reset();
-  int steps = 0;
+  int steps = 0, begun_later = 0;
   for (; steps < 20 && session.lags_behind_blade(); ++steps) {
     if (session.recondensing())
       session.swap_body();
@@ -150,7 +150,10 @@ TEST_CASE("A resisted blade that is left in the tissue still cuts what it has co
     CHECK_FALSE(step.cut->refused);
     CHECK(step.cut->area >= area);
     area = step.cut->area;
+    CHECK(session.has_put_off() == (session.lags_behind_blade() && !session.recondensing())); // else nobody asks for it
+    begun_later += session.has_put_off() ? 1 : 0;
   }
+  CHECK(begun_later > 0);
   CHECK(steps > 0);
   CHECK(steps < 20);
   Session in_step(scenario);

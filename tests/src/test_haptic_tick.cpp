@@ -427,6 +427,20 @@ struct Held {
   }
 };
 
+/// By a held force of 0.5 N, wherever it is.
+struct PulledAlong : Held {
+  PulledAlong() : Held(holding()) {
+    clear(contact);
+    contact.force = {0, 0, 0.5};
+    core.arrive(contact);
+  }
+  static HapticSettings holding() {
+    HapticSettings settings;
+    settings.model = ForceModelKind::hold;
+    return settings;
+  }
+};
+
 } // namespace
 
 TEST_CASE("A pose that jumps is no motion: it does no work and leaves no drag") {
@@ -479,12 +493,7 @@ TEST_CASE("What a hand can do is a motion") {
 }
 
 TEST_CASE("Who takes the tool up owes nothing for what was before") {
-  HapticSettings settings;
-  settings.model = ForceModelKind::hold;
-  Held held(settings);
-  clear(held.contact);
-  held.contact.force = {0, 0, 0.5};
-  held.core.arrive(held.contact);
+  PulledAlong held;
   for (int i = 0; i < 200; ++i) // the force pulls the tool along: the hand gets energy
     held.move({0, 0, 5e-5 * i});
   CHECK(held.last.energy < -1e-3);
@@ -524,12 +533,7 @@ TEST_CASE("A tool that is taken up within the tissue gets its force by and by, a
 }
 
 TEST_CASE("A tool that stands still is not damped") {
-  HapticSettings settings;
-  settings.model = ForceModelKind::hold;
-  Held held(settings);
-  clear(held.contact);
-  held.contact.force = {0, 0, 0.5};
-  held.core.arrive(held.contact);
+  PulledAlong held;
   for (int i = 0; i <= 200; ++i)
     held.move({0, 0, 3e-4 * i});
   CHECK(held.last.force.z() < 0.1);
@@ -541,12 +545,7 @@ TEST_CASE("A tool that stands still is not damped") {
 }
 
 TEST_CASE("Between two steps of the sensor a slow tool is damped on") {
-  HapticSettings settings;
-  settings.model = ForceModelKind::hold;
-  Held held(settings);
-  clear(held.contact);
-  held.contact.force = {0, 0, 0.5};
-  held.core.arrive(held.contact);
+  PulledAlong held;
   const double step = DeviceLimits{}.resolution;
   double largest = 0;
   double last = 0.5;
