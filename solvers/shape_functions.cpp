@@ -78,8 +78,9 @@ void pad(Support& support) {
 void resize(ShapeFunctions& out, int n, bool second) {
   for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
     array->resize(n);
-  for (std::vector<double>* array : {&out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz})
-    array->resize(second ? n : 0);
+  if (second || !out.dxx.empty())
+    for (std::vector<double>* array : {&out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz})
+      array->resize(second ? n : 0);
 }
 
 // The nodes whose spheres, grown by `factor`, hold x. Rare: every sphere is looked at.

@@ -42,26 +42,24 @@ struct Symmetric4 {
   V m[10];
 };
 
-// Inverse by A = L D L^T, A^-1 = L^-T D^-1 L^-1. A singular matrix gives entries that are huge or not finite.
+// Inverse by blocks of 2 x 2, A = [P Q; Q^T R] with Schur complement S = R - Q^T P^-1 Q: two divisions, one after the
+// other, where L D L^T has four. A singular matrix gives entries that are huge or not finite.
 template <class V>
-Symmetric4<V> inverse(const Symmetric4<V>& a) {
+inline __attribute__((always_inline)) Symmetric4<V> inverse(const Symmetric4<V>& a) {
   const V* m = a.m;
-  const V i0 = 1 / m[0];
-  const V l10 = m[1] * i0, l20 = m[2] * i0, l30 = m[3] * i0;
-  const V i1 = 1 / (m[4] - l10 * m[1]);
-  const V t12 = m[5] - l10 * m[2], t13 = m[6] - l10 * m[3];
-  const V l21 = t12 * i1, l31 = t13 * i1;
-  const V i2 = 1 / (m[7] - l20 * m[2] - l21 * t12);
-  const V t23 = m[8] - l20 * m[3] - l21 * t13;
-  const V l32 = t23 * i2;
-  const V i3 = 1 / (m[9] - l30 * m[3] - l31 * t13 - l32 * t23);
-  // Rows of L^-1 below the unit diagonal.
-  const V k10 = -l10, k21 = -l21, k32 = -l32;
-  const V k20 = l21 * l10 - l20, k31 = l32 * l21 - l31;
-  const V k30 = -(l30 + l31 * k10 + l32 * k20);
-  const V u10 = i1 * k10, u20 = i2 * k20, u30 = i3 * k30, u21 = i2 * k21, u31 = i3 * k31, u32 = i3 * k32;
-  return {{i0 + k10 * u10 + k20 * u20 + k30 * u30, u10 + k20 * u21 + k30 * u31, u20 + k30 * u32, u30,
-           i1 + k21 * u21 + k31 * u31, u21 + k31 * u32, u31, i2 + k32 * u32, u32, i3}};
+  const V ip = 1 / (m[0] * m[4] - m[1] * m[1]);
+  const V p00 = ip * m[4], p01 = -ip * m[1], p11 = ip * m[0];
+  // W = P^-1 Q.
+  const V w00 = p00 * m[2] + p01 * m[5], w01 = p00 * m[3] + p01 * m[6];
+  const V w10 = p01 * m[2] + p11 * m[5], w11 = p01 * m[3] + p11 * m[6];
+  const V s00 = m[7] - (m[2] * w00 + m[5] * w10), s01 = m[8] - (m[2] * w01 + m[5] * w11),
+          s11 = m[9] - (m[3] * w01 + m[6] * w11);
+  const V is = 1 / (s00 * s11 - s01 * s01);
+  const V r00 = is * s11, r01 = -is * s01, r11 = is * s00; // S^-1
+  const V q00 = w00 * r00 + w01 * r01, q01 = w00 * r01 + w01 * r11;
+  const V q10 = w10 * r00 + w11 * r01, q11 = w10 * r01 + w11 * r11; // W S^-1
+  return {{p00 + q00 * w00 + q01 * w01, p01 + q00 * w10 + q01 * w11, -q00, -q01, p11 + q10 * w10 + q11 * w11, -q10,
+           -q11, r00, r01, r11}};
 }
 
 inline double magnitude(double v) {
@@ -76,7 +74,7 @@ V larger(V a, V b) {
 } // keeps a NaN in either place
 
 template <class V>
-V norm1(const Symmetric4<V>& a) {
+inline __attribute__((always_inline)) V norm1(const Symmetric4<V>& a) {
   const V c01 = magnitude(a.m[1]), c02 = magnitude(a.m[2]), c03 = magnitude(a.m[3]), c12 = magnitude(a.m[5]),
           c13 = magnitude(a.m[6]), c23 = magnitude(a.m[8]);
   const V first = larger(magnitude(a.m[0]) + c01 + c02 + c03, magnitude(a.m[4]) + c01 + c12 + c13);
@@ -85,7 +83,7 @@ V norm1(const Symmetric4<V>& a) {
 }
 
 template <class V>
-void multiply(const Symmetric4<V>& a, const V* v, V* out) {
+inline __attribute__((always_inline)) void multiply(const Symmetric4<V>& a, const V* v, V* out) {
   const V* m = a.m;
   out[0] = m[0] * v[0] + m[1] * v[1] + m[2] * v[2] + m[3] * v[3];
   out[1] = m[1] * v[0] + m[4] * v[1] + m[5] * v[2] + m[6] * v[3];
@@ -119,29 +117,33 @@ double evaluate(const Support& support, const LinearOutput& output) {
   const int n = (support.count + width - 1) / width * width;
   if (n == 0)
     return __builtin_inf();
+  const double *const dx = support.dx, *const dy = support.dy, *const dz = support.dz, *const iq = support.q;
+  double *const value = output.value, *const to_x = output.dx, *const to_y = output.dy, *const to_z = output.dz;
 
-  Pack moment[10] = {};
+  // Sums are variables of their own: an array of them would be cleared and filled in memory.
+  Pack m0{}, m1{}, m2{}, m3{}, m4{}, m5{}, m6{}, m7{}, m8{}, m9{};
   for (int k = 0; k < n; k += width) {
-    const Pack x = load(support.dx + k), y = load(support.dy + k), z = load(support.dz + k), q = load(support.q + k);
+    const Pack x = load(dx + k), y = load(dy + k), z = load(dz + k), q = load(iq + k);
     const Weight weight = weigh<second>(x, y, z, q);
     const Pack w = weight.w;
-    store(output.dx + k, w); // until the results are known the outputs keep the weights
-    store(output.dy + k, weight.g);
+    store(to_x + k, w); // until the results are known the outputs keep the weights
+    store(to_y + k, weight.g);
     if constexpr (second)
       store(output.second[0] + k, weight.f);
     const Pack wx = w * x, wy = w * y, wz = w * z;
-    moment[0] += w;
-    moment[1] += wx;
-    moment[2] += wy;
-    moment[3] += wz;
-    moment[4] += wx * x;
-    moment[5] += wx * y;
-    moment[6] += wx * z;
-    moment[7] += wy * y;
-    moment[8] += wy * z;
-    moment[9] += wz * z;
+    m0 += w;
+    m1 += wx;
+    m2 += wy;
+    m3 += wz;
+    m4 += wx * x;
+    m5 += wx * y;
+    m6 += wx * z;
+    m7 += wy * y;
+    m8 += wy * z;
+    m9 += wz * z;
   }
-  const double scale = __builtin_sqrt(support.q[0]); // 1 / l, of the first sphere of the support
+  const Pack moment[10] = {m0, m1, m2, m3, m4, m5, m6, m7, m8, m9};
+  const double scale = __builtin_sqrt(iq[0]); // 1 / l, of the first sphere of the support
   const double scale2 = scale * scale;
   Symmetric4<double> a;
   add_lanes(moment, 10, a.m);
@@ -154,42 +156,45 @@ double evaluate(const Support& support, const LinearOutput& output) {
 
   // From here on coefficient vectors are those of {1, d}, so that P_j . c needs no scaling.
   const double c[4] = {b.m[0], scale * b.m[1], scale * b.m[2], scale * b.m[3]};
-  Pack third[10] = {}; // the last is not used
+  Pack t0{}, t1{}, t2{}, t3{}, t4{}, t5{}, t6{}, t7{}, t8{};
   for (int k = 0; k < n; k += width) {
-    const Pack x = load(support.dx + k), y = load(support.dy + k), z = load(support.dz + k);
+    const Pack x = load(dx + k), y = load(dy + k), z = load(dz + k);
     const Pack p = c[0] + c[1] * x + c[2] * y + c[3] * z;
-    store(output.value + k, load(output.dx + k) * p);
-    const Pack r = load(output.dy + k) * p;
+    store(value + k, load(to_x + k) * p);
+    const Pack r = load(to_y + k) * p;
+    store(to_z + k, r);
     const Pack rx = r * x, ry = r * y, rz = r * z;
-    third[0] += rx;
-    third[1] += ry;
-    third[2] += rz;
-    third[3] += rx * x;
-    third[4] += rx * y;
-    third[5] += rx * z;
-    third[6] += ry * y;
-    third[7] += ry * z;
-    third[8] += rz * z;
+    t0 += rx;
+    t1 += ry;
+    t2 += rz;
+    t3 += rx * x;
+    t4 += rx * y;
+    t5 += rx * z;
+    t6 += ry * y;
+    t7 += ry * z;
+    t8 += rz * z;
   }
+  const Pack third[10] = {t0, t1, t2, t3, t4, t5, t6, t7, t8, t8};
   double t[10];
   add_lanes(third, 10, t);
-  for (int i = 3; i < 9; ++i)
-    t[i] *= scale;
-  const double right[3][4] = {
-      {-t[0], scale - t[3], -t[4], -t[5]}, {-t[1], -t[4], scale - t[6], -t[7]}, {-t[2], -t[5], -t[7], scale - t[8]}};
   double c1[3][4];
-  for (int i = 0; i < 3; ++i) {
-    multiply(b, right[i], c1[i]);
-    for (int e = 1; e < 4; ++e)
-      c1[i][e] *= scale;
-  }
+  const auto slope = [&](int i, double r0, double r1, double r2, double r3) __attribute__((always_inline)) {
+    const double right[4] = {r0, r1, r2, r3};
+    multiply(b, right, c1[i]);
+    c1[i][1] *= scale;
+    c1[i][2] *= scale;
+    c1[i][3] *= scale;
+  };
+  slope(0, -t[0], scale - scale * t[3], -scale * t[4], -scale * t[5]);
+  slope(1, -t[1], -scale * t[4], scale - scale * t[6], -scale * t[7]);
+  slope(2, -t[2], -scale * t[5], -scale * t[7], scale - scale * t[8]);
 
   double c2[6][4];
   if constexpr (second) {
     Pack fourth[6][4] = {};
     for (int k = 0; k < n; k += width) {
-      const Pack d[3] = {load(support.dx + k), load(support.dy + k), load(support.dz + k)};
-      const Pack g = load(output.dy + k), f = load(output.second[0] + k);
+      const Pack d[3] = {load(dx + k), load(dy + k), load(dz + k)};
+      const Pack g = load(to_y + k), f = load(output.second[0] + k);
       const Pack p = c[0] + c[1] * d[0] + c[2] * d[1] + c[3] * d[2];
       Pack gp[3];
       for (int i = 0; i < 3; ++i)
@@ -218,12 +223,12 @@ double evaluate(const Support& support, const LinearOutput& output) {
   }
 
   for (int k = 0; k < n; k += width) {
-    const Pack x = load(support.dx + k), y = load(support.dy + k), z = load(support.dz + k);
-    const Pack w = load(output.dx + k);
-    const Pack r = load(output.dy + k) * (c[0] + c[1] * x + c[2] * y + c[3] * z);
-    store(output.dx + k, r * x + w * (c1[0][0] + c1[0][1] * x + c1[0][2] * y + c1[0][3] * z));
-    store(output.dy + k, r * y + w * (c1[1][0] + c1[1][1] * x + c1[1][2] * y + c1[1][3] * z));
-    store(output.dz + k, r * z + w * (c1[2][0] + c1[2][1] * x + c1[2][2] * y + c1[2][3] * z));
+    const Pack x = load(dx + k), y = load(dy + k), z = load(dz + k);
+    const Pack w = load(to_x + k);
+    const Pack r = load(to_z + k);
+    store(to_x + k, r * x + w * (c1[0][0] + c1[0][1] * x + c1[0][2] * y + c1[0][3] * z));
+    store(to_y + k, r * y + w * (c1[1][0] + c1[1][1] * x + c1[1][2] * y + c1[1][3] * z));
+    store(to_z + k, r * z + w * (c1[2][0] + c1[2][1] * x + c1[2][2] * y + c1[2][3] * z));
     if constexpr (second)
       for (int m = 0; m < 6; ++m) {
         double* to = output.second[m] + k;
@@ -251,7 +256,7 @@ inline void gradients_at_points(const Sphere* spheres, int count, const Points& 
                                 double* condition) {
   for (int p = 0; p < points_together; p += width) {
     const Pack px = load(points.x + p), py = load(points.y + p), pz = load(points.z + p);
-    Pack moment[10] = {}, first_q = {};
+    Pack m0{}, m1{}, m2{}, m3{}, m4{}, m5{}, m6{}, m7{}, m8{}, m9{}, first_q{};
     double* to = gradients + p;
     for (int k = 0; k < count; ++k, to += 3 * static_cast<std::ptrdiff_t>(stride)) {
       const Sphere& sphere = spheres[k];
@@ -265,62 +270,61 @@ inline void gradients_at_points(const Sphere* spheres, int count, const Points& 
       store(to, w); // until the results are known the gradients keep the weights
       store(to + stride, 12 * t2 * q);
       const Pack wx = w * x, wy = w * y, wz = w * z;
-      moment[0] += w;
-      moment[1] += wx;
-      moment[2] += wy;
-      moment[3] += wz;
-      moment[4] += wx * x;
-      moment[5] += wx * y;
-      moment[6] += wx * z;
-      moment[7] += wy * y;
-      moment[8] += wy * z;
-      moment[9] += wz * z;
+      m0 += w;
+      m1 += wx;
+      m2 += wy;
+      m3 += wz;
+      m4 += wx * x;
+      m5 += wx * y;
+      m6 += wx * z;
+      m7 += wy * y;
+      m8 += wy * z;
+      m9 += wz * z;
     }
     const Pack scale = root(first_q), scale2 = scale * scale;
-    Symmetric4<Pack> a;
-    for (int i = 0; i < 10; ++i)
-      a.m[i] = i == 0 ? moment[i] : i < 4 ? scale * moment[i] : scale2 * moment[i];
+    const Symmetric4<Pack> a{{m0, scale * m1, scale * m2, scale * m3, scale2 * m4, scale2 * m5, scale2 * m6,
+                              scale2 * m7, scale2 * m8, scale2 * m9}};
     const Symmetric4<Pack> b = inverse(a);
     store(condition + p, norm1(a) * norm1(b));
 
-    Pack c[4] = {b.m[0], scale * b.m[1], scale * b.m[2], scale * b.m[3]};
-    Pack t[9] = {};
+    const Pack c[4] = {b.m[0], scale * b.m[1], scale * b.m[2], scale * b.m[3]};
+    Pack t0{}, t1{}, t2{}, t3{}, t4{}, t5{}, t6{}, t7{}, t8{};
     to = gradients + p;
     for (int k = 0; k < count; ++k, to += 3 * static_cast<std::ptrdiff_t>(stride)) {
       const Sphere& sphere = spheres[k];
       const Pack x = sphere.x - px, y = sphere.y - py, z = sphere.z - pz;
       const Pack r = load(to + stride) * (c[0] + c[1] * x + c[2] * y + c[3] * z);
+      store(to + stride, r);
       const Pack rx = r * x, ry = r * y, rz = r * z;
-      t[0] += rx;
-      t[1] += ry;
-      t[2] += rz;
-      t[3] += rx * x;
-      t[4] += rx * y;
-      t[5] += rx * z;
-      t[6] += ry * y;
-      t[7] += ry * z;
-      t[8] += rz * z;
+      t0 += rx;
+      t1 += ry;
+      t2 += rz;
+      t3 += rx * x;
+      t4 += rx * y;
+      t5 += rx * z;
+      t6 += ry * y;
+      t7 += ry * z;
+      t8 += rz * z;
     }
-    for (int i = 3; i < 9; ++i)
-      t[i] *= scale;
-    const Pack right[3][4] = {
-        {-t[0], scale - t[3], -t[4], -t[5]}, {-t[1], -t[4], scale - t[6], -t[7]}, {-t[2], -t[5], -t[7], scale - t[8]}};
-    const Pack factor = load(points.factor + p);
+    const Pack factor = load(points.factor + p), factor_scale = factor * scale;
     Pack c1[3][4];
-    for (int i = 0; i < 3; ++i) {
-      multiply(b, right[i], c1[i]);
+    const auto slope = [&](int i, Pack r0, Pack r1, Pack r2, Pack r3) __attribute__((always_inline)) {
+      const Pack right[4] = {r0, r1, r2, r3};
+      multiply(b, right, c1[i]);
       c1[i][0] *= factor;
-      for (int e = 1; e < 4; ++e)
-        c1[i][e] *= factor * scale;
-    }
-    for (Pack& coefficient : c)
-      coefficient *= factor;
+      c1[i][1] *= factor_scale;
+      c1[i][2] *= factor_scale;
+      c1[i][3] *= factor_scale;
+    };
+    slope(0, -t0, scale - scale * t3, -scale * t4, -scale * t5);
+    slope(1, -t1, -scale * t4, scale - scale * t6, -scale * t7);
+    slope(2, -t2, -scale * t5, -scale * t7, scale - scale * t8);
 
     to = gradients + p;
     for (int k = 0; k < count; ++k, to += 3 * static_cast<std::ptrdiff_t>(stride)) {
       const Sphere& sphere = spheres[k];
       const Pack x = sphere.x - px, y = sphere.y - py, z = sphere.z - pz;
-      const Pack w = load(to), r = load(to + stride) * (c[0] + c[1] * x + c[2] * y + c[3] * z);
+      const Pack w = load(to), r = factor * load(to + stride);
       store(to, r * x + w * (c1[0][0] + c1[0][1] * x + c1[0][2] * y + c1[0][3] * z));
       store(to + stride, r * y + w * (c1[1][0] + c1[1][1] * x + c1[1][2] * y + c1[1][3] * z));
       store(to + 2 * stride, r * z + w * (c1[2][0] + c1[2][1] * x + c1[2][2] * y + c1[2][3] * z));

@@ -27,19 +27,32 @@ inline unsigned below_one(Pack v) {
 }
 #endif
 
-// Writes every candidate at the end of the list and moves the end on only past those that hold the point: no branch.
+#include "solvers/shape_kernel_lanes.inl"
+
+#include "solvers/shape_kernel_moments.inl"
+
+// First which candidates hold the point: every place is written at the end of the list and the end moves on only past
+// those that do, so that there is no branch. Then these alone are copied.
 void collect(const SphereGrid::Cell& cell, const double* point, Support& support) {
   const int candidates = static_cast<int>(cell.ids.size());
   int n = 0;
-  for (int k = 0; k < candidates; ++k) {
-    const double x = cell.x[k] - point[0], y = cell.y[k] - point[1], z = cell.z[k] - point[2];
-    const double q = cell.inverse_square_radius[k];
-    support.ids[n] = cell.ids[k];
-    support.dx[n] = x;
-    support.dy[n] = y;
-    support.dz[n] = z;
-    support.q[n] = q;
-    n += (x * x + y * y + z * z) * q < 1 ? 1 : 0;
+  for (int k = 0; k < candidates; k += width) { // entries beyond the last hold no point
+    const Pack x = load(cell.x + k) - point[0], y = load(cell.y + k) - point[1], z = load(cell.z + k) - point[2];
+    const unsigned inside = below_one((x * x + y * y + z * z) * load(cell.inverse_square_radius + k));
+    support.ids[n] = k;
+    n += static_cast<int>(inside & 1U);
+    support.ids[n] = k + 1;
+    n += static_cast<int>(inside >> 1U);
+  }
+  int* const ids = support.ids;
+  double *const dx = support.dx, *const dy = support.dy, *const dz = support.dz, *const q = support.q;
+  for (int i = 0; i < n; ++i) {
+    const int k = ids[i];
+    dx[i] = cell.x[k] - point[0];
+    dy[i] = cell.y[k] - point[1];
+    dz[i] = cell.z[k] - point[2];
+    q[i] = cell.inverse_square_radius[k];
+    ids[i] = cell.ids[k];
   }
   support.count = n;
   for (int k = n; k < n + SphereGrid::lanes; ++k) {
@@ -47,10 +60,6 @@ void collect(const SphereGrid::Cell& cell, const double* point, Support& support
     support.dy[k] = support.dz[k] = 0;
   }
 }
-
-#include "solvers/shape_kernel_lanes.inl"
-
-#include "solvers/shape_kernel_moments.inl"
 
 } // namespace
 

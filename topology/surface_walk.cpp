@@ -12,6 +12,7 @@ namespace {
 
 constexpr int leaf_size = 4;        // the lanes of a leaf
 constexpr int longest_walk = 8;     // steps; over a longer way the tree is faster
+constexpr float flat = 0.1F;        // half the height of a disc that is, over its radius
 constexpr double same_place = 1e-9; // fraction of a segment
 
 void check_mesh(const SurfaceMesh& mesh) {
@@ -124,6 +125,37 @@ void SurfaceWalk::build_tree(const SurfaceMesh& mesh) {
       node.upper[k][child] = static_cast<float>(upper[k] + padding_);
     }
   };
+  /// About the middle of a child's box, along the mean of its triangles' normals.
+  const auto set_disc = [&](Node& node, int child, int begin, int end) {
+    Vector3 normal = Vector3::Zero(), middle;
+    for (int i = begin; i < end; ++i) {
+      const Triangle& t = mesh.triangles[original_[i]];
+      normal += (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
+    }
+    normal = normal.squaredNorm() > 0 ? normal.stableNormalized().eval() : Vector3(Vector3::UnitZ());
+    for (int k = 0; k < 3; ++k)
+      middle[k] = 0.5 * (double{node.lower[k][child]} + double{node.upper[k][child]});
+    const auto for_each_corner = [&](const auto& visit) {
+      for (int i = begin; i < end; ++i)
+        for (int v : mesh.triangles[original_[i]])
+          visit(Vector3(mesh.vertices[v] - centre_ - middle));
+    };
+    double lowest = std::numeric_limits<double>::infinity(), highest = -lowest, radius2 = 0;
+    for_each_corner([&](const Vector3& arm) {
+      const double height = normal.dot(arm);
+      lowest = std::min(lowest, height);
+      highest = std::max(highest, height);
+      radius2 = std::max(radius2, (arm - height * normal).squaredNorm());
+    });
+    const Vector3 centre = middle + 0.5 * (lowest + highest) * normal;
+    for (int k = 0; k < 3; ++k) {
+      node.discs.centre[k][child] = static_cast<float>(centre[k]);
+      node.discs.normal[k][child] = static_cast<float>(normal[k]);
+    }
+    node.discs.radius[child] = static_cast<float>(std::sqrt(radius2) + padding_);
+    node.discs.half_height[child] = static_cast<float>(0.5 * (highest - lowest) + padding_);
+    node.is_flat = node.is_flat || node.discs.half_height[child] < flat * node.discs.radius[child];
+  };
   /// Halves the triangles begin .. end - 1 at the median of their longest extent; the middle. Leaves stay whole.
   const auto split = [&](int begin, int end) {
     if (end - begin <= leaf_size)
@@ -165,6 +197,8 @@ void SurfaceWalk::build_tree(const SurfaceMesh& mesh) {
         leaves_.emplace_back().first = begin;
       }
       set_box(nodes_[range.node], child, begin, end);
+      if (count > 0)
+        set_disc(nodes_[range.node], child, begin, end);
       nodes_[range.node].first[child] = first;
       nodes_[range.node].count[child] = count <= leaf_size ? count : 0;
     }
@@ -233,10 +267,11 @@ void SurfaceWalk::build_leaves() {
           centre = candidate;
         }
       for (int k = 0; k < 3; ++k) {
-        leaf.centre[k][lane] = static_cast<float>(centre[k] - centre_[k]);
-        leaf.normal[k][lane] = static_cast<float>(face_normals_[triangle][k]);
+        leaf.discs.centre[k][lane] = static_cast<float>(centre[k] - centre_[k]);
+        leaf.discs.normal[k][lane] = static_cast<float>(face_normals_[triangle][k]);
       }
-      leaf.radius[lane] = static_cast<float>(radius + padding_);
+      leaf.discs.radius[lane] = static_cast<float>(radius + padding_);
+      leaf.discs.half_height[lane] = static_cast<float>(padding_);
     }
   }
 }
@@ -244,22 +279,15 @@ void SurfaceWalk::build_leaves() {
 /// Rounding of the sums below, and of an x far from the mesh.
 constexpr float rounding = 1 - 4e-6F;
 
-inline SurfaceWalk::Lanes SurfaceWalk::squared_distance_bounds(const Node& node,
-                                                               const Eigen::Vector3f& x) const noexcept {
+inline SurfaceWalk::Lanes SurfaceWalk::squared_distance_bounds(const Node& node, const Eigen::Vector3f& x,
+                                                               double best) noexcept {
   Lanes squared = Lanes::Zero();
   for (int k = 0; k < 3; ++k)
     squared += (node.lower[k] - x[k]).max(x[k] - node.upper[k]).max(0.0F).square();
-  return rounding * squared;
-}
-
-inline SurfaceWalk::Lanes SurfaceWalk::squared_distance_bounds(const Leaf& leaf,
-                                                               const Eigen::Vector3f& x) const noexcept {
-  const Lanes vx = x[0] - leaf.centre[0], vy = x[1] - leaf.centre[1], vz = x[2] - leaf.centre[2];
-  const Lanes height = vx * leaf.normal[0] + vy * leaf.normal[1] + vz * leaf.normal[2];
-  const Lanes along2 = (vx - height * leaf.normal[0]).square() + (vy - height * leaf.normal[1]).square() +
-                       (vz - height * leaf.normal[2]).square();
-  return rounding * ((height.abs() - static_cast<float>(padding_)).max(0.0F).square() +
-                     (along2.sqrt() - leaf.radius).max(0.0F).square());
+  squared *= rounding;
+  if (node.is_flat && squared.minCoeff() < best)
+    squared = squared.max(rounding * node.discs.squared_distances(x));
+  return squared;
 }
 
 double SurfaceWalk::distance_to_triangle(const Vector3& x, int triangle) const noexcept {
@@ -327,26 +355,29 @@ inline NearestPoint SurfaceWalk::finish(const Vector3& x, const Candidate& best)
 
 NearestPoint SurfaceWalk::nearest(const Vector3& x, int hint, double enough) const noexcept {
   Candidate best;
+  const double enough2 = enough * enough;
   if (hint >= 0 && hint < std::ssize(corners_)) {
     try_triangle(x, hint, best);
-    descend(x, best);
+    if (!(best.squared_distance < enough2))
+      descend(x, best);
+    if (best.squared_distance < enough2)
+      return finish(x, best);
   }
 
   const Eigen::Vector3f relative = (x - centre_).cast<float>();
   VisitStack<float> stack;
   Visit<float> visit{0, 0, 0};
-  const double enough2 = enough * enough;
   for (;;) {
     if (visit.key < best.squared_distance) {
       if (visit.count > 0) {
         const Leaf& leaf = leaves_[visit.first];
-        const Lanes bounds = squared_distance_bounds(leaf, relative);
+        const Lanes bounds = rounding * leaf.discs.squared_distances(relative);
         for (int i = 0; i < visit.count; ++i)
           if (bounds[i] < best.squared_distance)
             try_triangle(x, leaf.first + i, best);
       } else {
         const Node& node = nodes_[visit.first];
-        const Lanes squared = squared_distance_bounds(node, relative);
+        const Lanes squared = squared_distance_bounds(node, relative, best.squared_distance);
         std::array<Visit<float>, 4> children;
         int n = 0;
         for (int child = 0; child < 4; ++child)

@@ -74,20 +74,35 @@ class SurfaceWalk {
   // The tree is searched in single precision, four lanes at once, relative to centre_; everything is padded so that
   // rounding drops nothing. Distances that count are then taken in double precision.
   using Lanes = Eigen::Array4f;
-  /// Up to four children, a lane each.
+  /// Flat round boxes, a lane each: what lies less than half_height from a plane and radius from a centre in it. Much
+  /// tighter than an upright box about a piece of a surface that is smooth and slanted.
+  struct Discs {
+    std::array<Lanes, 3> centre{Lanes::Zero(), Lanes::Zero(), Lanes::Zero()}, normal = centre; // normals of length 1
+    Lanes radius = Lanes::Zero(), half_height = Lanes::Zero();
+
+    [[nodiscard]] Lanes squared_distances(const Eigen::Vector3f& x) const noexcept {
+      const Lanes vx = x[0] - centre[0], vy = x[1] - centre[1], vz = x[2] - centre[2];
+      const Lanes height = vx * normal[0] + vy * normal[1] + vz * normal[2];
+      const Lanes along2 =
+          (vx - height * normal[0]).square() + (vy - height * normal[1]).square() + (vz - height * normal[2]).square();
+      return (height.abs() - half_height).max(0.0F).square() + (along2.sqrt() - radius).max(0.0F).square();
+    }
+  };
+  /// Up to four children, a lane each: the triangles of each lie in its box and in its disc.
   struct Node {
     std::array<Lanes, 3> lower, upper; // boxes, per axis
-    std::array<int, 4> first;          // child node, or leaf; -1: no child
-    std::array<int, 4> count;          // triangles of the leaf; 0: child node
+    bool is_flat = false;              // some disc is much flatter than wide: only then are they worth a look
+    Discs discs;
+    std::array<int, 4> first; // child node, or leaf; -1: no child
+    std::array<int, 4> count; // triangles of the leaf; 0: child node
 
     [[nodiscard]] Vector3 box_lower(int child) const { return {lower[0][child], lower[1][child], lower[2][child]}; }
     [[nodiscard]] Vector3 box_upper(int child) const { return {upper[0][child], upper[1][child], upper[2][child]}; }
   };
   /// Up to four triangles, each within a flat disc.
   struct Leaf {
-    std::array<Lanes, 3> centre, normal;
-    Lanes radius;
-    int first;
+    Discs discs;
+    int first = 0;
   };
   struct Corners {
     Vector3 a, b, c;
@@ -97,8 +112,8 @@ class SurfaceWalk {
   void build_tree(const SurfaceMesh& mesh);
   void build_adjacency(const SurfaceMesh& mesh);
   void build_leaves();
-  [[nodiscard]] Lanes squared_distance_bounds(const Node& node, const Eigen::Vector3f& x) const noexcept;
-  [[nodiscard]] Lanes squared_distance_bounds(const Leaf& leaf, const Eigen::Vector3f& x) const noexcept;
+  /// Bounds at least for children nearer than `best`, m2.
+  [[nodiscard]] static Lanes squared_distance_bounds(const Node& node, const Eigen::Vector3f& x, double best) noexcept;
   void try_triangle(const Vector3& x, int triangle, Candidate& best) const noexcept;
   void descend(const Vector3& x, Candidate& best) const noexcept;
   [[nodiscard]] NearestPoint finish(const Vector3& x, const Candidate& best) const noexcept;
