@@ -121,7 +121,7 @@ Json cut(const Session& session, const RunFindings& findings) {
 
 Json tear(const RunFindings& findings) {
   const EnergyLedger& ledger = findings.tear.ledger;
-  const double spent = ledger.surface + ledger.dissipation;
+  const std::optional<double> open = ledger.open_share();
   Json systems = Json::object();
   for (const SystemUpdate update : {SystemUpdate::updated, SystemUpdate::condensed_anew, SystemUpdate::rebuilt}) {
     const auto known = findings.tear_updates.find(update);
@@ -139,7 +139,7 @@ Json tear(const RunFindings& findings) {
           {"surface_J", ledger.surface},
           {"dissipation_J", ledger.dissipation},
           {"imbalance_J", ledger.imbalance()},
-          {"energy_balance", spent > 0 ? Json(std::abs(ledger.imbalance()) / spent) : Json(nullptr)},
+          {"energy_balance", open ? Json(*open) : Json(nullptr)},
           {"last_reason", findings.tear.reason}};
 }
 

@@ -4,6 +4,8 @@
 #include "src/body_model.hpp"
 #include "src/body_update.hpp"
 
+#include <cmath>
+#include <optional>
 #include <string>
 
 namespace spherecut::app {
@@ -17,6 +19,11 @@ struct EnergyLedger {
   double dissipation = 0; // released beyond that: surplus of unstable and of late growth, letting go
   /// What the account leaves open: the error of the solution and of the release rates.
   [[nodiscard]] double imbalance() const { return tool + loads - elastic - surface - dissipation; }
+  /// The same as a share of what was spent; none before anything was.
+  [[nodiscard]] std::optional<double> open_share() const {
+    const double spent = surface + dissipation;
+    return spent > 0 ? std::optional(std::abs(imbalance()) / spent) : std::nullopt;
+  }
 };
 
 /// Of a solved body, J.

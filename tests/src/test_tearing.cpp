@@ -1,5 +1,6 @@
 // Tears in runs: a grasper that pulls, pre-strain that drives, growth that runs away, starts without a cut, accounts.
 #include "src/haptics/virtual_loop.hpp"
+#include "src/run_output.hpp"
 #include "src/session.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
@@ -52,7 +53,7 @@ position = [-0.03, 0, 0.033]
 )";
 
 double balance(const EnergyLedger& ledger) {
-  return std::abs(ledger.imbalance()) / (ledger.surface + ledger.dissipation);
+  return ledger.open_share().value();
 }
 
 void require_sound(const Session& session) {
@@ -100,6 +101,24 @@ TEST_CASE("A notch in a stretched bar runs away, parts the bar, and says so") {
   CHECK(result.tear->ledger.loads > 2 * result.tear->ledger.surface); // the pre-strain works as the bar draws back
   CHECK(balance(result.tear->ledger) < 0.05);
   require_sound(session);
+}
+
+TEST_CASE("An account of tears that leaves more than a quarter open is told") {
+  Session session(scenario_of(stretched_bar(0.15, 0.05, bar_notch + "[tearing]\nstep = 1.0\n")));
+  StepResult result = session.step(session.steps().front());
+  REQUIRE(result.tear->increments.size() > 1);
+  const auto remarks_at = [&](double open) {
+    const TemporaryFolder folder;
+    RunOutput output(folder.path(), session);
+    result.tear->ledger = {.tool = 0, .loads = 1.5 + 2 * open, .elastic = -0.5, .surface = 1.5, .dissipation = 0.5};
+    CHECK(balance(result.tear->ledger) == Approx(open));
+    output.add(session, result);
+    output.write_summary(session, RunStatus::complete, "");
+    return output.remarks();
+  };
+  CHECK(remarks_at(0.2).empty());
+  REQUIRE(remarks_at(0.4).size() == 1);
+  CHECK_THAT(remarks_at(0.4).front(), Contains("40 % of what they spent open"));
 }
 
 TEST_CASE("A notch in a bar that is tough enough stays as it is") {
