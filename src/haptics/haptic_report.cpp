@@ -51,19 +51,21 @@ void write_ticks(const std::filesystem::path& file, const LoopRecords& records,
 
 void write_solves(const std::filesystem::path& file, const std::vector<SolveRecord>& solves) {
   OutputFile out(file);
-  std::string text = "sequence,pose_tick,arrival_tick,degradation,failed,resprinkled,cut_triangles,nodes,candidates,"
-                     "active,asymmetry,force_N,cut_area_m2,blade_N,edge_N,release_J_m2,edge_pieces,work_J,surface_J,"
-                     "update,residual,swapped,seconds\n";
+  std::string text =
+      "sequence,pose_tick,arrival_tick,degradation,failed,resprinkled,force_jump,cut_triangles,nodes,"
+      "candidates,active,asymmetry,force_N,cut_area_m2,blade_N,edge_N,release_J_m2,edge_pieces,work_J,surface_J,"
+      "update,residual,swapped,seconds\n";
   for (const SolveRecord& solve : solves)
     text += fmt::format(
-        "{},{},{},{},{:d},{:d},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{},{:.2g},{:d},{:"
+        "{},{},{},{},{:d},{:d},{:.3g},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{},{:.2g},"
+        "{:d},{:"
         ".6g}\n",
         solve.event.sequence, solve.event.pose_tick,
         solve.event.arrival_tick == SolveEvent::never ? "" : fmt::format("{}", solve.event.arrival_tick),
-        solve.event.degradation, solve.failed, solve.resprinkled, solve.cut_triangles, solve.nodes, solve.candidates,
-        solve.active, solve.asymmetry, solve.force.norm(), solve.cut_area, solve.blade_force.norm(), solve.blade_edge,
-        solve.blade_release, solve.blade_contacts, solve.blade_work, solve.blade_surface, solve.update, solve.residual,
-        solve.event.swaps, solve.seconds);
+        solve.event.degradation, solve.failed, solve.resprinkled, solve.force_jump, solve.cut_triangles, solve.nodes,
+        solve.candidates, solve.active, solve.asymmetry, solve.force.norm(), solve.cut_area, solve.blade_force.norm(),
+        solve.blade_edge, solve.blade_release, solve.blade_contacts, solve.blade_work, solve.blade_surface,
+        solve.update, solve.residual, solve.event.swaps, solve.seconds);
   out.write(text);
   out.close();
 }
@@ -159,6 +161,7 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
   for (const SolveRecord& record : records.solves) {
     findings.failed += record.failed ? 1 : 0;
     findings.resprinkled += record.resprinkled ? 1 : 0;
+    findings.resprinkle_jump = std::max(findings.resprinkle_jump, record.force_jump);
     findings.swaps += record.event.swaps ? 1 : 0;
     findings.increments += record.cut_triangles > 0 ? 1 : 0;
     findings.blade_peak = std::max(findings.blade_peak, record.blade_force.norm());
@@ -195,15 +198,16 @@ std::string text_of(const HapticFindings& f) {
     text = fmt::format(
         "haptic loop in virtual time: {:g} ticks and {:.4g} solves a second of it\nsimulation: a solve took ", f.rate,
         f.solve_rate);
-  text +=
-      fmt::format("p50 {:.2f}, p99 {:.2f}, max {:.1f} ms; {} cut increments, {} re-sprinkles, {} failed, coarsened to "
-                  "level {}{}\n",
-                  1e3 * f.solve.p50, 1e3 * f.solve.p99, 1e3 * f.solve.largest, f.increments, f.resprinkled, f.failed,
-                  f.highest_degradation,
-                  f.highest_degradation > 0 ? fmt::format(" (rebuilds missed their budget: nodes up to {:.2g} "
-                                                          "times as far apart)",
-                                                          std::pow(coarse_per_level, f.highest_degradation))
-                                            : "");
+  text += fmt::format(
+      "p50 {:.2f}, p99 {:.2f}, max {:.1f} ms; {} cut increments, {} re-sprinkles{}, {} failed, coarsened to "
+      "level {}{}\n",
+      1e3 * f.solve.p50, 1e3 * f.solve.p99, 1e3 * f.solve.largest, f.increments, f.resprinkled,
+      f.resprinkle_jump > 0 ? fmt::format(" (of the force by up to {:.2g} %)", 100 * f.resprinkle_jump) : "", f.failed,
+      f.highest_degradation,
+      f.highest_degradation > 0 ? fmt::format(" (rebuilds missed their budget: nodes up to {:.2g} "
+                                              "times as far apart)",
+                                              std::pow(coarse_per_level, f.highest_degradation))
+                                : "");
   text += fmt::format("force: peak {:.4g} N; largest step in a tick {:.3g} N (at hand-overs {:.3g}, onset {:.3g}, cut "
                       "increments {:.3g} N)\n",
                       f.peak, f.steps.any, f.steps.hand_over, f.steps.onset, f.steps.cut);
@@ -255,6 +259,7 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
       {"failed_solves", f.failed},
       {"cut_increments", f.increments},
       {"resprinkles", f.resprinkled},
+      {"largest_resprinkle_jump", f.resprinkle_jump},
       {"background_swaps", f.swaps},
       {"highest_degradation", f.highest_degradation},
       {"peak_force_N", f.peak},

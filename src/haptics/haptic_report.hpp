@@ -44,6 +44,7 @@ struct HapticFindings {
   std::uint64_t softened = 0;               // ticks
   double blade_peak = 0;                    // N, of the solves
   double blade_work = 0, blade_surface = 0; // J
+  double resprinkle_jump = 0;               // largest, as a share of the force
   double cut_area = 0;                      // m2, of the last solve's body
   bool unfollowed = false;                  // at the end that had yet to follow the blade (blade.advance)
   int highest_degradation = 0;

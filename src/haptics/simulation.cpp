@@ -224,6 +224,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
   }
   snapshot.sequence = event.sequence;
   SolveRecord record = record_of(event, snapshot);
+  record.force_jump = simulation.result().force_jump;
   if (const auto& cut = simulation.result().cut) {
     record.cut_area = cut->area;
     record.residual = simulation.result().residual;

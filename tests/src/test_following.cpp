@@ -1,4 +1,5 @@
 // Nodes that follow the tool beside the steps, fixed regions that keep theirs, and what a viewer is told of tears.
+#include "src/haptics/haptic_report.hpp"
 #include "src/haptics/tear_status.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
@@ -12,6 +13,7 @@
 using namespace spherecut;
 using namespace spherecut::app;
 using namespace spherecut::tests;
+using Catch::Contains;
 
 namespace {
 
@@ -84,6 +86,20 @@ TEST_CASE("In the loop nodes made beside it are taken over at the recorded solve
   const LoopRecords records = run_twice(scenario_of(slide), solves_aside(1500, 50, 20), 1500);
   CHECK(std::count_if(records.solves.begin(), records.solves.end(),
                       [](const SolveRecord& solve) { return solve.resprinkled; }) >= 2);
+}
+
+TEST_CASE("The loop tells by how much the force changed when the nodes followed in a step") {
+  const Scenario scenario = scenario_of(slide);
+  const LoopRecords records = run_twice(scenario, regular_solves(1500, 50, 20), 1500);
+  double largest = 0;
+  for (const SolveRecord& solve : records.solves) {
+    CHECK((solve.force_jump > 0) == solve.resprinkled);
+    largest = std::max(largest, solve.force_jump);
+  }
+  REQUIRE(largest > 0);
+  const HapticFindings findings = findings_of(HapticSettings{}, records, {});
+  CHECK(findings.resprinkle_jump == largest);
+  CHECK_THAT(text_of(findings), Contains("re-sprinkles (of the force by up to "));
 }
 
 TEST_CASE("A fixed region too small for coarser nodes keeps the node that it had") {
