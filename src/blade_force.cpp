@@ -9,23 +9,24 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double least_width = 0.75;    // of the node spacing: half width of the edge's contact
-constexpr double first_trigger = 1.2;   // of the needed release, at which a first cut is proposed
-constexpr double least_increment = 0.2; // of the node spacing: no later cut is shorter
-constexpr double longer_proposal = 1.5; // how much farther the blade is when a longer cut is proposed instead
-constexpr double depth_factor = 2;      // of its depth in the body: how far a piece of the edge may push
-constexpr int entry_steps = 12;         // halvings towards the place where the edge entered
-constexpr double probe_share = 0.05;    // of the half width: a step along the way for the stiffness
-constexpr double due_reach = 3;         // node spacings ahead in which the next cut is looked for
-constexpr int stroke_parts = 4;         // over which the forces are taken to change evenly
-constexpr double lip_tolerance = 1e-6;  // m
-constexpr double open_reach = 0.3;      // node spacings from a sheet: a place there lies in the cut
-constexpr int way_parts = 32;           // of a motion that is looked at for tissue
-constexpr double same_contact = 1e-4;   // of the node spacing, and of one: what has not moved
-constexpr double in_sheet = 0.1;        // node spacings from a sheet: a place there is in it
-constexpr double least_motion = 1e-3;   // of the node spacing, that tells a direction
-constexpr double same_pose = 1e-6;      // of the way from one pose to the next: no other pose
-constexpr int wait_steps = 20;          // halvings towards the place where a cut is due
+constexpr double least_width = 0.75;             // of the node spacing: half width of the edge's contact
+constexpr double first_trigger = 1.2;            // of the needed release, at which a first cut is proposed
+constexpr double first_wait = 2 * first_trigger; // the same, past which the blade waits for a first cut
+constexpr double least_increment = 0.2;          // of the node spacing: no later cut is shorter
+constexpr double longer_proposal = 1.5;          // how much farther the blade is when a longer cut is proposed instead
+constexpr double depth_factor = 2;               // of its depth in the body: how far a piece of the edge may push
+constexpr int entry_steps = 12;                  // halvings towards the place where the edge entered
+constexpr double probe_share = 0.05;             // of the half width: a step along the way for the stiffness
+constexpr double due_reach = 3;                  // node spacings ahead in which the next cut is looked for
+constexpr int stroke_parts = 4;                  // over which the forces are taken to change evenly
+constexpr double lip_tolerance = 1e-6;           // m
+constexpr double open_reach = 0.3;               // node spacings from a sheet: a place there lies in the cut
+constexpr int way_parts = 32;                    // of a motion that is looked at for tissue
+constexpr double same_contact = 1e-4;            // of the node spacing, and of one: what has not moved
+constexpr double in_sheet = 0.1;                 // node spacings from a sheet: a place there is in it
+constexpr double least_motion = 1e-3;            // of the node spacing, that tells a direction
+constexpr double same_pose = 1e-6;               // of the way from one pose to the next: no other pose
+constexpr int wait_steps = 20;                   // halvings towards the place where a cut is due
 constexpr double stop_distance = 0.1; // node spacings: poses nearer to each other are one, of a way that is made up for
 
 Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
@@ -456,7 +457,7 @@ std::vector<std::size_t> BladeForce::stops() const {
 
 bool BladeForce::is_past_due(const VectorX& advance) const {
   const solvers::BladeState state = solvers::push_blade(meeting_.patch, advance, meeting_.patch.dragged ? 1 : 0);
-  return !first_cut(state) && report_of(state).release > needed();
+  return report_of(state).release > (first_cut(state) ? first_wait : 1) * needed();
 }
 
 bool BladeForce::lags() const {
@@ -491,7 +492,7 @@ double BladeForce::toughness_of(const Meeting& meeting) const {
     sum += contact.length * toughness_(contact.point + 0.5 * half_width_ * contact.push);
     length += contact.length;
   }
-  return sum / length;
+  return length > 0 ? sum / length : 0;
 }
 
 double BladeForce::needed_for_proposal() const {
@@ -567,7 +568,7 @@ BodyModel BladeForce::take() {
   BodyModel body = std::move(proposal_->body);
   proposal_.reset();
   press(body);
-  ledger_.cut(before, *state_, paid / area, settings_.sharpness, area);
+  ledger_.cut(before, *state_, area > 0 ? paid / area : 0, settings_.sharpness, area);
   return body;
 }
 
@@ -594,6 +595,12 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
     return grip;
   grip.along = here.edge_force > 0 ? Vector3(-state_->edge_force / here.edge_force) : way.normalized();
   grip.contacts = static_cast<int>(meeting_.pieces.size());
+  grip.places = std::min(grip.contacts, BladeGrip::most_places);
+  for (int k = 0; k < grip.places; ++k) { // from the first to the last
+    const int c = grip.places > 1 ? k * (grip.contacts - 1) / (grip.places - 1) : 0;
+    const Vector3& point = edge_[static_cast<std::size_t>(meeting_.pieces[static_cast<std::size_t>(c)])].point;
+    grip.place[static_cast<std::size_t>(k)] = way_.back().orientation * point;
+  }
   grip.force = state_->blade_force;
   grip.edge = here.edge_force;
   grip.drag = (meeting_.drawn_back ? -1.0 : 1.0) * (state_->blade_force - state_->edge_force);
@@ -622,11 +629,13 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
     double length = 0;
     for (const solvers::EdgeContact& contact : meeting_.patch.contacts)
       length += contact.length;
-    // Where nothing is cut yet it is not known: twice what proposes a first cut, or what there is, is as far as a solve
-    // may be gone on from.
+    // Where nothing is cut yet it is not known: what the blade waits for a first cut at or, past that, twice what there
+    // is, is as far as a solve may be gone on from.
     const double least = needed() * length;
-    grip.due = now.incision != nullptr && !first_cut(*state_) ? std::max(grip.edge, least)
-                                                              : 2 * std::max(grip.edge, first_trigger * least);
+    if (now.incision != nullptr && !first_cut(*state_))
+      grip.due = std::max(grip.edge, least);
+    else
+      grip.due = grip.edge > (1 + same_pose) * first_wait * least ? 2 * grip.edge : first_wait * least;
   }
   return grip;
 }

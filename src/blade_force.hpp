@@ -77,8 +77,8 @@ class BladeForce {
   /// There was nothing to cut through these poses, or it cannot be: the front goes on without a cut.
   void pass(std::size_t poses, const BodyModel& now);
   [[nodiscard]] bool proposed() const { return proposal_.has_value(); }
-  /// Moves the blade on while its next cut is being made: as far as the force of steady cutting, but in a first cut,
-  /// which takes more, or to its pose.
+  /// Moves the blade on while its next cut is being made: as far as the force of steady cutting (in a first cut, which
+  /// takes more, a multiple of it) or to its pose.
   void wait(const BodyModel& now);
   /// Whether it has been left so far behind its pose that there is a cut to come.
   [[nodiscard]] bool lags() const;

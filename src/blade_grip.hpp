@@ -3,6 +3,7 @@
 
 #include "topology/types.hpp"
 
+#include <array>
 #include <limits>
 
 namespace spherecut::app {
@@ -19,7 +20,11 @@ struct BladeGrip {
   Vector3 drag = Vector3::Zero();                       // N, of the flanks on the blade as it goes along
   double stored = 0;                                    // J, elastic, behind the force
   double release = 0;                                   // J/m2, of the edge's force on the front that it presses
-  double work = 0, surface = 0;                         // J, of the blade since the start, and of it on new surface
+  // Places on the parts of the edge that press, m, from the blade's position: once they are out of the body it is free.
+  static constexpr int most_places = 4;
+  int places = 0;
+  std::array<Vector3, most_places> place{};
+  double work = 0, surface = 0; // J, of the blade since the start, and of it on new surface
 };
 
 } // namespace spherecut::app

@@ -7,9 +7,12 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double softening = 50; // per second, at most, by which the rendered share of the force falls
-constexpr double hardening = 2;  // the same as it rises
-constexpr double rim = 0.8;      // of the candidates' reach: a contact beyond it takes the patch along
+constexpr double softening = 50;     // per second, at most, by which the rendered share of the force falls
+constexpr double hardening = 2;      // the same as it rises
+constexpr double out_of_body = 1e-3; // m, over which a blade's edge comes clear of the surface
+constexpr double rim = 0.8;          // of the candidates' reach: a contact beyond it takes the patch along
+
+const topology::ToolShape edge_point = topology::SphereTip{1e-9};
 
 // A grasper's force is that of the last solve, held.
 bool holds_force(const ContactSnapshot& snapshot) {
@@ -43,17 +46,17 @@ topology::ToolPose tool_pose(const topology::ToolShape& tool, const DeviceState&
 }
 
 HapticTick::HapticTick(const HapticSettings& settings, const topology::ToolShape& tool,
-                       const topology::ContactQuery* organ)
-    : settings_(settings), tool_(tool), organ_(organ), model_(make_force_model(settings.model, tool)),
-      passivity_(settings.limits, settings.rate, settings.passivity) {}
+                       const topology::ContactQuery* organ, bool with_tool)
+    : settings_(settings), tool_(tool), organ_(organ), with_tool_(with_tool && organ != nullptr),
+      model_(make_force_model(settings.model, tool)), passivity_(settings.limits, settings.rate, settings.passivity) {}
 
 void HapticTick::start(const DeviceState& device) {
-  if (organ_ != nullptr)
+  if (with_tool_)
     contact_ = organ_->first_touch(tool_, tool_pose(tool_, device));
 }
 
 void HapticTick::locate(const DeviceState& device) noexcept {
-  if (organ_ == nullptr || located_ == device.tick + 1 || !follows_surface(device))
+  if (!with_tool_ || located_ == device.tick + 1 || !follows_surface(device))
     return;
   const topology::ToolPose pose = tool_pose(tool_, device);
   contact_ = organ_->walk(tool_, pose, contact_);
@@ -65,6 +68,26 @@ void HapticTick::locate(const DeviceState& device) noexcept {
   }
   fresh_ = false;
   located_ = device.tick + 1;
+}
+
+// Of the places of the edge that pressed in the last solve. A solve can take long, and the blade be out by then: over a
+// millimetre above the surface at rest, or above where it was above that already, its force fades.
+double HapticTick::share_inside(const Vector3& position) noexcept {
+  const BladeGrip& grip = snapshot_->blade;
+  if (organ_ == nullptr || grip.places == 0)
+    return 1;
+  const auto depth_at = [&](const Vector3& from, std::size_t k) {
+    edge_[k] = organ_->walk(edge_point, {from + grip.place[k], Vector3::UnitZ()}, edge_[k]);
+    return edge_[k].depth;
+  };
+  const bool is_new = std::exchange(edge_fresh_, false);
+  double sum = 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(grip.places); ++k) {
+    if (is_new)
+      edge_depth_[k] = std::min(0.0, depth_at(snapshot_->pose.point, k));
+    sum += std::clamp(1 + (depth_at(position, k) - edge_depth_[k]) / out_of_body, 0.0, 1.0);
+  }
+  return sum / grip.places;
 }
 
 HapticTick::Origin HapticTick::origin(const DeviceState& device) const noexcept {
@@ -85,7 +108,17 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
     return held;
   }
   topology::ToolPose pose = tool_pose(tool_, device);
-  if (follows_surface(device) && organ_ != nullptr && snapshot_->count > 0 && contact_.depth > 0) {
+  if (origin_ == Origin::blade) {
+    ModelForce held = model_->at(pose, device.time);
+    const double share = held.active > 0 ? share_inside(device.position) : 1;
+    held.force *= share;
+    held.stiffness *= share;
+    if (held.stored)
+      *held.stored *= share;
+    held.active = share > 0 ? held.active : 0;
+    return held;
+  }
+  if (follows_surface(device) && with_tool_ && snapshot_->count > 0 && contact_.depth > 0) {
     Vector3 away = contact_.point - snapshot_->contact.point;
     away -= away.dot(contact_.normal) * contact_.normal;
     const double distance = away.norm();
@@ -114,6 +147,7 @@ bool HapticTick::jumps(const DeviceState& device) const noexcept {
 void HapticTick::arrive(const ContactSnapshot& snapshot) noexcept {
   arrived_ = !model_->solved(snapshot) || holds_force(snapshot) || arrived_;
   fresh_ = true;
+  edge_fresh_ = true;
   snapshot_ = &snapshot;
 }
 

@@ -45,8 +45,10 @@ struct TickResult {
 /// first solve from there, has been found. The force is handed over, from none where nobody held the tool.
 class HapticTick {
  public:
-  /// `organ` follows the contact on the surface at rest; null: not followed. Tool and organ must outlive this.
-  HapticTick(const HapticSettings& settings, const topology::ToolShape& tool, const topology::ContactQuery* organ);
+  /// `organ` follows the contact of a tool, and the edge of a blade, on the surface at rest; null: not followed. Tool
+  /// and organ must outlive this. `with_tool` false: there is a blade alone.
+  HapticTick(const HapticSettings& settings, const topology::ToolShape& tool, const topology::ContactQuery* organ,
+             bool with_tool = true);
 
   /// Where the walk over the surface starts; before the first tick.
   void start(const DeviceState& device);
@@ -60,16 +62,21 @@ class HapticTick {
   [[nodiscard]] Origin origin(const DeviceState& device) const noexcept;
   [[nodiscard]] ModelForce ask(const DeviceState& device, bool& outside) noexcept;
   void locate(const DeviceState& device) noexcept;
+  [[nodiscard]] double share_inside(const Vector3& position) noexcept;
   void soften(const ModelForce& model) noexcept;
   [[nodiscard]] bool jumps(const DeviceState& device) const noexcept;
 
   HapticSettings settings_;
   const topology::ToolShape& tool_;
   const topology::ContactQuery* organ_;
+  bool with_tool_;
   std::unique_ptr<ForceModel> model_;
   PassivityControl passivity_;
   const ContactSnapshot* snapshot_ = nullptr;
   topology::SurfaceContact contact_;
+  std::array<topology::SurfaceContact, BladeGrip::most_places> edge_; // of the blade's edge and the surface
+  std::array<double, BladeGrip::most_places> edge_depth_{};           // m, below that where it was solved; at most 0
+  bool edge_fresh_ = false;                                           // a solve has come since they were found
   std::uint64_t located_ = 0;    // tick after which contact_ was found, plus one; 0: never
   bool arrived_ = false;         // a snapshot that changes the force has come since the last tick
   bool fresh_ = false;           // any snapshot has

@@ -205,7 +205,7 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
   LoopRecords records;
   const Session& session = simulation.session();
   const topology::ContactQuery query(session.organ().domain->surface());
-  HapticTick core(settings, simulation.tool(), session.scenario().tool ? &query : nullptr);
+  HapticTick core(settings, simulation.tool(), &query, session.scenario().tool.has_value());
   const DeviceState first = device.read(0);
   simulation.prepare(first);
   core.start(first);

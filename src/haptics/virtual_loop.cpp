@@ -113,7 +113,7 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
   cores.reserve(settings.size());
   for (const HapticSettings& one : settings)
     cores.push_back(
-        std::make_unique<HapticTick>(one, simulation.tool(), simulation.session().scenario().tool ? &query : nullptr));
+        std::make_unique<HapticTick>(one, simulation.tool(), &query, simulation.session().scenario().tool.has_value()));
   std::vector<LoopRecords> records(settings.size());
   std::vector<SolveRecord> solves;
   InFlight flights;

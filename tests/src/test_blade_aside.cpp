@@ -84,6 +84,28 @@ TEST_CASE("A resisted blade whose cuts are made beside the steps waits at the fo
   CHECK(end.cut->blade.force.norm() == 0);
 }
 
+TEST_CASE("A blade whose first cut is long in the making waits for it, and nothing is lost") {
+  const Scenario scenario = scenario_of(through_a_corner);
+  Session in_step(scenario);
+  const double area = run(in_step).back().cut->area;
+  Session aside(scenario);
+  aside.set_following_aside(true);
+  int waited = 0;
+  StepResult end;
+  for (const StepSample& sample : aside.steps()) { // bodies are taken where the blade has got too far ahead
+    end = aside.step(sample);
+    if (end.cut->area > 0 || !aside.recondensing())
+      continue;
+    waited += aside.blade()->lags() ? 1 : 0;
+    CHECK(end.cut->blade.release <= 2.4 * toughness * (1 + 1e-4));
+  }
+  CHECK(waited >= 2);
+  CHECK(end.cut->area == Approx(area).epsilon(0.05));
+  const solvers::BladeLedger& ledger = end.cut->blade.ledger;
+  CHECK(ledger.surface == Approx(toughness * end.cut->area).epsilon(1e-9));
+  CHECK(ledger.imbalance() < 0.02);
+}
+
 TEST_CASE("A session whose resisted blade is followed beside the steps comes out the same twice") {
   const LoopRecords records = run_twice(scenario_of(through_a_corner), solves_aside(400, 10, 10), 400);
   CHECK(records.solves.back().cut_area > 1e-4);

@@ -146,6 +146,37 @@ TEST_CASE("The hand feels a blade indent and cut at toughness times width, witho
   CHECK(damped < 0.01 * peak); // energy that a solve finds is no reason to damp
 }
 
+TEST_CASE("Between solves the force on a blade's edge ends where the edge comes out of the body") {
+  const auto domain = topology::make_box_domain({-0.03, -0.03, 0}, {0.03, 0.03, 0.03}, 0.005);
+  const topology::ContactQuery organ(domain->surface());
+  const topology::ToolShape none = topology::SphereTip{0.004};
+  HapticTick core({}, none, &organ, false);
+  ContactSnapshot snapshot = edge_of(0);
+  snapshot.without_tool = true;
+  snapshot.pose.point = {0, 0, 0.022};
+  snapshot.blade.stored = 0.002;
+  snapshot.blade.places = 2; // an upright edge from the blade's position on
+  snapshot.blade.place = {Vector3(0, 0, 0), Vector3(0, 0, 0.004)};
+  core.start({0, 0, snapshot.pose.point});
+  core.arrive(snapshot);
+  std::uint64_t tick = 0;
+  const auto up_to = [&](double from, double to) {
+    TickResult last;
+    for (int k = 1; k <= 400; ++k, ++tick)
+      last = core.tick({tick, 1e-3 * static_cast<double>(tick), {0, 0, std::lerp(from, to, k / 400.0)}});
+    return last.model;
+  };
+  const double whole = up_to(0.022, 0.0255).force.norm();
+  CHECK(whole > 0.5);
+  CHECK(up_to(0.0255, 0.0265).force.norm() == Approx(0.75 * whole).epsilon(0.1)); // the upper end, half a millimetre up
+  CHECK(up_to(0.0265, 0.029).force.norm() == Approx(0.5 * whole).epsilon(0.1));
+  const ModelForce out = up_to(0.029, 0.0311);
+  CHECK(out.force.norm() == 0);
+  CHECK(*out.stored == 0);
+  CHECK(out.active == 0);
+  CHECK(up_to(0.0311, 0.05).force.norm() == 0);
+}
+
 TEST_CASE("With the controller on, a contact stiffer than the device is rendered as stiff as that") {
   const auto run = [](bool controlled, double stiffness) {
     const topology::ToolShape tool = topology::SphereTip{0.004};
