@@ -219,7 +219,7 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
   };
   std::size_t leg = front; // from way_[leg] to the next
   topology::BladePose met = way_[front];
-  const bool on_surface = outside(met);
+  bool on_surface = outside(met);
   if (on_surface) {
     while (leg + 1 < way_.size() && outside(way_[leg + 1]))
       ++leg;
@@ -231,6 +231,26 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
       (outside(pose_between(way_[leg], way_[leg + 1], middle)) ? out : in) = middle;
     }
     met = pose_between(way_[leg], way_[leg + 1], in);
+    // Where it comes back into a cut it meets nothing before it has gone through that.
+    const auto is_cut = [&](const topology::BladePose& pose) {
+      return lies_in(*body.incision, to_rest, placed(pose, part.point));
+    };
+    if (body.incision != nullptr && is_cut(met)) {
+      double begin = in;
+      while (leg + 1 < way_.size() && is_cut(way_[leg + 1])) {
+        ++leg;
+        begin = 0;
+      }
+      if (leg + 1 >= way_.size())
+        return;
+      double cut = begin, uncut = 1;
+      for (int k = 0; k < entry_steps; ++k) {
+        const double middle = 0.5 * (cut + uncut);
+        (is_cut(pose_between(way_[leg], way_[leg + 1], middle)) ? cut : uncut) = middle;
+      }
+      met = pose_between(way_[leg], way_[leg + 1], cut);
+      on_surface = false;
+    }
   }
   // Its way from there: to where it is clear of its start and, past a turn, of the cut that is there already, on whose
   // faces it does not push when it goes back.

@@ -541,6 +541,37 @@ TEST_CASE("A blade that is pressed too little does not cut, and leaves nothing b
   CHECK(std::none_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
 }
 
+TEST_CASE("A blade that comes back into its own cut meets nothing before it has gone through it, then cuts on") {
+  const std::string text =
+      replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
+      "[cut]\nfront_spacing = 0.004\n" +
+      blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.02]", "[0.004, 0, 0.034]", "[0.004, 0, 0.015]"}, 0.04, "0.05");
+  Session session = session_of(text);
+  double area = 0, depth = 0, work = 0;
+  bool was_out = false;
+  StepResult last;
+  for (const StepSample& sample : session.steps()) {
+    last = session.step(sample);
+    const double z = sample.blade->position.z();
+    if (last.cut->area > 0)
+      CHECK(last.cut->blade.ledger.imbalance() < 0.05);
+    if (!was_out) {
+      was_out = z > 0.033;
+      area = last.cut->area;
+      depth = area / 0.06;
+      work = last.cut->blade.ledger.work;
+    } else if (z > 0.0305 - depth) { // down to the front that it has left
+      CHECK(last.cut->blade.force.norm() == 0);
+      CHECK(last.cut->area == area);
+      CHECK(last.cut->blade.ledger.work == work);
+    }
+  }
+  REQUIRE(was_out);
+  REQUIRE(depth > 0.005);
+  CHECK(last.cut->area > area + 0.06 * 0.003);
+  CHECK(last.cut->blade.release == Approx(10).epsilon(0.3));
+}
+
 TEST_CASE("A resisted blade's steady force is toughness times width in short steps, too") {
   Session session =
       session_of(replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 5") +
