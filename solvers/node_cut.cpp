@@ -129,7 +129,13 @@ class Chooser {
     std::array<Vector3, 2> x{p + offset * n, p - offset * n};
     if (on_rim)
       x = {on_surface(p, n, edge, offset), on_surface(p, n, edge, -offset)};
-    if (!incision_.blocks(x[0], x[1]) || faces_another(x[0], h, sheet) || faces_another(x[1], h, sheet))
+    // On a sharp fold one of the two would lie on the other face.
+    const auto on_sheet = [&](const Vector3& at) {
+      const auto face = incision_.closest(at, offset);
+      return face && face->distance < 0.5 * offset;
+    };
+    if (!incision_.blocks(x[0], x[1]) || on_sheet(x[0]) || on_sheet(x[1]) || faces_another(x[0], h, sheet) ||
+        faces_another(x[1], h, sheet))
       return false;
     keep_lip(x[0], h, sheet);
     keep_lip(x[1], h, sheet);

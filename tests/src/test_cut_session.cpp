@@ -160,6 +160,47 @@ TEST_CASE("A wound stays as it is while the blade goes back through it, and goes
   CHECK(last.cut->opening_volume == Approx(expected.opening_volume).epsilon(0.06));
 }
 
+TEST_CASE("A box cut out of a block: lip nodes keep off the folds of its sheet, and it opens under pressure") {
+  const TemporaryFolder folder;
+  topology::SurfaceMesh box{{},
+                            {{0, 2, 1},
+                             {1, 2, 3},
+                             {4, 5, 6},
+                             {5, 7, 6},
+                             {0, 1, 4},
+                             {1, 5, 4},
+                             {2, 6, 3},
+                             {3, 6, 7},
+                             {0, 4, 2},
+                             {2, 4, 6},
+                             {1, 3, 5},
+                             {3, 7, 5}}};
+  for (int k = 0; k < 8; ++k)
+    box.vertices.emplace_back((k & 1) != 0 ? 0.0127 : -0.0113, (k & 2) != 0 ? 0.0123 : -0.0117,
+                              (k & 4) != 0 ? 0.026 : 0.008);
+  topology::write_surface(folder.path() / "box.obj", box);
+  const std::string coarse = GENERATE(as<std::string>(), "0.012", "0.009", "0.007");
+  const auto file =
+      write_file(folder.path() / "case.toml",
+                 replaced(cut_block, "coarse_spacing = 0.012", "coarse_spacing = " + coarse) +
+                     "[cut]\nunheld = \"hold\"\n[[precut]]\nshape = \"file\"\nfile = \"box.obj\"\npressure = 50\n");
+  Session session(read_scenario(file));
+  const StepResult last = run(session).back();
+  CHECK(last.cut->pieces == 2);
+  CHECK(last.cut->volumes.back() == Approx(0.024 * 0.024 * 0.018).epsilon(1e-9));
+  CHECK(last.cut->opening_volume > 1e-8);
+  CHECK(last.residual < 1e-8);
+  const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+  int lips = 0;
+  for (int i = 0; i < nodes.size(); ++i)
+    if (nodes.kinds[i] == solvers::NodeKind::lip) {
+      ++lips;
+      const double offset = solvers::lip_offset * nodes.spacings[i];
+      CHECK(session.incision()->closest(nodes.positions[i], 2 * offset)->distance >= 0.5 * offset);
+    }
+  CHECK(lips >= 24);
+}
+
 TEST_CASE("A severed piece that nothing holds is held, dropped or refused as the scenario asks, and said") {
   SECTION("hold") {
     Session session = session_of(cut_block + topping + "[cut]\nunheld = \"hold\"\n");
