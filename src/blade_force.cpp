@@ -12,7 +12,8 @@ namespace {
 constexpr double least_width = 0.75;             // of the node spacing: half width of the edge's contact
 constexpr double first_trigger = 1.2;            // of the needed release, at which a first cut is proposed
 constexpr double first_wait = 2 * first_trigger; // the same, past which the blade waits for a first cut
-constexpr double least_increment = 0.2;          // of the node spacing: no later cut is shorter
+constexpr double least_increment = 0.2;          // of the node spacing: no later cut is shorter, where that is less
+constexpr double smallest_increment = 0.05;      // than what it gives way by before it cuts; else down to this
 constexpr double longer_proposal = 1.5;          // how much farther the blade is when a longer cut is proposed instead
 constexpr double depth_factor = 2;               // of its depth in the body: how far a piece of the edge may push
 constexpr int entry_steps = 12;                  // halvings towards the place where the edge entered
@@ -443,8 +444,8 @@ std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
   const double share = needed() / pressed.release; // of its advance that the edge can keep
   double remaining = share * way;
   // A cut of the least length is due when the edge has as much to spare before it as it lacks after it: half of that
-  // length farther on.
-  const double least = least_increment * spacing_;
+  // length farther on. Where little force cuts less is cut at a time, so that it stays within half of that force.
+  const double least = std::clamp(share * way, smallest_increment * spacing_, least_increment * spacing_);
   bool near = way - remaining >= 0.5 * least;
   if (way - remaining < least)
     remaining = std::max(0.0, way - least);

@@ -94,8 +94,13 @@ HandMode mode_of(const Json& value) {
 
 SettingsChange settings_of(const Json& message) {
   SettingsChange change;
+  std::size_t known = 1; // the type
+  const auto has = [&](const char* name) {
+    known += message.contains(name) ? 1 : 0;
+    return message.contains(name);
+  };
   const auto number = [&](const char* name, std::optional<double>& value) {
-    if (message.contains(name))
+    if (has(name))
       value = number_of(message[name], name);
   };
   number("young_modulus", change.young_modulus);
@@ -103,10 +108,13 @@ SettingsChange settings_of(const Json& message) {
   number("toughness", change.toughness);
   number("fine_spacing", change.fine_spacing);
   number("coarse_spacing", change.coarse_spacing);
-  if (message.contains("method"))
+  if (has("method"))
     change.method = solvers::method_from_string(text_of(message["method"], "method"));
-  if (message.contains("sight"))
+  if (has("sight"))
     change.sight = solvers::sight_rule_from_string(text_of(message["sight"], "sight"));
+  if (known == 1 || known < message.size()) // a session is not begun anew, its cuts lost, by a name that is mistyped
+    refuse("'set' must name one or more of young_modulus, poisson_ratio, toughness, fine_spacing, coarse_spacing, "
+           "method and sight, and nothing else");
   return change;
 }
 

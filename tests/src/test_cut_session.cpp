@@ -653,6 +653,24 @@ TEST_CASE("The flanks of a blade drag against its motion, forwards and back") {
   CHECK(back > 0);
 }
 
+TEST_CASE("Where little force cuts, a resisted blade cuts at that force in short steps, too") {
+  const std::string text = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 0.5") +
+                           "[cut]\nfront_spacing = 0.004\n" +
+                           blade({"[0.004, 0, 0.0305]", "[0.004, 0, 0.0235]"}, 0.04, "0.025");
+  Session session = session_of(text);
+  StepResult last;
+  double most = 0;
+  for (const StepSample& sample : session.steps()) {
+    last = session.step(sample);
+    if (last.cut->area > 0.06 * 0.003) // past the first cut
+      most = std::max(most, last.cut->blade.release);
+  }
+  const solvers::BladeLedger& ledger = last.cut->blade.ledger;
+  REQUIRE(last.cut->area > 0.06 * 0.005);
+  CHECK(ledger.work < 1.15 * (ledger.surface + ledger.stored));
+  CHECK(most < 5 * 0.5);
+}
+
 TEST_CASE("Tissue that a resisted blade has gone through without cutting it is told") {
   const std::string tough = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 20000");
   SECTION("where it presses too little to cut, and comes out at the other side") {

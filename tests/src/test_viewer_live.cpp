@@ -275,6 +275,9 @@ TEST_CASE("Messages are read as they are meant and refused in words") {
                            R"({"type":"overlays","slice":{"point":[0,0,0],"normal":[0,0,0],"size":1}})",
                            R"({"type":"overlays","colour":"red"})",
                            R"({"type":"set","method":"fem"})",
+                           R"({"type":"set"})",
+                           R"({"type":"set","bogus":1})",
+                           R"({"type":"set","young_modulus":1e4,"poison_ratio":0.3})",
                            R"({"type":"set","young_modulus":"soft"})",
                            R"({"type":"replay"})"}) {
     CAPTURE(text);
