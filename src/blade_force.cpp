@@ -444,8 +444,10 @@ std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
   const double share = needed() / pressed.release; // of its advance that the edge can keep
   double remaining = share * way;
   // A cut of the least length is due when the edge has as much to spare before it as it lacks after it: half of that
-  // length farther on. Where little force cuts less is cut at a time, so that it stays within half of that force.
-  const double least = std::clamp(share * way, smallest_increment * spacing_, least_increment * spacing_);
+  // length farther on. Where the edge gives way by less than that before it cuts, no more is cut at a time.
+  const double kept = share * way;
+  const double least = kept < 0.5 * least_increment * spacing_ ? std::max(kept, smallest_increment * spacing_)
+                                                               : least_increment * spacing_;
   bool near = way - remaining >= 0.5 * least;
   if (way - remaining < least)
     remaining = std::max(0.0, way - least);
