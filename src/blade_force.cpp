@@ -12,8 +12,8 @@ namespace {
 constexpr double least_width = 0.75;             // of the node spacing: half width of the edge's contact
 constexpr double first_trigger = 1.2;            // of the needed release, at which a first cut is proposed
 constexpr double first_wait = 2 * first_trigger; // the same, past which the blade waits for a first cut
-constexpr double least_increment = 0.2;          // of the node spacing: no later cut is shorter, where that is less
-constexpr double smallest_increment = 0.05;      // than what it gives way by before it cuts; else down to this
+constexpr double least_increment = 0.2;          // of the node spacing: no later cut is shorter, but where the edge
+constexpr double smallest_increment = 0.05;      // gives way by less than half of that: then none shorter than this
 constexpr double longer_proposal = 1.5;          // how much farther the blade is when a longer cut is proposed instead
 constexpr double depth_factor = 2;               // of its depth in the body: how far a piece of the edge may push
 constexpr int entry_steps = 12;                  // halvings towards the place where the edge entered
