@@ -154,7 +154,8 @@ void SurfaceWalk::build_tree(const SurfaceMesh& mesh) {
     }
     node.discs.radius[child] = static_cast<float>(std::sqrt(radius2) + padding_);
     node.discs.half_height[child] = static_cast<float>(0.5 * (highest - lowest) + padding_);
-    node.is_flat = node.is_flat || node.discs.half_height[child] < flat * node.discs.radius[child];
+    if (const float r = node.discs.radius[child]; node.discs.half_height[child] < flat * r)
+      node.least_radius2 = std::min(node.least_radius2, r * r);
   };
   /// Halves the triangles begin .. end - 1 at the median of their longest extent; the middle. Leaves stay whole.
   const auto split = [&](int begin, int end) {
@@ -285,7 +286,7 @@ inline SurfaceWalk::Lanes SurfaceWalk::squared_distance_bounds(const Node& node,
   for (int k = 0; k < 3; ++k)
     squared += (node.lower[k] - x[k]).max(x[k] - node.upper[k]).max(0.0F).square();
   squared *= rounding;
-  if (node.is_flat && squared.minCoeff() < best)
+  if (best > node.least_radius2 && squared.minCoeff() < best)
     squared = squared.max(rounding * node.discs.squared_distances(x));
   return squared;
 }

@@ -9,6 +9,7 @@
 #include "topology/proximity.hpp"
 #include "topology/surface_mesh.hpp"
 
+#include <limits>
 #include <span>
 
 namespace spherecut::topology {
@@ -91,8 +92,9 @@ class SurfaceWalk {
   /// Up to four children, a lane each: the triangles of each lie in its box and in its disc.
   struct Node {
     std::array<Lanes, 3> lower, upper; // boxes, per axis
-    bool is_flat = false;              // some disc is much flatter than wide: only then are they worth a look
     Discs discs;
+    // m2: discs are worth a look for what is farther than the radius of a flat one.
+    float least_radius2 = std::numeric_limits<float>::infinity();
     std::array<int, 4> first; // child node, or leaf; -1: no child
     std::array<int, 4> count; // triangles of the leaf; 0: child node
 
