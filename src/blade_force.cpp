@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
@@ -221,16 +222,21 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
   std::size_t leg = front; // from way_[leg] to the next
   topology::BladePose met = way_[front];
   bool on_surface = outside(met);
+  // Where on a leg, from a share of it on, something that is true of the pose ends: just before and just after.
+  const auto end_of = [&](std::size_t at, double before, const auto& holds) {
+    double after = 1;
+    for (int k = 0; k < entry_steps; ++k) {
+      const double middle = 0.5 * (before + after);
+      (holds(pose_between(way_[at], way_[at + 1], middle)) ? before : after) = middle;
+    }
+    return std::pair{before, after};
+  };
   if (on_surface) {
     while (leg + 1 < way_.size() && outside(way_[leg + 1]))
       ++leg;
     if (leg + 1 >= way_.size())
       return;
-    double out = 0, in = 1;
-    for (int k = 0; k < entry_steps; ++k) {
-      const double middle = 0.5 * (out + in);
-      (outside(pose_between(way_[leg], way_[leg + 1], middle)) ? out : in) = middle;
-    }
+    const double in = end_of(leg, 0, outside).second;
     met = pose_between(way_[leg], way_[leg + 1], in);
     // Where it comes back into a cut it meets nothing before it has gone through that.
     const auto is_cut = [&](const topology::BladePose& pose) {
@@ -244,12 +250,7 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
       }
       if (leg + 1 >= way_.size())
         return;
-      double cut = begin, uncut = 1;
-      for (int k = 0; k < entry_steps; ++k) {
-        const double middle = 0.5 * (cut + uncut);
-        (is_cut(pose_between(way_[leg], way_[leg + 1], middle)) ? cut : uncut) = middle;
-      }
-      met = pose_between(way_[leg], way_[leg + 1], cut);
+      met = pose_between(way_[leg], way_[leg + 1], end_of(leg, begin, is_cut).first);
       on_surface = false;
     }
   }
