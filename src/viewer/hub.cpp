@@ -14,7 +14,8 @@ namespace {
 constexpr std::size_t log_lines = 200;                        // kept for telling
 constexpr auto log_interval = std::chrono::milliseconds(100); // between two lines
 constexpr auto cutting_shown = std::chrono::milliseconds(300);
-constexpr double reach = 2; // of the organ's diagonal, from its middle: so far away a hand may be
+constexpr double inside_told = 1; // s, that a tool in its place may be wanted inside the organ for before that is told
+constexpr double reach = 2;       // of the organ's diagonal, from its middle: so far away a hand may be
 
 double seconds_since(std::chrono::steady_clock::time_point then) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
@@ -158,7 +159,7 @@ void Hub::act(int client, Client& from, const Request& request) {
     set_mode(client, request.mode);
     break;
   case RequestType::pose:
-    move(request);
+    move(client, request);
     break;
   case RequestType::park:
     put_down(target_.mode);
@@ -215,6 +216,8 @@ void Hub::put_down(HandMode mode) {
   target_.number = number;
   target_.jumps = jumps + 1;
   parked_ = true;
+  inside_since_.reset();
+  inside_told_ = false;
   session_->aim(target_);
 }
 
@@ -228,19 +231,39 @@ void Hub::set_mode(int client, HandMode mode) {
   send_all(mode_text(mode));
 }
 
-// A tool that comes from its parking place is put down where it is led, unless that is inside the organ: then it has to
-// go there through the surface.
-void Hub::move(const Request& request) {
-  target_.number = request.pose;
+// A tool that comes from its parking place is put down where it is led. Inside the organ it cannot be: on its way there
+// it would press or cut what nobody has asked for, as when a new session takes over from one that was worked in.
+void Hub::move(int client, const Request& request) {
+  PointerTarget target = target_;
+  target.number = request.pose;
   const BoundingBox box = session_->domain().bounds();
   const double most = reach * box.extent().norm();
   const Vector3 away = request.position - box.centre();
-  target_.position = box.centre() + (away.norm() > most ? Vector3(most / away.norm() * away) : away);
+  target.position = box.centre() + (away.norm() > most ? Vector3(most / away.norm() * away) : away);
   if (request.orientation)
-    target_.orientation = *request.orientation;
-  if (std::exchange(parked_, false) && session_->clear_of_organ(target_))
+    target.orientation = *request.orientation;
+  if (parked_ && !session_->clear_of_organ(target)) {
+    tell_inside(client);
+    return;
+  }
+  target_ = target;
+  if (std::exchange(parked_, false))
     ++target_.jumps;
   session_->aim(target_);
+}
+
+// Once each time that the tool is away, and not for the poses that were under way when a session was replaced.
+void Hub::tell_inside(int client) {
+  if (!inside_since_)
+    inside_since_ = Clock::now();
+  if (inside_told_ || seconds_since(*inside_since_) < inside_told)
+    return;
+  inside_told_ = true;
+  send(client,
+       error_text("refused",
+                  "the tool stays away, as it is led to a place inside the organ: lead it outside first, and in "
+                  "from there",
+                  "pose"));
 }
 
 void Hub::change(Client& from, int client, const OverlaysChange& overlays) {

@@ -78,7 +78,8 @@ class Hub {
   void let_go();
   void put_down(HandMode mode);
   void set_mode(int client, HandMode mode);
-  void move(const Request& request);
+  void move(int client, const Request& request);
+  void tell_inside(int client);
   void change(Client& from, int client, const OverlaysChange& overlays);
   void request_overlays();
   void choose(int client, const std::string& name);
@@ -119,7 +120,9 @@ class Hub {
   std::uint32_t epoch_ = 1;
   bool fifo_ = false;
   PointerTarget target_;
-  bool parked_ = true; // the tool has not been led anywhere since it was put away
+  bool parked_ = true;                            // the tool has not been led anywhere since it was put away
+  std::optional<Clock::time_point> inside_since_; // since when it is wanted inside the organ all the same
+  bool inside_told_ = false;
   std::unique_ptr<Building> building_, next_;
   std::thread ending_; // of the session before
 

@@ -447,6 +447,20 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     REQUIRE(first.until(
         [&] { return first.session["epoch"] == 2 && !first.frame.empty() && first.value<std::uint32_t>(12) == 2; }));
     CHECK(first.value<float>(216) == 0);
+    // The blade rests in the organ, as it did when the new session took over: it does not come through the surface.
+    for (int again = 0; again < 12; ++again) {
+      first.pose({0.002, 0.015, 0.018});
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    REQUIRE(first.until([&] { return !first.errors.empty(); }));
+    CHECK(first.errors[0]["about"] == "pose");
+    CHECK(first.value<float>(216) == 0);
+    CHECK(first.vector(64).norm() > 0.04);
+    first.pose({0.002, -0.045, 0.018});
+    REQUIRE(first.until([&] { return (first.vector(64) - Vector3(0.002, -0.045, 0.018)).norm() < 1e-4; }));
+    first.pose({0.002, 0.015, 0.018});
+    CHECK(first.until([&] { return first.value<float>(216) > 1e-4; }));
+    CHECK(first.errors.size() == 1);
   }
 
   SECTION("what cannot be built is told, and the session stays") {
