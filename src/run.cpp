@@ -1,5 +1,6 @@
 #include "src/run.hpp"
 
+#include "src/blade_account.hpp"
 #include "src/interrupt.hpp"
 #include "src/progress.hpp"
 #include "src/run_output.hpp"
@@ -82,8 +83,8 @@ std::string findings_text(const Session& session, const RunOutput& output, const
       text += fmt::format(" {:.4g} ml", 1e6 * volume);
     text += fmt::format("; {} pairs of lip nodes, {} closed; {} nodes\n", cut.lip_pairs, cut.closed_pairs, cut.nodes);
     if (session.blade() != nullptr)
-      text += fmt::format("  blade: work {:.3g} mJ, {:.3g} mJ of it on new surface of {:.4g} J/m2\n",
-                          1e3 * cut.blade.ledger.work, 1e3 * cut.blade.ledger.surface, session.scenario().toughness);
+      text +=
+          fmt::format("  blade, at {:.4g} J/m2: {}\n", session.scenario().toughness, account_text(cut.blade.ledger));
     if (found.refused_cuts > 0)
       text += fmt::format("  {} increments refused, see cuts.csv\n", found.refused_cuts);
   }

@@ -1,5 +1,6 @@
 #include "src/summary.hpp"
 
+#include "src/blade_account.hpp"
 #include "src/version.hpp"
 
 #include <cmath>
@@ -101,22 +102,26 @@ Json piece_checks(const RunFindings& findings) {
 
 Json cut(const Session& session, const RunFindings& findings) {
   const CutReport& last = findings.cut;
-  return {{"increments", findings.increments},
-          {"refused", findings.refused_cuts},
-          {"area_m2", last.area},
-          {"front_m", last.front_length},
-          {"sheets", last.sheets},
-          {"pieces", last.pieces},
-          {"unheld_pieces", last.unheld},
-          {"volumes_m3", last.volumes},
-          {"piece_checks", piece_checks(findings)},
-          {"opening_m", last.opening},
-          {"largest_opening_m", findings.largest_opening},
-          {"opening_volume_m3", last.opening_volume},
-          {"lip_pairs", last.lip_pairs},
-          {"closed_pairs", last.closed_pairs},
-          {"lips", solvers::to_string(session.scenario().cut.lips)},
-          {"surface_hash", hash_text(last.surface_hash)}};
+  Json out{{"increments", findings.increments},
+           {"refused", findings.refused_cuts},
+           {"area_m2", last.area},
+           {"front_m", last.front_length},
+           {"sheets", last.sheets},
+           {"pieces", last.pieces},
+           {"unheld_pieces", last.unheld},
+           {"volumes_m3", last.volumes},
+           {"piece_checks", piece_checks(findings)},
+           {"opening_m", last.opening},
+           {"largest_opening_m", findings.largest_opening},
+           {"opening_volume_m3", last.opening_volume},
+           {"lip_pairs", last.lip_pairs},
+           {"closed_pairs", last.closed_pairs},
+           {"lips", solvers::to_string(session.scenario().cut.lips)},
+           {"surface_hash", hash_text(last.surface_hash)}};
+  if (session.blade() != nullptr)
+    for (const AccountEntry& entry : account_of(last.blade.ledger))
+      out["blade"][entry.key] = entry.joules;
+  return out;
 }
 
 Json tear(const RunFindings& findings) {

@@ -1,5 +1,6 @@
 #include "src/haptics/haptic_report.hpp"
 
+#include "src/blade_account.hpp"
 #include "src/figure.hpp"
 #include "src/output_file.hpp"
 
@@ -54,18 +55,21 @@ void write_solves(const std::filesystem::path& file, const std::vector<SolveReco
   std::string text =
       "sequence,pose_tick,arrival_tick,degradation,failed,resprinkled,force_jump,cut_triangles,nodes,"
       "candidates,active,asymmetry,force_N,cut_area_m2,blade_N,edge_N,release_J_m2,edge_pieces,work_J,surface_J,"
-      "update,residual,swapped,seconds\n";
+      "crushing_J,friction_J,excess_J,stored_J,update,residual,swapped,seconds\n";
   for (const SolveRecord& solve : solves)
-    text += fmt::format(
-        "{},{},{},{},{:d},{:d},{:.3g},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{},{:.2g},"
-        "{:d},{:"
-        ".6g}\n",
-        solve.event.sequence, solve.event.pose_tick,
-        solve.event.arrival_tick == SolveEvent::never ? "" : fmt::format("{}", solve.event.arrival_tick),
-        solve.event.degradation, solve.failed, solve.resprinkled, solve.force_jump, solve.cut_triangles, solve.nodes,
-        solve.candidates, solve.active, solve.asymmetry, solve.force.norm(), solve.cut_area, solve.blade_force.norm(),
-        solve.blade_edge, solve.blade_release, solve.blade_contacts, solve.blade_work, solve.blade_surface,
-        solve.update, solve.residual, solve.event.swaps, solve.seconds);
+    text +=
+        fmt::format("{},{},{},{},{:d},{:d},{:.3g},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:."
+                    "6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.2g},"
+                    "{:d},{:"
+                    ".6g}\n",
+                    solve.event.sequence, solve.event.pose_tick,
+                    solve.event.arrival_tick == SolveEvent::never ? "" : fmt::format("{}", solve.event.arrival_tick),
+                    solve.event.degradation, solve.failed, solve.resprinkled, solve.force_jump, solve.cut_triangles,
+                    solve.nodes, solve.candidates, solve.active, solve.asymmetry, solve.force.norm(), solve.cut_area,
+                    solve.blade_force.norm(), solve.blade_edge, solve.blade_release, solve.blade_contacts,
+                    solve.blade_account.work, solve.blade_account.surface, solve.blade_account.crushing,
+                    solve.blade_account.friction, solve.blade_account.excess, solve.blade_account.stored, solve.update,
+                    solve.residual, solve.event.swaps, solve.seconds);
   out.write(text);
   out.close();
 }
@@ -166,8 +170,7 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
     findings.increments += record.cut_triangles > 0 ? 1 : 0;
     findings.blade_peak = std::max(findings.blade_peak, record.blade_force.norm());
     if (!record.failed) {
-      findings.blade_work = record.blade_work;
-      findings.blade_surface = record.blade_surface;
+      findings.blade_account = record.blade_account;
       findings.cut_area = record.cut_area;
     }
     findings.highest_degradation = std::max(findings.highest_degradation, record.event.degradation);
@@ -213,9 +216,8 @@ std::string text_of(const HapticFindings& f) {
                       f.peak, f.steps.any, f.steps.hand_over, f.steps.onset, f.steps.cut);
   text += fmt::format("  {} ticks limited, {} softened, {} with the contact beyond the patch, {} not converged\n",
                       f.limited, f.softened, f.outside, f.unconverged);
-  if (f.blade_work > 0)
-    text += fmt::format("blade: peak {:.4g} N; {:.3g} mJ, {:.3g} mJ of it on new surface\n", f.blade_peak,
-                        1e3 * f.blade_work, 1e3 * f.blade_surface);
+  if (f.blade_account.work > 0)
+    text += fmt::format("blade: peak {:.4g} N; {}\n", f.blade_peak, account_text(f.blade_account));
   if (f.increments > 0)
     text += fmt::format("cut: {:.4g} cm2{}\n", 1e4 * f.cut_area,
                         f.unfollowed ? "; the body had yet to follow the blade's last way" : "");
@@ -268,7 +270,7 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
       {"model_error_N",
        {{"rms", f.error.rms}, {"largest", f.error.largest}, {"solved_peak", f.error.peak}, {"ticks", f.error.ticks}}},
       {"port_energy_J", {{"end", f.energy}, {"lowest", f.lowest_energy}}},
-      {"blade", {{"peak_N", f.blade_peak}, {"work_J", f.blade_work}, {"surface_J", f.blade_surface}}},
+      {"blade", {{"peak_N", f.blade_peak}}},
       {"cut_area_m2", f.cut_area},
       {"cut_unfollowed", f.unfollowed},
       {"ticks_limited", f.limited},
@@ -281,6 +283,8 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
         {"ticks", f.loop.haptic_cpu_seconds},
         {"solves", f.loop.solve_seconds},
         {"frames", f.loop.viewer_seconds}}}};
+  for (const AccountEntry& entry : account_of(f.blade_account))
+    json["blade"][entry.key] = entry.joules;
   if (f.bridge)
     json["bridge"] = {{"poses", f.bridge->poses},  {"clients", f.bridge->clients}, {"silent", f.bridge->lost},
                       {"old", f.bridge->old},      {"garbage", f.bridge->garbage}, {"others", f.bridge->others},

@@ -1,6 +1,7 @@
 // What a haptic session leaves behind: every tick and every solve, enough to replay it.
 #pragma once
 
+#include "solvers/blade_contact.hpp"
 #include "src/haptics/haptic_tick.hpp"
 
 namespace spherecut::app {
@@ -46,7 +47,7 @@ struct SolveRecord {
   double asymmetry = 0;                     // of the compliance
   Vector3 blade_force = Vector3::Zero();    // N, on a blade that the tissue resists, in the hand or beside it
   double blade_edge = 0, blade_release = 0; // N, of its edge alone; J/m2, of that on the front
-  double blade_work = 0, blade_surface = 0; // J since the start: all, and on new surface
+  solvers::BladeLedger blade_account;       // J since the start
   int blade_contacts = 0;                   // pieces of the edge that press
   double residual = 0;                      // of a body that has followed its cut by an update
   double cut_area = 0;                      // m2

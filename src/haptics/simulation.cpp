@@ -233,8 +233,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     record.blade_edge = cut->blade.edge_force;
     record.blade_release = cut->blade.release;
     record.blade_contacts = cut->blade.contacts;
-    record.blade_work = cut->blade.ledger.work;
-    record.blade_surface = cut->blade.ledger.surface;
+    record.blade_account = cut->blade.ledger;
   }
   return record;
 }

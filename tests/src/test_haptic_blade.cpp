@@ -128,7 +128,7 @@ TEST_CASE("The hand feels a blade indent and cut at toughness times width, witho
       ++cuts;
     }
     area = solve.cut_area;
-    CHECK(solve.blade_surface == Approx(10 * area).margin(1e-12));
+    CHECK(solve.blade_account.surface == Approx(10 * area).margin(1e-12));
   }
   CHECK(area > 1e-4);
   REQUIRE(cuts > 1);

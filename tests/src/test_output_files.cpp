@@ -1,5 +1,7 @@
 #include "src/output_file.hpp"
 #include "src/vtp.hpp"
+#include "tests/src/blade_text.hpp"
+#include "tests/src/scenario_text.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "topology/errors.hpp"
@@ -7,6 +9,7 @@
 
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <regex>
 
 using namespace spherecut;
@@ -114,4 +117,38 @@ TEST_CASE("A results folder is made, and refused when it holds results or is non
   const auto file = write_file(folder.path() / "file", "");
   CHECK_THROWS_WITH(claim_results_folder(file), Contains("file"));
   CHECK_THROWS_WITH(claim_results_folder(file / "inside"), Contains("cannot be created"));
+}
+
+TEST_CASE("Both summaries give the whole account of a resisted blade's work") {
+  const TemporaryFolder folder;
+  const std::string scenario =
+      write_file(folder.path() / "s.toml",
+                 replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
+                     "[cut]\nfront_spacing = 0.004\n" +
+                     replaced(blade({"[0.004, 0, 0.031]", "[0.003, 0, 0.02]"}, 0.04, "0.1"),
+                              "step =", "friction = 500.0\nflank = 0.01\nstep ="))
+          .string();
+  const auto check = [&](const std::string& command, const std::vector<std::string>& more, const std::string& file,
+                         const std::vector<std::string>& place) {
+    CAPTURE(command);
+    std::vector<std::string> arguments{command, scenario, "--out", (folder.path() / command).string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const ProgramResult result = run_spherecut(arguments);
+    INFO(result.out << result.err);
+    REQUIRE(result.status == 0);
+    CHECK_THAT(result.out, Contains("on new surface") && Contains("friction of the flanks"));
+    nlohmann::json account = nlohmann::json::parse(read_file(folder.path() / command / file));
+    for (const std::string& key : place)
+      account = account.at(key);
+    const double work = account.at("work_J");
+    REQUIRE(work > 0);
+    CHECK(account.at("surface_J").get<double>() > 0.1 * work);
+    CHECK(account.at("friction_J").get<double>() > 0.01 * work);
+    double others = 0;
+    for (const char* key : {"surface_J", "crushing_J", "friction_J", "excess_J", "stored_J"})
+      others += account.at(key).get<double>();
+    CHECK(others == Approx(work).epsilon(0.02));
+  };
+  check("run", {}, "summary.json", {"cut", "blade"});
+  check("haptics", {"--virtual", "--duration", "1"}, "haptic.json", {"blade"});
 }
