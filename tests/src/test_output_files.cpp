@@ -126,7 +126,7 @@ TEST_CASE("Both summaries give the whole account of a resisted blade's work") {
                  replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
                      "[cut]\nfront_spacing = 0.004\n" +
                      replaced(blade({"[0.004, 0, 0.031]", "[0.003, 0, 0.02]"}, 0.04, "0.1"),
-                              "step =", "friction = 500.0\nflank = 0.01\nstep ="))
+                              "step =", "friction = 50.0\nflank = 0.01\nstep ="))
           .string();
   const auto check = [&](const std::string& command, const std::vector<std::string>& more, const std::string& file,
                          const std::vector<std::string>& place) {
@@ -143,7 +143,7 @@ TEST_CASE("Both summaries give the whole account of a resisted blade's work") {
     const double work = account.at("work_J");
     REQUIRE(work > 0);
     CHECK(account.at("surface_J").get<double>() > 0.1 * work);
-    CHECK(account.at("friction_J").get<double>() > 0.01 * work);
+    CHECK(account.at("friction_J").get<double>() > 0.002 * work);
     double others = 0;
     for (const char* key : {"surface_J", "crushing_J", "friction_J", "excess_J", "stored_J"})
       others += account.at(key).get<double>();
