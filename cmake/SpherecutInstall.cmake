@@ -6,8 +6,23 @@ install(TARGETS spherecut_topology spherecut_solvers spherecut_app spherecut_opt
   EXPORT spherecutTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(EXPORT spherecutTargets NAMESPACE spherecut:: DESTINATION "${SPHERECUT_PACKAGE_FOLDER}")
 install(TARGETS spherecut RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
-install(DIRECTORY topology solvers src DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/spherecut" FILES_MATCHING PATTERN "*.hpp"
-  PATTERN page EXCLUDE)
+# Headers are installed under spherecut/ and say so when they include one another: a folder named src or topology on the
+# include path of a program must not come before theirs.
+install(CODE "set(source \"${PROJECT_SOURCE_DIR}\")
+  cmake_path(ABSOLUTE_PATH CMAKE_INSTALL_PREFIX OUTPUT_VARIABLE prefix)
+  set(target \"\$ENV{DESTDIR}\${prefix}/${CMAKE_INSTALL_INCLUDEDIR}/spherecut\")")
+install(CODE [=[
+  foreach(floor topology solvers src)
+    file(GLOB_RECURSE headers RELATIVE "${source}" "${source}/${floor}/*.hpp")
+    list(FILTER headers EXCLUDE REGEX "/node_modules/")
+    foreach(header IN LISTS headers)
+      file(READ "${source}/${header}" text)
+      string(REGEX REPLACE "#include \"(topology|solvers|src)/" "#include \"spherecut/\\1/" text "${text}")
+      file(WRITE "${target}/${header}" "${text}")
+      list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${target}/${header}")
+    endforeach()
+  endforeach()
+]=])
 install(DIRECTORY "${SPHERECUT_PAGE_FOLDER}/" DESTINATION "${CMAKE_INSTALL_DATADIR}/spherecut/page" OPTIONAL)
 install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/spherecut" FILES_MATCHING PATTERN "*.toml")
 install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}")

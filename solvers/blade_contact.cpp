@@ -230,8 +230,8 @@ double energy_release(const BladePatch& patch, const BladeState& state, const Ve
 std::optional<double> cutting_share(const BladePatch& now, const BladeStroke& stroke, const BladePatch& cut,
                                     const BladeStroke& cut_stroke, double needed, double drag) {
   const auto enough = [&](double share) {
-    return push_blade(now, stroke.at(share), drag).driving - push_blade(cut, cut_stroke.at(share), drag).driving >=
-           needed;
+    const double kept = cut.contacts.empty() ? 0 : push_blade(cut, cut_stroke.at(share), drag).driving;
+    return push_blade(now, stroke.at(share), drag).driving - kept >= needed;
   };
   if (enough(0))
     return 0;
@@ -249,9 +249,12 @@ std::optional<double> cutting_share(const BladePatch& now, const BladeStroke& st
   return high;
 }
 
-void BladeLedger::move(const BladePatch& patch, const BladeState& from, const BladeState& to, double slide) {
+void BladeLedger::move(const BladePatch& patch, const BladeState& from, const BladeState& to, const VectorX& motion,
+                       double slide) {
   const Eigen::Index m = count(patch), n = unilateral(patch);
-  work += 0.5 * (from.forces.head(m) + to.forces.head(m)).dot(to.advance - from.advance);
+  const VectorX forces = 0.5 * (from.forces.head(m) + to.forces.head(m));
+  work += forces.dot(motion);
+  excess += forces.dot(motion - (to.advance - from.advance));
   if (patch.dragged) {
     const double amplitude = 0.5 * (from.forces[n] + to.forces[n]);
     const double blade = amplitude * patch.drag.norm() * slide;

@@ -113,7 +113,8 @@ struct BladeStroke {
 };
 
 /// First share of a stroke (to 1e-9) at which the cut that takes the body `now` into the body `cut` releases `needed` J
-/// at fixed blade, by difference of the two; nullopt when it does at none of its eighths. `needed` > 0.
+/// at fixed blade, by difference of the two; nullopt when it does at none of its eighths. `needed` > 0. A `cut` without
+/// contacts leaves the blade nothing to press on.
 std::optional<double> cutting_share(const BladePatch& now, const BladeStroke& stroke, const BladePatch& cut,
                                     const BladeStroke& cut_stroke, double needed, double drag = 0);
 
@@ -123,12 +124,13 @@ struct BladeLedger {
   double surface = 0;  // toughness times area
   double crushing = 0; // beside a blunt edge
   double friction = 0; // of the flanks
-  double excess = 0;   // released beyond need where a cut came late
+  double excess = 0;   // released beyond need where a cut came late, or where tissue slips off the edge
   double stored = 0;   // elastic, in the tissue now
 
-  /// A motion of the blade at a given cut, short enough for forces to change evenly; `slide` m is how far its flanks
-  /// went.
-  void move(const BladePatch& patch, const BladeState& from, const BladeState& to, double slide);
+  /// A motion of the blade at a given cut, short enough for forces to change evenly. `motion`, m, is how far each piece
+  /// of the edge went along its push: what the state's advance falls short of, tissue has slipped off the edge.
+  /// `slide`, m, is how far the flanks went.
+  void move(const BladePatch& patch, const BladeState& from, const BladeState& to, const VectorX& motion, double slide);
   /// A cut of `area` m2 at fixed blade.
   void cut(const BladeState& before, const BladeState& after, double toughness, double sharpness, double area);
   /// |work - all the others| over the work; 0 without work.

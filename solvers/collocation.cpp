@@ -65,6 +65,7 @@ void Collocation::find_constrained() {
 }
 
 double Collocation::load_work(const Field& field) const {
+  require_own(field);
   const VectorX displacements = nodal_displacements(field);
   const auto of = [&](std::size_t node) { return displacements.segment<3>(3 * static_cast<Eigen::Index>(node)); };
   double work = 0;
@@ -200,6 +201,7 @@ std::vector<Field> Collocation::responses_to(const MatrixX& right) const {
 }
 
 std::vector<Field> Collocation::force_responses(const std::vector<int>& candidates) const {
+  require_nodes(candidates);
   MatrixX right = MatrixX::Zero(report_.unknowns, 3 * std::ssize(candidates));
   for (Eigen::Index c = 0; c < std::ssize(candidates); ++c)
     for (int axis = 0; axis < 3; ++axis)
@@ -209,6 +211,7 @@ std::vector<Field> Collocation::force_responses(const std::vector<int>& candidat
 }
 
 std::vector<Field> Collocation::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
+  require_cases(nodes, forces);
   MatrixX right = MatrixX::Zero(report_.unknowns, forces.cols());
   for (Eigen::Index k = 0; k < std::ssize(nodes); ++k)
     for (int c = 0; c < 3; ++c)
@@ -230,6 +233,7 @@ std::vector<Field> Collocation::pattern_responses(const std::vector<ForcePattern
 }
 
 std::vector<Vector3> Collocation::constraint_forces(const Field& field) const {
+  require_own(field);
   std::vector<Vector3> forces;
   forces.reserve(problem_.prescribed.size());
   for (const Prescribed& entry : problem_.prescribed) {
@@ -244,6 +248,8 @@ std::vector<Vector3> Collocation::constraint_forces(const Field& field) const {
 
 double Collocation::residual(const Field& field, const std::vector<int>& loaded_nodes,
                              const std::vector<Vector3>& nodal_forces) const {
+  require_loads(loaded_nodes, nodal_forces);
+  require_own(field);
   std::vector<Vector3> applied = loads_;
   for (Vector3& force : applied)
     force *= field.load_factor;

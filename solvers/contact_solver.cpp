@@ -26,6 +26,22 @@ int size_of(const ContactPatch& patch) {
   return static_cast<int>(patch.nodes.size());
 }
 
+void require_forces(const ContactPatch& patch, const ContactState& state) {
+  if (state.nodal_forces.size() != patch.nodes.size())
+    throw InputError(fmt::format("a contact's forces on {} candidates for a patch of {}: they are another patch's",
+                                 state.nodal_forces.size(), patch.nodes.size()));
+}
+
+void require_own(const ContactPatch& patch, const ContactState& state) {
+  const std::size_t count = patch.nodes.size();
+  require_forces(patch, state);
+  if (state.active.size() != count || state.along.size() != count || state.bond.size() != count ||
+      state.displacement.size() != 3 * std::ssize(patch.nodes))
+    throw InputError(fmt::format("a contact's state on {} candidates for a patch of {}: it is another patch's; among() "
+                                 "takes it to other candidates",
+                                 state.nodal_forces.size(), count));
+}
+
 VectorX displacement_of(const ContactPatch& patch, const std::vector<Vector3>& forces) {
   VectorX stacked(3 * size_of(patch));
   for (int c = 0; c < size_of(patch); ++c)
@@ -349,6 +365,7 @@ ContactPatch condense(const Discretisation& body, const std::vector<int>& candid
 }
 
 ContactState among(const ContactPatch& patch, const ContactState& state, const std::vector<int>& nodes) {
+  require_own(patch, state);
   ContactState result = state;
   const std::size_t count = nodes.size();
   result.nodal_forces.assign(count, Vector3::Zero());
@@ -374,6 +391,11 @@ ContactState among(const ContactPatch& patch, const ContactState& state, const s
 ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
                    const ContactOptions& options, const ContactState* previous) {
   const bool frictional = options.condition == ContactCondition::frictional;
+  topology::check(tool);
+  topology::check(pose);
+  if (options.maximum_iterations < 1 || !(options.gap_tolerance > 0) || !std::isfinite(options.gap_tolerance))
+    throw InputError(fmt::format("{} iterations to a tolerance of {:g} m; allowed: both above 0",
+                                 options.maximum_iterations, options.gap_tolerance));
   if (!(options.friction >= 0) || !std::isfinite(options.friction))
     throw InputError(fmt::format("a coefficient of friction of {:g}; allowed: 0 or more", options.friction));
   topology::ToolPose from = pose;
@@ -382,6 +404,7 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
     state = recalled(patch, tool, options, *previous->memory);
     from = state.pose;
   } else if (previous != nullptr) {
+    require_own(patch, *previous);
     state = *previous;
     from = state.pose;
   } else {
@@ -440,6 +463,10 @@ std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements) {
   if (displacements.size() != patch.nodes.size())
     throw InputError(fmt::format("{} displacements for {} candidate nodes", displacements.size(), patch.nodes.size()));
+  for (std::size_t c = 0; c < displacements.size(); ++c)
+    if (!displacements[c].allFinite())
+      throw InputError(fmt::format("the displacement of candidate node {} is ({}, {}, {}) m; it must be finite",
+                                   patch.nodes[c], displacements[c].x(), displacements[c].y(), displacements[c].z()));
   ContactState state = resting(patch, {});
   std::vector<int> held(patch.nodes.size());
   for (int c = 0; c < size_of(patch); ++c)
@@ -453,6 +480,7 @@ ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& di
 Field deform(const Discretisation& body, const ContactPatch& patch, const ContactState& state) {
   if (std::ssize(patch.responses) == 3 * std::ssize(patch.nodes))
     return deform(patch, state);
+  require_forces(patch, state);
   Field field = patch.base;
   std::vector<int> nodes;
   std::vector<Vector3> forces;
@@ -470,6 +498,7 @@ Field deform(const ContactPatch& patch, const ContactState& state) {
   if (std::ssize(patch.responses) != 3 * std::ssize(patch.nodes))
     throw InputError(fmt::format("a patch of {} candidates with {} fields of unit forces; allowed: three each",
                                  patch.nodes.size(), patch.responses.size()));
+  require_forces(patch, state);
   Field field = patch.base;
   for (int c = 0; c < size_of(patch); ++c)
     for (int axis = 0; axis < 3; ++axis)

@@ -74,7 +74,8 @@ struct ContactState {
 };
 
 /// `state` of `patch` on other candidates of the same body, ascending: what both have keeps its force, bond and place,
-/// the others are free. To go on from, by press(): the sums over the patch are not made again.
+/// the others are free. To go on from, by press(): the sums over the patch are not made again. Throws InputError when
+/// the state is not the patch's.
 ContactState among(const ContactPatch& patch, const ContactState& state, const std::vector<int>& nodes);
 
 /// Finds the active set and the forces: no penetration, no tension. Frictionless: forces along the tool's normals.
@@ -83,19 +84,22 @@ ContactState among(const ContactPatch& patch, const ContactState& state, const s
 /// moves with the tool. The tool advances from `previous` (or, without one, from where it is clear of the patch along
 /// its axis) in sub-steps shorter than its tip radius, so that deep presses find the right side; with friction, which
 /// remembers its way, of a tenth of that radius at most. Where `previous` is but a memory, the contact it tells of is
-/// first set up on these nodes.
+/// first set up on these nodes. Throws InputError on a tool or pose that topology::check refuses, options out of their
+/// range, and a `previous` of another patch.
 ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
                    const ContactOptions& options = {}, const ContactState* previous = nullptr);
 
 /// What friction needs to go on with other nodes than those of this patch; nothing without contact.
 std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState& state, double friction);
 
-/// Nodes of the patch with given displacements (bonded cap): solves for their forces.
+/// Nodes of the patch with given displacements, m (bonded cap): solves for their forces. Throws InputError unless there
+/// is a finite one for every node.
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements);
 
-/// Field of the body for given nodal forces on the patch, by its fields, or by a solution where it lacks them.
+/// Field of the body for given nodal forces on the patch, by its fields, or by a solution where it lacks them. Throws
+/// InputError when the state is not the patch's.
 Field deform(const Discretisation& body, const ContactPatch& patch, const ContactState& state);
-/// Of a patch with all its fields; throws InputError where it lacks some.
+/// Of a patch with all its fields; throws InputError besides where it lacks some.
 Field deform(const ContactPatch& patch, const ContactState& state);
 
 } // namespace spherecut::solvers

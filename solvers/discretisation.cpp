@@ -4,11 +4,19 @@
 #include "solvers/published.hpp"
 #include "topology/errors.hpp"
 
+#include <cmath>
 #include <fmt/format.h>
 
 namespace spherecut::solvers {
 
 void Field::add(double factor, const Field& other) {
+  if (coefficients.size() != other.coefficients.size() || (pressure.size() > 0) != (other.pressure.size() > 0) ||
+      prescribed.size() != other.prescribed.size())
+    throw InputError(
+        fmt::format("a field of {} coefficients, {} pressures and {} prescribed displacements added to one "
+                    "of {}, {} and {}: they are not of the same body",
+                    other.coefficients.size(), other.pressure.size(), other.prescribed.size(), coefficients.size(),
+                    pressure.size(), prescribed.size()));
   coefficients += factor * other.coefficients;
   if (pressure.size() > 0)
     pressure += factor * other.pressure;
@@ -16,7 +24,39 @@ void Field::add(double factor, const Field& other) {
   prescribed += factor * other.prescribed;
 }
 
+void Discretisation::require_nodes(const std::vector<int>& nodes) const {
+  const int count = problem().nodes.size();
+  for (const int node : nodes)
+    if (node < 0 || node >= count)
+      throw InputError(fmt::format("node {} does not exist; there are {}", node, count));
+}
+
+void Discretisation::require_cases(const std::vector<int>& nodes, const MatrixX& forces) const {
+  require_nodes(nodes);
+  if (forces.rows() != 3 * std::ssize(nodes))
+    throw InputError(
+        fmt::format("forces in {} rows for {} nodes; allowed: three rows a node", forces.rows(), nodes.size()));
+}
+
+void Discretisation::require_loads(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
+  require_nodes(nodes);
+  if (nodes.size() != forces.size())
+    throw InputError(fmt::format("{} forces for {} loaded nodes", forces.size(), nodes.size()));
+}
+
+void Discretisation::require_own(const Field& field) const {
+  if (const Eigen::Index count = 3 * Eigen::Index{problem().nodes.size()}; field.coefficients.size() != count)
+    throw InputError(fmt::format("a field of {} coefficients on a body of {}: it is another body's",
+                                 field.coefficients.size(), count));
+}
+
+void Discretisation::require_own(const std::vector<Field>& fields) const {
+  for (const Field& field : fields)
+    require_own(field);
+}
+
 std::vector<Field> Discretisation::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
+  require_cases(nodes, forces);
   const std::vector<Field> units = force_responses(nodes);
   std::vector<Field> responses;
   for (Eigen::Index c = 0; c < forces.cols(); ++c) {
@@ -30,6 +70,7 @@ std::vector<Field> Discretisation::case_responses(const std::vector<int>& nodes,
 }
 
 Field Discretisation::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
+  require_loads(nodes, forces);
   MatrixX together(3 * std::ssize(nodes), 1);
   for (Eigen::Index k = 0; k < std::ssize(nodes); ++k)
     together.col(0).segment<3>(3 * k) = forces[k];
@@ -65,6 +106,12 @@ double Discretisation::load_work(const Field&) const {
 }
 
 std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options) {
+  if (!(options.support_radius >= 0) || !std::isfinite(options.support_radius))
+    throw InputError(fmt::format("a support radius of {:g} spacings; allowed: above 0, or 0 for the method's own",
+                                 options.support_radius));
+  if (options.quadrature < 1 || !(options.cell_size > 0) || !std::isfinite(options.cell_size))
+    throw InputError(fmt::format("background cells of {:g} spacings with {} points a direction; allowed: both above 0",
+                                 options.cell_size, options.quadrature));
   switch (options.method) {
   case Method::collocation:
     return make_collocation(std::move(problem), options);

@@ -102,7 +102,7 @@ struct Field {
   double load_factor = 0; // multiple of problem().loads acting
   VectorX prescribed;     // m, 3 per entry of problem().prescribed
 
-  /// field += factor * other.
+  /// field += factor * other. Throws InputError when the two are not of the same body.
   void add(double factor, const Field& other);
 };
 
@@ -123,6 +123,8 @@ struct ForcePattern {
 
 struct ShapeFunctions; // solvers/shape_functions.hpp
 
+/// Every function of it throws InputError for a node that the body does not have and for a field or forces of another
+/// size than it asks for. An object is for one thread at a time; different objects are independent of each other.
 class Discretisation {
  public:
   virtual ~Discretisation() = default;
@@ -196,9 +198,17 @@ class Discretisation {
   /// the largest force in the system; of a mixed form also what continuity misses, taken as a force mu / h per m3.
   [[nodiscard]] virtual double residual(const Field& field, const std::vector<int>& loaded_nodes = {},
                                         const std::vector<Vector3>& nodal_forces = {}) const = 0;
+
+ protected:
+  void require_nodes(const std::vector<int>& nodes) const;
+  void require_cases(const std::vector<int>& nodes, const MatrixX& forces) const;
+  void require_loads(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const;
+  void require_own(const Field& field) const;
+  void require_own(const std::vector<Field>& fields) const;
 };
 
-/// Assembles and factors. Throws InputError for an unusable problem (nothing prescribed, bad material, too few nodes),
+/// Assembles and factors. Throws InputError for an unusable problem (nothing prescribed, bad material, too few nodes)
+/// and for options out of their range,
 /// NumericalError naming the node whose support never becomes sound or for a singular system.
 std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options);
 

@@ -129,6 +129,7 @@ VectorX NodalSupports::displacements(const Field& field) const {
 }
 
 VectorX ElasticBody::nodal_displacements(const Field& field) const {
+  require_own(field);
   return supports_.displacements(field);
 }
 
@@ -141,6 +142,8 @@ std::vector<Vector3> ElasticBody::constraint_points() const {
 }
 
 MatrixX ElasticBody::contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const {
+  require_nodes(nodes);
+  require_own(fields);
   MatrixX displacements = MatrixX::Zero(3 * std::ssize(nodes), std::ssize(fields));
   for (Eigen::Index f = 0; f < displacements.cols(); ++f)
     for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
@@ -153,7 +156,10 @@ MatrixX ElasticBody::contact_displacements(const std::vector<int>& nodes, const 
 MatrixX pattern_loads(const Spheres& spheres, const std::vector<ForcePattern>& patterns) {
   MatrixX loads = MatrixX::Zero(3 * static_cast<Eigen::Index>(spheres.size()), std::ssize(patterns));
   ShapeFunctions shape;
-  for (std::size_t p = 0; p < patterns.size(); ++p)
+  for (std::size_t p = 0; p < patterns.size(); ++p) {
+    if (patterns[p].points.size() != patterns[p].forces.size())
+      throw InputError(
+          fmt::format("a pattern of {} forces on {} points", patterns[p].forces.size(), patterns[p].points.size()));
     for (std::size_t q = 0; q < patterns[p].points.size(); ++q) {
       const Vector3& x = patterns[p].points[q];
       if (!evaluate(spheres, x, shape))
@@ -163,11 +169,13 @@ MatrixX pattern_loads(const Spheres& spheres, const std::vector<ForcePattern>& p
         loads.col(static_cast<Eigen::Index>(p)).segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) +=
             shape.value[k] * patterns[p].forces[q];
     }
+  }
   return loads;
 }
 
 MatrixX ElasticBody::pattern_displacements(const std::vector<ForcePattern>& patterns,
                                            const std::vector<Field>& fields) const {
+  require_own(fields);
   const MatrixX loads = pattern_loads(spheres_, patterns);
   MatrixX displacements(std::ssize(patterns), std::ssize(fields));
   for (std::size_t f = 0; f < fields.size(); ++f)
@@ -176,6 +184,7 @@ MatrixX ElasticBody::pattern_displacements(const std::vector<ForcePattern>& patt
 }
 
 PointState ElasticBody::at(const Vector3& x, const Field& field) const {
+  require_own(field);
   thread_local ShapeFunctions shape;
   require_support(spheres_, x, shape);
   return state_from(problem_, shape, field);

@@ -65,9 +65,15 @@ class ElasticBody : public Discretisation {
   [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
   [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
   void shape_at(const Vector3& x, ShapeFunctions& shape) const override { require_support(spheres_, x, shape); }
-  [[nodiscard]] double sphere_radius(int node) const override { return spheres_.radii()[node]; }
+  [[nodiscard]] double sphere_radius(int node) const override {
+    require_nodes({node});
+    return spheres_.radii()[node];
+  }
   [[nodiscard]] std::vector<Vector3> constraint_points() const override;
-  [[nodiscard]] Vector3 contact_point(int node) const override { return problem_.nodes.positions[node]; }
+  [[nodiscard]] Vector3 contact_point(int node) const override {
+    require_nodes({node});
+    return problem_.nodes.positions[node];
+  }
   [[nodiscard]] MatrixX contact_displacements(const std::vector<int>& nodes,
                                               const std::vector<Field>& fields) const override;
   [[nodiscard]] MatrixX pattern_displacements(const std::vector<ForcePattern>& patterns,

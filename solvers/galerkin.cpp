@@ -71,13 +71,18 @@ class Galerkin final : public ElasticBody {
     return field_of(solve_refined(loads_, prescribed), 1, prescribed);
   }
 
-  double load_work(const Field& field) const override { return field.load_factor * loads_.dot(field.coefficients); }
+  double load_work(const Field& field) const override {
+    require_own(field);
+    return field.load_factor * loads_.dot(field.coefficients);
+  }
 
   std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
+    require_nodes(candidates);
     return fields_of(solve_ordered(unit_forces(candidates)));
   }
 
   std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const override {
+    require_cases(nodes, forces);
     MatrixX right = MatrixX::Zero(report_.unknowns, forces.cols());
     for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
       const DisplacementMean mean = contact_mean(nodes[c]);
@@ -89,6 +94,7 @@ class Galerkin final : public ElasticBody {
 
   // B^T A^-1 B = (L^-1 B)^T (L^-1 B): half the way of a solution.
   MatrixX contact_compliance(const std::vector<int>& candidates) const override {
+    require_nodes(candidates);
     SparseMatrix right(report_.unknowns, 3 * std::ssize(candidates));
     std::vector<Eigen::Triplet<double>> entries;
     for (int c = 0; c < std::ssize(candidates); ++c) {
@@ -116,8 +122,13 @@ class Galerkin final : public ElasticBody {
       points.push_back(mean.centroid);
     return points;
   }
-  Vector3 contact_point(int node) const override { return contact_mean(node).centroid; }
+  Vector3 contact_point(int node) const override {
+    require_nodes({node});
+    return contact_mean(node).centroid;
+  }
   MatrixX contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const override {
+    require_nodes(nodes);
+    require_own(fields);
     MatrixX displacements(3 * std::ssize(nodes), std::ssize(fields));
     for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
       const DisplacementMean& mean = contact_mean(nodes[c]);
@@ -407,6 +418,7 @@ void Galerkin::assemble_loads() {
 }
 
 std::vector<Vector3> Galerkin::constraint_forces(const Field& field) const {
+  require_own(field);
   std::vector<Vector3> forces;
   forces.reserve(problem_.prescribed.size());
   for (std::size_t k = 0; k < problem_.prescribed.size(); ++k)
@@ -416,6 +428,8 @@ std::vector<Vector3> Galerkin::constraint_forces(const Field& field) const {
 
 double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nodes,
                           const std::vector<Vector3>& nodal_forces) const {
+  require_loads(loaded_nodes, nodal_forces);
+  require_own(field);
   VectorX applied = field.load_factor * loads_;
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
     add_force(contact_mean(loaded_nodes[k]), nodal_forces[k], applied);

@@ -140,6 +140,7 @@ Field GrowingBody::solve() const {
 }
 
 double GrowingBody::load_work(const Field& field) const {
+  require_own(field);
   return field.load_factor * cut_->external_loads().dot(expanded(field.coefficients).col(0));
 }
 
@@ -166,10 +167,12 @@ MatrixX GrowingBody::unit_forces(const std::vector<int>& nodes) const {
 }
 
 std::vector<Field> GrowingBody::force_responses(const std::vector<int>& candidates) const {
+  require_nodes(candidates);
   return responses_to(unit_forces(candidates));
 }
 
 std::vector<Field> GrowingBody::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
+  require_cases(nodes, forces);
   MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), forces.cols());
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
     const DisplacementMean& mean = cut_->mean(id_[nodes[c]]);
@@ -180,6 +183,7 @@ std::vector<Field> GrowingBody::case_responses(const std::vector<int>& nodes, co
 }
 
 MatrixX GrowingBody::contact_compliance(const std::vector<int>& candidates) const {
+  require_nodes(candidates);
   const std::vector<int>& known = cut_->candidates();
   std::vector<int> place(compact_.size(), -1); // of a node the system knows, in its compliance
   for (int k = 0; k < std::ssize(known); ++k)
@@ -214,6 +218,7 @@ std::vector<Field> GrowingBody::pattern_responses(const std::vector<ForcePattern
 
 MatrixX GrowingBody::pattern_displacements(const std::vector<ForcePattern>& patterns,
                                            const std::vector<Field>& fields) const {
+  require_own(fields);
   const MatrixX loads = compacted(pattern_loads(cut_->spheres(), patterns));
   MatrixX displacements(std::ssize(patterns), std::ssize(fields));
   for (std::size_t f = 0; f < fields.size(); ++f)
@@ -236,10 +241,13 @@ std::vector<Vector3> GrowingBody::constraint_points() const {
 }
 
 Vector3 GrowingBody::contact_point(int node) const {
+  require_nodes({node});
   return cut_->mean(id_[node]).centroid;
 }
 
 MatrixX GrowingBody::contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const {
+  require_nodes(nodes);
+  require_own(fields);
   MatrixX displacements(3 * std::ssize(nodes), std::ssize(fields));
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
     DisplacementMean mean = cut_->mean(id_[nodes[c]]);
@@ -252,6 +260,7 @@ MatrixX GrowingBody::contact_displacements(const std::vector<int>& nodes, const 
 }
 
 VectorX GrowingBody::nodal_displacements(const Field& field) const {
+  require_own(field);
   return supports_.displacements(field);
 }
 
@@ -262,12 +271,14 @@ void GrowingBody::shape_at(const Vector3& x, ShapeFunctions& shape) const {
 }
 
 PointState GrowingBody::at(const Vector3& x, const Field& field) const {
+  require_own(field);
   thread_local ShapeFunctions shape;
   shape_at(x, shape);
   return state_from(problem_, shape, field);
 }
 
 std::vector<Vector3> GrowingBody::constraint_forces(const Field& field) const {
+  require_own(field);
   const VectorX coefficients = expanded(field.coefficients);
   std::vector<Vector3> forces;
   forces.reserve(problem_.prescribed.size());
@@ -278,6 +289,8 @@ std::vector<Vector3> GrowingBody::constraint_forces(const Field& field) const {
 
 double GrowingBody::residual(const Field& field, const std::vector<int>& loaded_nodes,
                              const std::vector<Vector3>& nodal_forces) const {
+  require_loads(loaded_nodes, nodal_forces);
+  require_own(field);
   const VectorX coefficients = expanded(field.coefficients);
   VectorX applied = field.load_factor * cut_->external_loads();
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)

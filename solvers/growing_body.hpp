@@ -63,7 +63,10 @@ class GrowingBody final : public Discretisation, public Growable {
   [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
   [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
   void shape_at(const Vector3& x, ShapeFunctions& shape) const override;
-  [[nodiscard]] double sphere_radius(int node) const override { return cut_->spheres().radii()[id_[node]]; }
+  [[nodiscard]] double sphere_radius(int node) const override {
+    require_nodes({node});
+    return cut_->spheres().radii()[id_[node]];
+  }
   [[nodiscard]] std::vector<Vector3> constraint_forces(const Field& field) const override;
   /// From the stiffness as the cells make it, not from the window that was updated.
   [[nodiscard]] double residual(const Field& field, const std::vector<int>& loaded_nodes,

@@ -72,6 +72,7 @@ class Published final : public ElasticBody {
   }
 
   [[nodiscard]] std::vector<Field> force_responses(const std::vector<int>& candidates) const override {
+    require_nodes(candidates);
     const VectorX none = VectorX::Zero(3 * std::ssize(problem_.prescribed));
     std::vector<Field> responses;
     responses.reserve(3 * candidates.size());
@@ -87,6 +88,7 @@ class Published final : public ElasticBody {
   }
 
   [[nodiscard]] std::vector<Vector3> constraint_forces(const Field& field) const override {
+    require_own(field);
     std::vector<Vector3> forces;
     forces.reserve(problem_.prescribed.size());
     for (const Prescribed& entry : problem_.prescribed)
@@ -96,8 +98,8 @@ class Published final : public ElasticBody {
 
   [[nodiscard]] double residual(const Field& field, const std::vector<int>& loaded_nodes,
                                 const std::vector<Vector3>& nodal_forces) const override {
-    if (loaded_nodes.size() != nodal_forces.size())
-      throw InputError(fmt::format("{} forces for {} loaded nodes", nodal_forces.size(), loaded_nodes.size()));
+    require_loads(loaded_nodes, nodal_forces);
+    require_own(field);
     double largest = 0;
     std::vector<Vector3> rest(report_.nodes);
     for (int i = 0; i < report_.nodes; ++i) {

@@ -42,6 +42,8 @@ class BladeForce {
   [[nodiscard]] double half_width() const { return half_width_; }
   [[nodiscard]] bool finer_than_nodes() const { return finer_; }
 
+  /// Whether a part of the edge is inside the body, or pushes tissue ahead of itself beyond where that was.
+  [[nodiscard]] bool meets(const topology::BladePose& pose, const BodyModel& body) const;
   /// Whether a part of the edge is inside the body.
   [[nodiscard]] bool inside(const topology::BladePose& pose, const BodyModel& body) const;
 
@@ -128,6 +130,10 @@ class BladeForce {
   [[nodiscard]] Meeting meet(const BodyModel& body, std::size_t front, const Meeting& last) const;
   void add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
                    Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const;
+  [[nodiscard]] double reach(const Meeting& meeting, Eigen::Index contact, const topology::RestMap& to_rest,
+                             const Vector3& x) const;
+  [[nodiscard]] VectorX motions(const Meeting& meeting, const topology::BladePose& pose) const;
+  [[nodiscard]] bool leaves_bridge(const BodyModel& now, std::size_t last, double cut) const;
   [[nodiscard]] VectorX advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const;
   [[nodiscard]] solvers::ForcePattern drag(const BodyModel& body, const std::vector<solvers::EdgeContact>& contacts,
                                            const Vector3& way) const;

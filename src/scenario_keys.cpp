@@ -53,7 +53,9 @@ constexpr std::array keys = {
     ScenarioKey{"material.young_modulus", number, "Pa", "required", "Young's modulus E. Liver: about 5e3 to 1e4.",
                 above(0, 1e12)},
     ScenarioKey{"material.poisson_ratio", number, "", "required",
-                "Poisson's ratio nu. Soft tissue: 0.45 to 0.49; 0.5 (incompressible) cannot be computed.",
+                "Poisson's ratio nu. Soft tissue: 0.45 to 0.49. Above 0.49 method galerkin is too stiff (told); 0.5 "
+                "(incompressible) cannot be "
+                "computed.",
                 from(0, 0.499)},
     ScenarioKey{"material.density", number, "kg/m3", "1060.0", "Mass density, used by gravity alone.", above(0, 1e5)},
     ScenarioKey{"material.toughness", number, "J/m2", "",

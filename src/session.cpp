@@ -22,6 +22,7 @@ constexpr double patch_gap = 0.02;          // of the fine spacing: penetration 
 constexpr int patch_growths = 6;            // in one step
 constexpr double same_place = 1e-6;         // of the fine spacing: a blade that has gone less has not moved
 constexpr double rest_delay = 0.1;          // s without motion after which it is at rest
+constexpr double stiffest_galerkin = 0.49;  // Poisson's ratio
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
@@ -62,6 +63,11 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
   steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
   if (scenario_.method.method == solvers::Method::published)
     warn("published", "the published scheme does not converge and its force is not one in newtons: see docs");
+  if (scenario_.method.method == solvers::Method::galerkin && scenario_.material.poisson_ratio > stiffest_galerkin)
+    warn("locking",
+         fmt::format("method galerkin has no pressure of its own: at poisson_ratio = {:g}, above {:g}, it is "
+                     "too stiff, by some percent at usual spacings; collocation is not",
+                     scenario_.material.poisson_ratio, stiffest_galerkin));
   if (scenario_.tool && !touch_)
     warn("touch", "the tool never touches the organ on its way");
   if (cuts()) {

@@ -90,8 +90,8 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
   const bool placed = blade_force_->has_place();
   double surface = 0;
   if (placed) {
-    const bool leaves = !blade_force_->inside(*sample.blade, model_);
-    while (leaves && !passed_.empty() && !blade_force_->inside(passed_.back(), model_))
+    const bool leaves = !blade_force_->meets(*sample.blade, model_);
+    while (leaves && !passed_.empty() && !blade_force_->meets(passed_.back(), model_))
       passed_.pop_back();
     const bool goes_on = leaves && !passed_.empty(); // before it leaves
     if (goes_on)
@@ -106,7 +106,7 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
       surface += cut_on(sample, false, report);
   }
   blade_force_->go_to(*sample.blade, model_);
-  if (!blade_force_->inside(*sample.blade, model_)) {
+  if (!blade_force_->meets(*sample.blade, model_)) {
     if (const double uncut = blade_force_->passed_uncut(model_); uncut > 0)
       warn("bridge",
            fmt::format("by t = {:g} s the blade has left the organ past up to {:.2g} mm of tissue that it has "

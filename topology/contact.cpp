@@ -139,6 +139,7 @@ struct ContactQuery::Impl {
   explicit Impl(const SurfaceMesh& organ)
       : walk(organ), model(fcl_model(organ)), fcl(walk, model), triangles(cgal_triangles(organ)),
         tree(triangles.cbegin(), triangles.cend()) {
+    require_outward(organ);
     // Built now: CGAL would build them under a lock at the first query.
     tree.build();
     tree.accelerate_distance_queries();
@@ -158,11 +159,7 @@ ContactQuery& ContactQuery::operator=(ContactQuery&&) noexcept = default;
 
 SurfaceContact ContactQuery::first_touch(const ToolShape& tool, const ToolPose& pose) const {
   check(tool);
-  if (!pose.point.allFinite() || !(std::abs(pose.axis.norm() - 1) < 1e-6))
-    throw InputError(fmt::format("contact: the tool's pose is point ({}, {}, {}), axis ({}, {}, {}); it must be finite "
-                                 "and the axis of length 1",
-                                 pose.point.x(), pose.point.y(), pose.point.z(), pose.axis.x(), pose.axis.y(),
-                                 pose.axis.z()));
+  check(pose);
   return deepest_contact(impl_->fcl, tool, pose, {});
 }
 

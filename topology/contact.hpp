@@ -42,7 +42,8 @@ struct SurfaceContact {
 /// allocates, locks nor throws.
 class ContactQuery {
  public:
-  /// Throws InputError on an empty surface, a vertex index out of range or a coordinate that is not finite.
+  /// Throws InputError on an empty surface, a vertex index out of range, a coordinate that is not finite, and triangles
+  /// that are oriented inwards.
   explicit ContactQuery(const SurfaceMesh& organ);
   ~ContactQuery();
   ContactQuery(ContactQuery&&) noexcept;

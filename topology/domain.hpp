@@ -56,8 +56,8 @@ std::shared_ptr<const Domain> make_cylinder_domain(double radius, double height,
 /// from the exact nearest point of the triangles, signed by pseudonormals (surface_distance.hpp), except that farther
 /// from the surface than 1.5 voxels signed_distance is read from an OpenVDB level set (level_set.hpp, which states its
 /// error) of the given voxel size, m (0: derived as 1/128 of the largest extent). The sign is right everywhere. Normals
-/// and closest points are always exact. Const calls are thread safe. Throws InputError when the surface is not closed
-/// or the voxel size does not fit it.
+/// and closest points are always exact. Const calls are thread safe. Throws InputError when the surface is not closed,
+/// oriented inwards, or the voxel size does not fit it.
 std::shared_ptr<const Domain> make_organ_domain(SurfaceMesh surface, double voxel_size = 0);
 
 } // namespace spherecut::topology

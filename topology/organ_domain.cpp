@@ -18,7 +18,9 @@ class OrganDomain final : public Domain {
  public:
   OrganDomain(SurfaceMesh surface, double voxel_size)
       : surface_(std::move(surface)), exact_(surface_), level_set_(surface_, voxel_size),
-        bounds_(topology::bounds(surface_)) {}
+        bounds_(topology::bounds(surface_)) {
+    require_outward(surface_);
+  }
 
   [[nodiscard]] double signed_distance(const Vector3& x) const override {
     const double sampled = level_set_.distance(x);

@@ -1,9 +1,11 @@
 #include "topology/surface_mesh.hpp"
 
+#include "topology/errors.hpp"
 #include "topology/half_edges.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <fmt/format.h>
 
 namespace spherecut::topology {
 
@@ -27,6 +29,14 @@ double volume(const SurfaceMesh& mesh) {
     six_volumes += a.dot(b.cross(c));
   }
   return six_volumes / 6;
+}
+
+void require_outward(const SurfaceMesh& mesh) {
+  if (const double enclosed = volume(mesh); enclosed < 0)
+    throw InputError(
+        fmt::format("the surface of {} triangles is oriented inwards: it encloses {:.4g} m3; allowed: more "
+                    "than 0 (topology::check_surface turns it)",
+                    mesh.triangles.size(), enclosed));
 }
 
 double area(const SurfaceMesh& mesh) {

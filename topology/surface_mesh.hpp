@@ -17,6 +17,9 @@ BoundingBox bounds(const SurfaceMesh& mesh);
 /// Enclosed volume, m3 (divergence theorem; negative when the orientation is inward).
 double volume(const SurfaceMesh& mesh);
 
+/// Throws InputError when a closed surface is oriented inwards.
+void require_outward(const SurfaceMesh& mesh);
+
 /// Total area, m2.
 double area(const SurfaceMesh& mesh);
 

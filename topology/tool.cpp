@@ -189,6 +189,15 @@ void check(const ToolShape& tool) {
   std::visit(by_shape, tool);
 }
 
+void check(const ToolPose& pose) {
+  constexpr double rounding = 1e-6;
+  require_finite("reference point", pose.point);
+  require_finite("axis", pose.axis);
+  if (const double length = pose.axis.norm(); std::abs(length - 1) > rounding)
+    throw InputError(fmt::format("tool: axis ({}, {}, {}) has the length {}, it must be 1", pose.axis.x(),
+                                 pose.axis.y(), pose.axis.z(), length));
+}
+
 SurfaceMesh tool_mesh(const ToolShape& tool, const ToolPose& pose, double edge) {
   check(tool);
   require_positive("edge of the mesh", edge);

@@ -62,6 +62,8 @@ double tip_radius(const ToolShape& tool);
 
 /// Throws InputError on non-positive or non-finite sizes, a port that is not finite, a shaft thicker than its tip.
 void check(const ToolShape& tool);
+/// Throws InputError on a pose that is not finite or whose axis is not a unit vector.
+void check(const ToolPose& pose);
 
 /// Closed outward surface of the tool for viewers, edges of about `edge` m (never fewer than 12 nor more than 720
 /// around or along a part). Its vertices lie on the tool. Throws InputError when edge is not positive.

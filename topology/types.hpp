@@ -1,10 +1,18 @@
 // Basic value types shared by every floor. SI units throughout: metres, newtons, pascals, seconds.
 #pragma once
 
+#include "topology/errors.hpp" // what functions of these types throw
+
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <vector>
+
+#if EIGEN_DEFAULT_ALIGN_BYTES != 16
+#error                                                                                                                 \
+    "Eigen aligns memory to more than 16 bytes here (-mavx, -march=native); the libraries of spherecut, as Debian's, \
+do to 16, and one would free what the other took. Add -mno-avx to what includes their headers, or -DEIGEN_DONT_VECTORIZE."
+#endif
 
 namespace spherecut {
 

@@ -105,7 +105,7 @@ class Cutting {
     for (int k = 1; k <= parts; ++k) {
       const double at = blade_ + (reached - blade_) * k / parts;
       const BladeState next = push_blade(now_.patch, now_.advance(at), drag);
-      run_.ledger.move(now_.patch, state_, next, (reached - blade_) / parts);
+      run_.ledger.move(now_.patch, state_, next, next.advance - state_.advance, (reached - blade_) / parts);
       state_ = next;
     }
     note(reached);

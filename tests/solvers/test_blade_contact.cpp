@@ -113,7 +113,7 @@ TEST_CASE("A block that looks the same at every depth is cut at toughness times 
       const auto share = cutting_share(body, stroke, body, beyond, needed);
       const double reached = share ? blade + *share * (target - blade) : target;
       const BladeState next = push_blade(body, one(reached - front));
-      ledger.move(body, state, next, 0);
+      ledger.move(body, state, next, next.advance - state.advance, 0);
       if (front > 0.02) {
         force_work += 0.5 * (state.forces[0] + next.forces[0]) * (reached - blade);
         way += reached - blade;
@@ -164,14 +164,12 @@ TEST_CASE("With lips in contact and dragging flanks every motion and cut balance
     after.compliance *= 0.9;
     BladeLedger ledger;
     BladeState state = push_blade(before, VectorX::Zero(3), 1);
-    ledger.move(before, push_blade(before, VectorX::Constant(3, -10), 0), state, 0); // friction sets in at rest
-    ledger = {};
     const double initially = state.stored;
     constexpr int parts = 4000; // forces change evenly but for where a contact sets in
     for (int k = 1; k <= parts; ++k) {
       const BladeState next = push_blade(before, VectorX::Constant(3, 0.5 * k / parts), 1);
       REQUIRE(next.converged);
-      ledger.move(before, state, next, 0.5 / parts);
+      ledger.move(before, state, next, next.advance - state.advance, 0.5 / parts);
       state = next;
     }
     CHECK(state.forces.head(8).minCoeff() >= 0);

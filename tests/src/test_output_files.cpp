@@ -152,3 +152,39 @@ TEST_CASE("Both summaries give the whole account of a resisted blade's work") {
   check("run", {}, "summary.json", {"cut", "blade"});
   check("haptics", {"--virtual", "--duration", "1"}, "haptic.json", {"blade"});
 }
+
+TEST_CASE("docs/output.md names every column that is written") {
+  const TemporaryFolder folder;
+  const std::string page = read_file(std::filesystem::path(SPHERECUT_SOURCE_DIR) / "docs/output.md");
+  const std::string body = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10");
+  const auto scenario = [&](const std::string& name, const std::string& rest) {
+    return write_file(folder.path() / (name + ".toml"), body + rest).string();
+  };
+  const auto check = [&](const std::vector<std::string>& arguments, const std::vector<std::string>& files) {
+    std::vector<std::string> all = arguments;
+    all.insert(all.end(), {"--out", (folder.path() / ("out-" + files.front())).string()});
+    const ProgramResult result = run_spherecut(all);
+    INFO(result.out << result.err);
+    REQUIRE(result.status == 0);
+    for (const std::string& file : files) {
+      const std::string text = read_file(folder.path() / ("out-" + files.front()) / file);
+      std::istringstream columns(text.substr(0, text.find('\n')));
+      const std::size_t start = page.find("### `" + file + "`");
+      CAPTURE(file);
+      const bool in_list = file == "haptic_deadlines.csv"; // three columns, named where the file is
+      REQUIRE((in_list || start != std::string::npos));
+      const std::string section = in_list ? page : page.substr(start, page.find("\n#", start + 5) - start);
+      for (std::string column; std::getline(columns, column, ',');) {
+        const std::string vector = std::regex_replace(column, std::regex("_[xyz](_|$)"), "_{x,y,z}$1");
+        CAPTURE(column);
+        CHECK((section.find('`' + column + '`') != std::string::npos ||
+               section.find('`' + vector + '`') != std::string::npos));
+      }
+    }
+  };
+  const std::string down = blade({"[0.004, 0, 0.031]", "[0.003, 0, 0.029]"}, 0.04, "0.5");
+  check({"run", scenario("blade", down + replaced(ball_tool, "0.001", "0.002"))}, {"cuts.csv", "forces.csv"});
+  check({"run", scenario("tear", disc_precut + "[tearing]\n" + replaced(ball_tool, "0.001", "0.002"))}, {"tears.csv"});
+  check({"haptics", scenario("hand", down), "--virtual", "--duration", "0.1"},
+        {"haptic_ticks.csv", "haptic_solves.csv", "haptic_deadlines.csv"});
+}

@@ -157,6 +157,33 @@ TEST_CASE("Where little force cuts, a resisted blade cuts at that force in short
   CHECK(most < 5 * 0.5);
 }
 
+TEST_CASE("A resisted blade that pushes the far side of an organ out goes on until it has cut that, too") {
+  const double toughness = 10; // J/m2
+  const std::string text = replaced(replaced(cut_block, "size = [0.06, 0.06, 0.03]", "size = [0.04, 0.03, 0.03]"),
+                                    "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10") +
+                           "[cut]\nfront_spacing = 0.005\nunheld = \"hold\"\n" +
+                           blade({"[-0.024, 0, 0.02]", "[0.027, 0, 0.02]"}, 0.02, "0.1");
+  Session session = session_of(text);
+  const std::vector<StepResult> results = run(session);
+  double before = 0;
+  for (const StepResult& result : results) {
+    const BladeReport& blade = result.cut->blade;
+    CHECK(blade.force.x() <= 1e-12); // against its motion
+    CHECK(blade.ledger.work >= before - 1e-12);
+    before = blade.ledger.work;
+  }
+  const CutReport& last = *results.back().cut;
+  CHECK(last.pieces == 2);
+  CHECK(last.area == Approx(0.04 * 0.03).epsilon(1e-3));
+  CHECK(last.front_length == 0);
+  CHECK(last.blade.force.norm() == 0);
+  CHECK(last.blade.ledger.surface == Approx(toughness * last.area).epsilon(1e-9));
+  CHECK(last.blade.ledger.stored == 0);
+  CHECK(last.blade.ledger.work == Approx(last.blade.ledger.surface).epsilon(0.1));
+  CHECK(last.blade.ledger.imbalance() < 0.03);
+  CHECK(std::none_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
+}
+
 TEST_CASE("Tissue that a resisted blade has gone through without cutting it is told") {
   const std::string tough = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 20000");
   SECTION("where it presses too little to cut, and comes out at the other side") {

@@ -1,3 +1,4 @@
+#include "topology/contact.hpp"
 #include "topology/domain.hpp"
 
 #include "tests/support/mesh_oracles.hpp"
@@ -146,6 +147,16 @@ TEST_CASE("Voxel sizes that cannot hold the organ, or that fill memory, are refu
   CHECK(derived.active_voxels() * std::pow(derived.voxel_size(), 3) > volume(mesh));
   CHECK(derived.memory_bytes() > derived.active_voxels() * sizeof(float));
   CHECK_NOTHROW(LevelSet(mesh, 0, derived.memory_bytes() * 2));
+}
+
+TEST_CASE("A surface that is oriented inwards is refused as an organ and for contact", "[domain]") {
+  SurfaceMesh mesh = make_hemisphere(0.05, 0.01);
+  CHECK_NOTHROW(make_organ_domain(mesh));
+  CHECK_NOTHROW(ContactQuery(mesh));
+  for (Triangle& t : mesh.triangles)
+    std::swap(t[0], t[1]);
+  CHECK_THROWS_WITH(make_organ_domain(mesh), Catch::Contains("oriented inwards"));
+  CHECK_THROWS_WITH(ContactQuery(mesh), Catch::Contains("oriented inwards"));
 }
 
 TEST_CASE("An organ domain is exact near its surface and within a voxel ten voxels deep", "[domain]") {
