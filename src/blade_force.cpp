@@ -313,6 +313,7 @@ void BladeForce::propose(BodyModel body, std::size_t poses, double drawn) {
   next.body = std::move(body);
   proposal_ = std::move(next);
   proposal_->meeting = meet(proposal_->body, proposal_->poses, {});
+  proposal_->through = !inside(way_[proposal_->poses], proposal_->body);
 }
 
 void BladeForce::pass(std::size_t poses, const BodyModel& now) {
@@ -333,7 +334,7 @@ bool BladeForce::advance(const BodyModel& now) {
   for (const std::size_t stop : stops()) {
     const topology::BladePose target = way_[stop];
     std::optional<double> share;
-    if (proposal_)
+    if (proposal_ && (proposal_->through || !proposal_->meeting.pieces.empty()))
       share = solvers::cutting_share(
           meeting_.patch, {state_->advance, advances(meeting_, now, target)}, proposal_->meeting.patch,
           {advances(proposal_->meeting, proposal_->body, at_), advances(proposal_->meeting, proposal_->body, target)},

@@ -122,8 +122,9 @@ class BladeForce {
     BodyModel body;
     Meeting meeting;
     std::size_t poses = 0;
-    double way = 0;   // m, from the front to the blade when it was proposed
-    double drawn = 0; // J, released by other loads
+    double way = 0;       // m, from the front to the blade when it was proposed
+    double drawn = 0;     // J, released by other loads
+    bool through = false; // it ends outside the body: nothing is left to press on
   };
 
   [[nodiscard]] bool lies_in(const topology::Incision& cut, const topology::RestMap& to_rest, const Vector3& x) const;

@@ -88,6 +88,8 @@ bool Session::proposes_aside() const {
 double Session::press_blade(const StepSample& sample, CutReport& report) {
   const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };
   const bool placed = blade_force_->has_place();
+  const bool out =
+      !blade_force_->inside(*sample.blade, model_); // what it pushes ahead of itself there is cut in the step
   double surface = 0;
   if (placed) {
     const bool leaves = !blade_force_->meets(*sample.blade, model_);
@@ -99,7 +101,7 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
     else
       blade_force_->pass_by(passed_);
     const double far = most_advances * aside_advance * zone_.spacing.fine;
-    if (proposing_ && (proposing_->arrived || leaves || blade_force_->way_left() - proposing_->way_left > far))
+    if (proposing_ && (proposing_->arrived || leaves || out || blade_force_->way_left() - proposing_->way_left > far))
       take_proposal(sample, report);
     const bool lags = proposes_aside() && (blade_force_->proposed() || blade_force_->lags());
     if (goes_on || (leaves && lags)) // what it has come to is cut before
@@ -122,7 +124,7 @@ double Session::press_blade(const StepSample& sample, CutReport& report) {
   }
   if (!placed)
     incisions_->place(*sample.blade, to_rest);
-  return surface + cut_on(sample, proposes_aside(), report);
+  return surface + cut_on(sample, proposes_aside() && !out, report);
 }
 
 // A cut is built when it comes near, beside the body, and the body becomes it when it is due. Where it is built beside
