@@ -131,8 +131,8 @@ class BladeForce {
   [[nodiscard]] Meeting meet(const BodyModel& body, std::size_t front, const Meeting& last) const;
   void add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
                    Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const;
-  [[nodiscard]] double reach(const Meeting& meeting, Eigen::Index contact, const topology::RestMap& to_rest,
-                             const Vector3& x) const;
+  [[nodiscard]] double reach(const Meeting& meeting, Eigen::Index contact, const BodyModel& body,
+                             const topology::RestMap& to_rest, const Vector3& x) const;
   [[nodiscard]] VectorX motions(const Meeting& meeting, const topology::BladePose& pose) const;
   [[nodiscard]] bool leaves_bridge(const BodyModel& now, std::size_t last, double cut) const;
   [[nodiscard]] VectorX advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const;

@@ -228,13 +228,19 @@ VectorX BladeForce::motions(const Meeting& meeting, const topology::BladePose& p
   return result;
 }
 
-// How far a piece of the edge at x may push before tissue slips off it, m. A piece that goes out of the body sideways
-// has less and less of it; one that goes out straight ahead has the tissue there before it still, and pushes that out.
-double BladeForce::reach(const Meeting& meeting, Eigen::Index contact, const topology::RestMap& to_rest,
-                         const Vector3& x) const {
+// How far a piece of the edge at x may push before tissue slips off it, m. A piece that goes out of the body sideways,
+// or back through the cut, has less and less of it; one that goes out straight ahead has the tissue there before it
+// still, and pushes that out.
+double BladeForce::reach(const Meeting& meeting, Eigen::Index contact, const BodyModel& body,
+                         const topology::RestMap& to_rest, const Vector3& x) const {
   const solvers::EdgeContact& there = meeting.patch.contacts[static_cast<std::size_t>(contact)];
-  const Vector3 behind = x - (there.push.dot(x - there.point) + spacing_) * there.push;
-  const double depth = std::max(-signed_distance(*domain_, to_rest, x), -domain_->signed_distance(behind)); // m
+  double depth = -signed_distance(*domain_, to_rest, x); // m
+  bool is_cut_ahead = false;
+  if (body.incision != nullptr)
+    if (const auto on = body.incision->closest(there.point + 0.5 * spacing_ * there.push, in_sheet * spacing_))
+      is_cut_ahead = !on->on_border;
+  if (!is_cut_ahead)
+    depth = std::max(depth, -domain_->signed_distance(x - (there.push.dot(x - there.point) + spacing_) * there.push));
   return meeting.patch.base[contact] + depth_factor * std::max(0.0, depth);
 }
 
@@ -243,8 +249,8 @@ VectorX BladeForce::advances(const Meeting& meeting, const BodyModel& body, cons
   VectorX result = motions(meeting, pose);
   for (Eigen::Index c = 0; c < result.size(); ++c) {
     const int piece = meeting.pieces[static_cast<std::size_t>(c)];
-    result[c] =
-        std::min(result[c], reach(meeting, c, to_rest, placed(pose, edge_[static_cast<std::size_t>(piece)].point)));
+    result[c] = std::min(result[c],
+                         reach(meeting, c, body, to_rest, placed(pose, edge_[static_cast<std::size_t>(piece)].point)));
   }
   return result;
 }
@@ -259,7 +265,7 @@ bool BladeForce::meets(const topology::BladePose& pose, const BodyModel& body) c
   for (Eigen::Index c = 0; c < motion.size(); ++c) {
     const int piece = meeting_.pieces[static_cast<std::size_t>(c)];
     const Vector3 x = placed(pose, edge_[static_cast<std::size_t>(piece)].point);
-    if (motion[c] > meeting_.patch.base[c] && motion[c] < reach(meeting_, c, to_rest, x))
+    if (motion[c] > meeting_.patch.base[c] && motion[c] < reach(meeting_, c, body, to_rest, x))
       return true;
   }
   return false;
