@@ -24,7 +24,12 @@ target_compile_features(spherecut_options INTERFACE cxx_std_20)
 target_compile_definitions(spherecut_options INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
 
 add_library(spherecut_warnings INTERFACE)
-target_compile_options(spherecut_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+target_compile_options(spherecut_warnings INTERFACE -Wall -Wextra -Wpedantic -Wnon-virtual-dtor -Woverloaded-virtual)
+if(SPHERECUT_UNITY) # a name of one file is no concern of the next one in its unit
+  target_compile_options(spherecut_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+else()
+  target_compile_options(spherecut_warnings INTERFACE -Wshadow)
+endif()
 if(SPHERECUT_WERROR)
   target_compile_options(spherecut_warnings INTERFACE -Werror)
 endif()

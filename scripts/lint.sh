@@ -29,7 +29,8 @@ status=0
 for shell in "${shells[@]}"; do
   bash -n "$shell" || status=1
 done
-clang-format-14 --dry-run -Werror "${sources[@]}" || status=1
+jobs=${SPHERECUT_JOBS:-$(nproc)}
+printf '%s\0' "${sources[@]}" | xargs -0 -P "$jobs" -n 40 clang-format-14 --dry-run -Werror || status=1
 printf 'lint: %d sources formatted, %d shell scripts parsed\n' "${#sources[@]}" "${#shells[@]}"
 
 page=src/viewer/page
@@ -40,48 +41,66 @@ else
   printf 'lint: the packages of the page are not installed (./dev build does it): its types are not checked\n'
 fi
 
-# unit <tab> files it includes, itself first, following the project's own quoted includes.
+# The units of what ships as they are compiled: sources by themselves, and those that hold several of them. Tests are
+# formatted and compiled with warnings as errors.
+root=$PWD
+mapfile -t units < <(sed -n 's/^ *"file": "\(.*\)",\{0,1\}$/\1/p' "$build/compile_commands.json" | sed "s#^$root/##" |
+  grep -vE "^($build/)?tests/" | sort -u)
+
+# unit <tab> 1 when it includes a heavy library, else 0 <tab> files it includes, itself first, following the project's own
+# quoted includes.
 dependencies() {
-  awk '
-    FNR == 1 { files[++count] = FILENAME }
-    /^#include "/ { split($0, part, "\""); includes[FILENAME] = includes[FILENAME] " " part[2] }
+  printf '%s\n' "${units[@]}" "${sources[@]}" | sort -u | awk -v root="$root/" -v compiled="$(printf '%s\n' "${units[@]}")" '
+    function scan(file,   line, part) {
+      while ((getline line < file) > 0) {
+        if (line ~ /^#include [<"](CGAL|openvdb|fcl)\//) heavy[file] = 1
+        if (line !~ /^#include "/) continue
+        split(line, part, "\"")
+        if (index(part[2], root) == 1) part[2] = substr(part[2], length(root) + 1)
+        includes[file] = includes[file] " " part[2]
+      }
+      close(file)
+    }
     function visit(file,   names, n, i) {
-      if (file in seen) return
+      if (file in seen || !(file in known)) return
       seen[file] = 1; closure = closure " " file
+      if (file in heavy) is_heavy = 1
       n = split(includes[file], names, " ")
       for (i = 1; i <= n; i++) visit(names[i])
     }
+    { known[$0] = 1; scan($0) }
     END {
-      for (f = 1; f <= count; f++) {
-        if (files[f] !~ /\.cpp$/) continue
-        split("", seen); closure = ""; visit(files[f]); print files[f] "\t" substr(closure, 2)
+      count = split(compiled, list, "\n")
+      for (u = 1; u <= count; u++) {
+        split("", seen); closure = ""; is_heavy = 0; visit(list[u])
+        print list[u] "\t" is_heavy "\t" substr(closure, 2)
       }
-    }' "${sources[@]}"
+    }'
 }
 
 cache=$build/lint
 mkdir -p "$cache"
 tool=$(clang-tidy-14 --version | tr '\n' ' ')
-heavy='#include [<"](CGAL|openvdb|fcl)/'
 pending=()
 checked=0
-while IFS=$'\t' read -r unit closure; do
-  # Tests are formatted and compiled with warnings as errors; clang-tidy reads what ships.
-  [[ $unit == tests/* ]] && continue
-  # shellcheck disable=SC2086
-  if grep -qE "$heavy" $closure 2>/dev/null || ! grep -qF "/$unit\"" "$build/compile_commands.json"; then
-    continue
-  fi
+sources_checked=0
+while IFS=$'\t' read -r unit is_heavy closure; do
+  [ "$is_heavy" = 1 ] && continue
+  mapfile -t members < <(tr ' ' '\n' <<<"$closure" | grep '\.cpp$')
+  sources_checked=$((sources_checked + ${#members[@]}))
   checked=$((checked + 1))
+  # The settings of a folder hold for its sources wherever they are compiled.
+  settings=$(dirname "${members[0]}")/.clang-tidy
+  [ -e "$settings" ] || settings=.clang-tidy
   # shellcheck disable=SC2086
-  key=$({ printf '%s\n' "$tool" "$checks"; cat .clang-tidy src/*/.clang-tidy cmake/*.cmake $closure 2>/dev/null || true; } | sha256sum | cut -c 1-32)
-  [ -e "$cache/$key" ] || pending+=("$key $unit")
+  key=$({ printf '%s\n' "$tool" "$checks"; cat .clang-tidy "$settings" cmake/*.cmake $closure; } | sha256sum | cut -c 1-32)
+  [ -e "$cache/$key" ] || pending+=("$key $unit $settings")
 done < <(dependencies)
-printf 'lint: clang-tidy on %d units, %d of them changed\n' "$checked" "${#pending[@]}"
+printf 'lint: clang-tidy on %d sources in %d units, %d of them changed\n' "$sources_checked" "$checked" "${#pending[@]}"
 
-check_unit() { # CACHE BUILD KEY UNIT
+check_unit() { # CACHE BUILD KEY UNIT SETTINGS
   local said
-  if said=$(clang-tidy-14 --quiet ${checks:+"--checks=$checks"} -p "$2" "$4" 2>/dev/null); then
+  if said=$(clang-tidy-14 --quiet --extra-arg=-Wno-unknown-warning-option --config-file="$5" ${checks:+"--checks=$checks"} -p "$2" "$4" 2>/dev/null); then
     : >"$1/$3"
   else
     printf '%s\n' "$said"
@@ -90,7 +109,7 @@ check_unit() { # CACHE BUILD KEY UNIT
 }
 export -f check_unit
 if [ ${#pending[@]} -gt 0 ]; then
-  printf '%s\n' "${pending[@]}" | xargs -P "${SPHERECUT_JOBS:-$(nproc)}" -L 1 bash -c 'check_unit "$@"' lint "$cache" "$build" || status=1
+  printf '%s\n' "${pending[@]}" | xargs -P "$jobs" -L 1 bash -c 'check_unit "$@"' lint "$cache" "$build" || status=1
 fi
 if [ "$status" = 0 ]; then printf 'lint: clean\n'; else printf 'lint: see above\n' >&2; fi
 exit "$status"

@@ -14,7 +14,7 @@ namespace {
 constexpr double smooth_cosine = 0.8; // of the angle between a point's normal and the cell's
 
 /// A polygon, as triangles about its centroid.
-struct Polygon {
+struct LoadedPolygon {
   const std::vector<Vector3>& corners;
   int begin, end;
   Vector3 centroid;
@@ -29,7 +29,7 @@ struct Polygon {
 using Function = std::function<Vector3(const Vector3& x, const Vector3& normal)>;
 
 /// Over the cone from `apex` over the polygon, N.
-Vector3 body_force_on(const Vector3& apex, const Polygon& base, const Loads& loads) {
+Vector3 body_force_on(const Vector3& apex, const LoadedPolygon& base, const Loads& loads) {
   constexpr double near = 0.5854101966249685, far = 0.1381966011250105;
   Vector3 force = Vector3::Zero();
   base.triangles([&](const Vector3& a, const Vector3& b, const Vector3& c) {
@@ -44,7 +44,7 @@ Vector3 body_force_on(const Vector3& apex, const Polygon& base, const Loads& loa
 }
 
 /// Over the polygon of the given area vector, N.
-Vector3 traction_on(const Polygon& face, const Vector3& area, const Function& traction) {
+Vector3 traction_on(const LoadedPolygon& face, const Vector3& area, const Function& traction) {
   const double size = area.norm();
   if (!traction || size <= 0)
     return Vector3::Zero();
@@ -104,7 +104,7 @@ std::vector<Vector3> cell_loads(const topology::CellComplex& cells, const Proble
             x[node], {cells.face_corners, cells.face_start[f], cells.face_start[f + 1], cells.faces[f].centroid},
             problem.loads);
   }
-  const auto add = [&](int node, const Polygon& face, const Vector3& area, const Function& traction) {
+  const auto add = [&](int node, const LoadedPolygon& face, const Vector3& area, const Function& traction) {
     if (problem.loads.body_force)
       forces[node] += body_force_on(x[node], face, problem.loads);
     forces[node] += traction_on(face, area, traction) + initial_stress * area;

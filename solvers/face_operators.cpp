@@ -16,9 +16,9 @@ namespace {
 constexpr double singular_reach = 2; // from the front, in units of the spacing
 constexpr int deepest_division = 4;  // of a triangle whose edges are longer than it is away from the front
 
-using Triangle = std::array<Vector3, 3>;
+using FacetCorners = std::array<Vector3, 3>;
 
-Vector3 area_of(const Triangle& t) {
+Vector3 area_of(const FacetCorners& t) {
   return 0.5 * (t[1] - t[0]).cross(t[2] - t[0]);
 }
 
@@ -36,7 +36,7 @@ class FaceMeans {
     if (enriched_ && incision_->front_frame(face.centroid, singular_reach * spacing)) {
       const int begin = cells_.face_start[f], end = cells_.face_start[f + 1];
       const auto triangle = [&](int k) {
-        return Triangle{face.centroid, cells_.face_corners[k], cells_.face_corners[k + 1 < end ? k + 1 : begin]};
+        return FacetCorners{face.centroid, cells_.face_corners[k], cells_.face_corners[k + 1 < end ? k + 1 : begin]};
       };
       Vector3 area = Vector3::Zero();
       for (int k = begin; k < end; ++k)
@@ -58,12 +58,13 @@ class FaceMeans {
   FaceOperators take() { return std::move(result_); }
 
  private:
-  void add_triangle(const topology::CellFace& face, const Triangle& t, const Vector3& share_of_area, int depth) {
+  void add_triangle(const topology::CellFace& face, const FacetCorners& t, const Vector3& share_of_area, int depth) {
     const Vector3 middle = (t[0] + t[1] + t[2]) / 3;
     const double longest = std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
     if (depth < deepest_division && incision_->front_frame(middle, longest)) {
       const Vector3 a = 0.5 * (t[0] + t[1]), b = 0.5 * (t[1] + t[2]), c = 0.5 * (t[2] + t[0]);
-      for (const Triangle& part : {Triangle{t[0], a, c}, Triangle{a, t[1], b}, Triangle{c, b, t[2]}, Triangle{a, b, c}})
+      for (const FacetCorners& part :
+           {FacetCorners{t[0], a, c}, FacetCorners{a, t[1], b}, FacetCorners{c, b, t[2]}, FacetCorners{a, b, c}})
         add_triangle(face, part, share_of_area, depth + 1);
       return;
     }

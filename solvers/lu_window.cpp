@@ -19,7 +19,7 @@ namespace spherecut::solvers {
 namespace {
 
 /// Of the largest entry of the pivot's row: a smaller pivot is rounding.
-constexpr double singular_pivot = 1e-13;
+constexpr double rounding_pivot = 1e-13;
 
 constexpr int rows_at_once = 4; // of a node, which have the same columns: what they read is read once
 constexpr int chunk = 512;      // columns of them at once, which stay in the first cache
@@ -144,7 +144,7 @@ void LuWindow::Part::factorise(const VectorX& scale) {
   if (n > 0)
     dgetrf_(&n, &n, factor.data(), &n, pivots.data(), &info);
   for (int j = 0; j < n; ++j)
-    if (const double pivot = std::abs(factor(j, j)); !(pivot > singular_pivot * scale[j]))
+    if (const double pivot = std::abs(factor(j, j)); !(pivot > rounding_pivot * scale[j]))
       throw NumericalError(fmt::format("the window of {} unknowns is singular to rounding (slot {}, pivot {:.1e} of "
                                        "{:.1e}): a piece that nothing holds, or an unsound support",
                                        n, slots[j], pivot, scale[j]));

@@ -22,7 +22,7 @@ constexpr double single_crowding = 0.7;  // of the ring ahead
 constexpr double taken_crowding = 0.4;   // of pairs against seeds
 constexpr double facing = 0.5;           // of lip nodes of different sheets that see each other
 constexpr double step_crowding = 0.87;   // as between other nodes: see node_filler.cpp
-constexpr double sweep_crowding = 0.88;
+constexpr double strip_crowding = 0.88;
 constexpr double step_length = 0.93;
 constexpr double surface_clearance = 0.3; // of rings
 constexpr double above_sheet =
@@ -264,7 +264,7 @@ class Chooser {
         station(chain, curve, from + (to - from) * k / steps, station_crowding);
     }
     for (double at = 0; at < curve.length(); at += 0.25) // places that the regular steps have missed
-      station(chain, curve, at, sweep_crowding);
+      station(chain, curve, at, strip_crowding);
     for (int end : {0, 1})
       if (chain.at_front[end])
         ahead_on_surface(chain, end);
@@ -358,11 +358,11 @@ class Chooser {
         advance(pairs_.size() - 1);
     };
     for (const SheetSample& sample : layout_.samples)
-      sweep(sample, sweep_crowding, 0.8 * ring_offset, above_sheet);
+      sweep(sample, strip_crowding, 0.8 * ring_offset, above_sheet);
     // A sheet smaller than its rings gets a pair all the same.
     for (const SheetSample& sample : layout_.samples)
       if (fresh_[sample.sheet].size() + settled_[sample.sheet].size() == 0)
-        sweep(sample, sweep_crowding, 0.1, 0.1);
+        sweep(sample, strip_crowding, 0.1, 0.1);
   }
 
   const topology::Domain& domain_;

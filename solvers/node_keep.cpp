@@ -8,8 +8,8 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double grown_crowding = 0.8; // between previous nodes where h has grown, in units of their mean spacing
-constexpr double taken_crowding = 0.4; // of previous lip nodes by seeds
+constexpr double stretched_crowding = 0.8; // between previous nodes where h has grown, in units of their mean spacing
+constexpr double seeded_crowding = 0.4;    // of previous lip nodes by seeds
 // The range of placed / wanted spacing in which a node is kept.
 constexpr double kept_finest = 0.75, kept_coarsest = 1.1;
 constexpr double kept_clearance = 0.3; // of previous nodes from the sheets, in units of h
@@ -79,7 +79,7 @@ bool Filler::still_fits(const NodeCloud& previous, int j, double h, double ratio
   const Vector3& x = previous.positions[j];
   const bool grown = ratio < 1, inside = previous.kinds[j] == NodeKind::interior;
   return ratio >= kept_finest && ratio <= kept_coarsest &&
-         !grid_.crowded(x, h, grown ? grown_crowding : kept_crowding) &&
+         !grid_.crowded(x, h, grown ? stretched_crowding : kept_crowding) &&
          !(grown && inside && domain_.signed_distance(x) > -options_.wall_clearance * h) &&
          clear_of_sheets(x, kept_clearance * h);
 }
@@ -91,7 +91,7 @@ std::vector<int> Filler::lips_to_keep(const NodeCloud& previous) const {
     const Vector3& x = previous.positions[j];
     const double h = spacing_(x), ratio = previous.spacings[j] / h;
     const double reach = 2 * lip_offset * previous.spacings[j];
-    return ratio >= kept_finest && ratio <= kept_coarsest && !grid_.crowded(x, h, taken_crowding) &&
+    return ratio >= kept_finest && ratio <= kept_coarsest && !grid_.crowded(x, h, seeded_crowding) &&
            incision_->closest(x, reach).has_value();
   };
   for (int j = 0; j < previous.size(); ++j)

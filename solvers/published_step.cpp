@@ -13,14 +13,15 @@ namespace {
 
 constexpr double worst_condition = 1e9;
 constexpr double worst_pivot_ratio = 1e12; // equal rows leave a pivot of the size of rounding, not zero
-constexpr double growth = 1.25;
-constexpr int growth_steps = 4;
-constexpr int fewest_nodes = 6, most_nodes = 500;
+constexpr double tip_growth = 1.25;
+constexpr int tip_growth_steps = 4;
+constexpr int fewest_step_nodes = 6, most_step_nodes = 500;
 
 int checked_count(int nodes, const Material& material, double rho) {
   material.check();
-  if (nodes < fewest_nodes || nodes > most_nodes)
-    throw InputError(fmt::format("published step: {} nodes; it takes {} to {}", nodes, fewest_nodes, most_nodes));
+  if (nodes < fewest_step_nodes || nodes > most_step_nodes)
+    throw InputError(
+        fmt::format("published step: {} nodes; it takes {} to {}", nodes, fewest_step_nodes, most_step_nodes));
   if (!(rho > 0) || !std::isfinite(rho))
     throw InputError(fmt::format("published step: support radius of {} spacings; it must be positive", rho));
   return nodes;
@@ -63,12 +64,12 @@ bool PublishedStep::evaluate_node(const Vector3& x) noexcept {
     kernel.collect(cell, x.data(), support);
     if (shape_kernel::evaluate_support(kernel, support, Basis::linear, true, worst_condition, shape_))
       break;
-    if (step == growth_steps)
+    if (step == tip_growth_steps)
       return false;
-    shrink /= growth * growth;
+    shrink /= tip_growth * tip_growth;
     for (int b = 3 * blocks_; b < 4 * blocks_; ++b)
       for (double& q : spheres_[b])
-        q /= growth * growth;
+        q /= tip_growth * tip_growth;
   }
   if (shrink < 1)
     for (int b = 3 * blocks_; b < 4 * blocks_; ++b)

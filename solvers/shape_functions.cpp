@@ -18,7 +18,7 @@ using shape_kernel::Support;
 
 namespace {
 
-constexpr double growth = 1.25;
+constexpr double radius_growth = 1.25;
 constexpr int growth_steps_at_node = 6;
 constexpr int growth_steps_at_point = 4;
 constexpr int growth_steps_for_enrichment = 2;
@@ -102,7 +102,7 @@ bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3&
   SupportMemory memory(spheres.size());
   double factor = 1;
   for (int step = 0; step < growth_steps_at_point; ++step) {
-    collect_grown(spheres, x, factor *= growth, memory.support);
+    collect_grown(spheres, x, factor *= radius_growth, memory.support);
     if (evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out))
       return true;
   }
@@ -114,10 +114,10 @@ bool evaluate_grown_near_cut(const Kernel& kernel, const Spheres& spheres, const
                              ShapeFunctions& out) {
   SupportMemory memory(spheres.size());
   for (const CutSight::Enrich enrich : {CutSight::Enrich::where_near, CutSight::Enrich::never}) {
-    double factor = enrich == CutSight::Enrich::never ? 1 / growth : 1;
+    double factor = enrich == CutSight::Enrich::never ? 1 / radius_growth : 1;
     const int steps = enrich == CutSight::Enrich::never ? growth_steps_at_point + 1 : growth_steps_at_point;
     for (int step = 0; step < steps; ++step) {
-      collect_grown(spheres, x, factor *= growth, memory.support);
+      collect_grown(spheres, x, factor *= radius_growth, memory.support);
       if (spheres.cut()->evaluate(kernel, x, memory.support, true, second, 0, spheres.worst_condition(), enrich, out))
         return true;
     }
@@ -262,7 +262,7 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
   while (!unsound.empty()) {
     // The nodes in question alone, until they are sound. For a few of them every sphere is looked at.
     while (!unsound.empty()) {
-      const double furthest = std::pow(growth, ++round);
+      const double furthest = std::pow(radius_growth, ++round);
       std::vector<double> widest(n);
       for (int j = 0; j < n; ++j)
         widest[j] = furthest * base[j];
@@ -275,15 +275,15 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
           throw NumericalError(fmt::format(
               "shape functions: the support of node {} at ({:.6g}, {:.6g}, {:.6g}) m is not sound after {} steps of "
               "growth by {} from a radius of {:.6g} m ({} such nodes); the nodes around it are too few or in a plane",
-              i, centres_[i].x(), centres_[i].y(), centres_[i].z(), growth_steps_at_node, growth, base[i],
+              i, centres_[i].x(), centres_[i].y(), centres_[i].z(), growth_steps_at_node, radius_growth, base[i],
               unsound.size()));
-        const double factor = std::pow(growth, wanted[i]);
+        const double factor = std::pow(radius_growth, wanted[i]);
         for (int j : near(i))
           if ((centres_[j] - centres_[i]).norm() < factor * base[j])
             level[j] = std::max(level[j], wanted[i]);
       }
       for (int j = 0; j < n; ++j)
-        radii_[j] = base[j] * std::pow(growth, level[j]);
+        radii_[j] = base[j] * std::pow(radius_growth, level[j]);
       std::vector<int> still;
       for (int i : unsound) {
         const std::span<const int> candidates = near(i);

@@ -14,9 +14,9 @@ namespace spherecut::solvers {
 namespace {
 
 /// For every supernode the columns of B that are not zero there after the forward solution.
-class Reach {
+class ColumnReach {
  public:
-  Reach(const SupernodalFactor& lower, const SparseMatrix& columns)
+  ColumnReach(const SupernodalFactor& lower, const SparseMatrix& columns)
       : words_((columns.cols() + word_bits - 1) / word_bits),
         bits_(static_cast<std::size_t>(lower.supernodes * words_), 0) {
     std::vector<int> supernode_of(static_cast<std::size_t>(lower.size));
@@ -57,7 +57,7 @@ MatrixX sparse_compliance(const SupernodalFactor& lower, const SparseMatrix& col
   for (Eigen::Index c = 0; c < columns.cols(); ++c)
     for (SparseMatrix::InnerIterator entry(columns, c); entry; ++entry)
       solution(c, entry.row()) = entry.value();
-  Reach reach(lower, columns);
+  ColumnReach reach(lower, columns);
   std::vector<int> active;
   MatrixX own, passed_on; // one row a column of B that is not zero there
   for (int s = 0; s < lower.supernodes; ++s) {

@@ -15,7 +15,7 @@ constexpr double side_over_radius = 0.45;
 constexpr int few_members = 16; // a cell with no more is not split
 constexpr int deepest = 12;
 constexpr int octants = 8;
-constexpr double slack = 1e-9; // of the cell's side: a point on a face may be sorted to either side of it
+constexpr double face_slack = 1e-9; // of the cell's side: a point on a face may be sorted to either side of it
 
 } // namespace
 
@@ -45,7 +45,7 @@ struct SphereGrid::Builder {
   /// inside[o * members.size()] on; returns how many.
   [[nodiscard]] std::array<std::size_t, octants> sort_into_octants(const Vector3& lower, double side,
                                                                    std::span<const int> members, int* inside) const {
-    const double half = 0.5 * side, tolerance = slack * half;
+    const double half = 0.5 * side, tolerance = face_slack * half;
     std::array<std::size_t, octants> counts{};
     for (const int j : members) {
       double squared[3][2]; // of the distance to either half, along each axis
@@ -141,14 +141,14 @@ SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<do
   std::vector<Run> runs;
   runs.reserve(static_cast<std::size_t>(n) * 40);
   const auto cells_between = [&](int axis, double low, double high) {
-    const double from = (low - origin_[axis]) * inverse_side_ - slack;
-    const double to = (high - origin_[axis]) * inverse_side_ + slack;
+    const double from = (low - origin_[axis]) * inverse_side_ - face_slack;
+    const double to = (high - origin_[axis]) * inverse_side_ + face_slack;
     return std::array<int, 2>{std::clamp(static_cast<int>(std::floor(from)), 0, roots_[axis] - 1),
                               std::clamp(static_cast<int>(std::floor(to)), 0, roots_[axis] - 1)};
   };
   // Squared distance from a coordinate to the layer of cells `i` along an axis.
   const auto layer_distance = [&](int axis, int i, double coordinate) {
-    const double low = origin_[axis] + i * side, tolerance = slack * side;
+    const double low = origin_[axis] + i * side, tolerance = face_slack * side;
     const double outside = std::max({low - tolerance - coordinate, coordinate - (low + side + tolerance), 0.0});
     return outside * outside;
   };

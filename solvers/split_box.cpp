@@ -10,7 +10,7 @@ namespace {
 constexpr double sliver = 1e-9; // of the box's volume
 
 /// A box face cut by a plane has at most five corners.
-struct Polygon {
+struct BoxSection {
   std::array<Vector3, 5> corners;
   int count = 0;
   void add(const Vector3& x) { corners[count++] = x; }
@@ -40,7 +40,7 @@ std::array<BoxPart, 2> split_box(const Vector3& centre, const Vector3& half, con
         corners[k][u] = (k == 1 || k == 2 ? side : -side) * half[u]; // counter-clockwise from outside
         corners[k][v] = (k >= 2 ? 1 : -1) * half[v];
       }
-      Polygon kept;
+      BoxSection kept;
       for (int k = 0; k < 4; ++k) {
         const Vector3 &a = corners[k], &b = corners[(k + 1) % 4];
         const double at_a = normal.dot(a) - offset, at_b = normal.dot(b) - offset;

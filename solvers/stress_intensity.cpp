@@ -16,8 +16,6 @@ using topology::FrontFrame;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 double plane_strain_modulus(const Material& material) {
   return material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
 }
@@ -45,7 +43,8 @@ TipField tip_field(const Material& material, const Intensities& k, double ahead,
   if (!(r > 0))
     return field;
   const double mu = material.shear_modulus(), kappa = 3 - 4 * material.poisson_ratio;
-  const double c = std::cos(theta / 2), s = std::sin(theta / 2), size = std::sqrt(r / (2 * pi)) / (2 * mu);
+  const double c = std::cos(theta / 2), s = std::sin(theta / 2),
+               size = std::sqrt(r / (2 * std::numbers::pi)) / (2 * mu);
   // Angular functions of the three modes, and their derivatives.
   const Vector3 f = k[0] * Vector3(c * (kappa - 1 + 2 * s * s), s * (kappa + 1 - 2 * c * c), 0) +
                     k[1] * Vector3(s * (kappa + 1 + 2 * c * c), -c * (kappa - 1 - 2 * s * s), 0) +
@@ -108,8 +107,9 @@ Intensities displacement_correlation(const Discretisation& body, const Field& fi
   }
   const Vector3 leading = normal_matrix.inverse().row(0) * right;
   const Material& material = body.problem().material;
-  const double plane = plane_strain_modulus(material) * std::sqrt(2 * pi) / 8;
-  return {plane * leading[0], plane * leading[1], material.shear_modulus() * std::sqrt(2 * pi) / 4 * leading[2]};
+  const double plane = plane_strain_modulus(material) * std::sqrt(2 * std::numbers::pi) / 8;
+  return {plane * leading[0], plane * leading[1],
+          material.shear_modulus() * std::sqrt(2 * std::numbers::pi) / 4 * leading[2]};
 }
 
 namespace {
@@ -237,7 +237,8 @@ Intensities each_sample(const Discretisation& body, const FrontFrame& front, con
                                  -problem.domain->signed_distance(front.point), 0.2 * inset));
   for (const double s : {-half_length, half_length})
     for (int c = 0; c < 8 && inset == 0; ++c)
-      if (tube.at(outer * std::cos(c * pi / 4), outer * std::sin(c * pi / 4), s).leaves(*problem.domain))
+      if (tube.at(outer * std::cos(c * std::numbers::pi / 4), outer * std::sin(c * std::numbers::pi / 4), s)
+              .leaves(*problem.domain))
         throw InputError(
             fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
                         "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
@@ -278,7 +279,7 @@ Intensities each_sample(const Discretisation& body, const FrontFrame& front, con
     const auto [q_s, dq_s] = bump(s);
     for (int c = 0; c < 2 * cells_around; ++c) {
       const int cell = c / 2;
-      const double theta = pi * ((2 * cell + 1 + gauss.place[c % 2]) / cells_around - 1);
+      const double theta = std::numbers::pi * ((2 * cell + 1 + gauss.place[c % 2]) / cells_around - 1);
       const double ahead = r * std::cos(theta);
       double above = r * std::sin(theta);
       const Tube::Place place = tube.at(ahead, above, s);
@@ -289,7 +290,7 @@ Intensities each_sample(const Discretisation& body, const FrontFrame& front, con
       if (covered.share == 0)
         continue;
       const double q_r = fade_r * covered.share;
-      const double weight = r * (pi / cells_around) * ds * dr * place.stretch;
+      const double weight = r * (std::numbers::pi / cells_around) * ds * dr * place.stretch;
       Sample sample;
       sample.position = place.position;
       // Gradient of xi = q e in the axes of the place; e turns along the front.

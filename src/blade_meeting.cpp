@@ -11,13 +11,13 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double depth_factor = 2;     // of its depth in the body: how far a piece of the edge may push
-constexpr double ahead = 0.1;          // of the half width: less material than that before a piece of the edge is none
-constexpr int entry_steps = 12;        // halvings towards the place where the edge entered
-constexpr double lip_tolerance = 1e-6; // m
-constexpr double same_contact = 1e-4;  // of the node spacing, and of one: what has not moved
-constexpr double in_sheet = 0.1;       // node spacings from a sheet: a place there is in it
-constexpr double least_motion = 1e-3;  // of the node spacing, that tells a direction
+constexpr double depth_factor = 2; // of its depth in the body: how far a piece of the edge may push
+constexpr double ahead = 0.1;      // of the half width: less material than that before a piece of the edge is none
+constexpr int entry_steps = 12;    // halvings towards the place where the edge entered
+constexpr double opening_tolerance = 1e-6; // m
+constexpr double same_contact = 1e-4;      // of the node spacing, and of one: what has not moved
+constexpr double in_sheet = 0.1;           // node spacings from a sheet: a place there is in it
+constexpr double least_motion = 1e-3;      // of the node spacing, that tells a direction
 
 /// Of the pairs of lips along their normals, m.
 VectorX openings(const BodyModel& body, const solvers::Field& field) {
@@ -187,7 +187,7 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front, c
     const VectorX open = openings(body, solvers::deform(meeting.patch, state, base));
     const std::size_t before = pairs.size();
     for (std::size_t p = 0; p < body.pairs.size(); ++p)
-      if (open[static_cast<Eigen::Index>(p)] < -lip_tolerance && used[p] == 0) {
+      if (open[static_cast<Eigen::Index>(p)] < -opening_tolerance && used[p] == 0) {
         used[p] = 1;
         pairs.push_back(body.pairs[p]);
       }

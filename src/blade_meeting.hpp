@@ -12,11 +12,6 @@ inline constexpr double least_increment = 0.2;          // of the node spacing: 
                                                         // edge gives way by less than half of that
 inline constexpr double same_pose = 1e-6;               // of the way from one pose to the next: no other pose
 
-/// A point of the blade's frame.
-inline Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
-  return pose.orientation * point + pose.position;
-}
-
 /// Of a place in the body as it is: negative inside; outside where there is no telling.
 double signed_distance(const topology::Domain& domain, const topology::RestMap& to_rest, const Vector3& x);
 

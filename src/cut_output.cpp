@@ -9,7 +9,7 @@
 namespace spherecut::app {
 namespace {
 
-std::string quoted(std::string text) {
+std::string csv_quoted(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   std::string out = "\"";
   for (const char c : text)
@@ -49,10 +49,10 @@ std::string cut_row(double time, const CutReport& r) {
       time, r.triangles, r.refused ? 1 : 0, r.sheets, r.area, r.front_length, r.pieces, r.unheld, volumes, r.opening,
       r.opening_volume, r.lip_pairs, r.closed_pairs, r.lips_converged ? 1 : 0, r.nodes, r.kept_nodes,
       hash_text(r.surface_hash), r.seconds.topology, r.seconds.level_sets, r.seconds.visibility, r.seconds.sprinkling,
-      r.seconds.assembly, r.seconds.solve, to_string(r.update), quoted(r.update_reason), r.blade.force.x(),
+      r.seconds.assembly, r.seconds.solve, to_string(r.update), csv_quoted(r.update_reason), r.blade.force.x(),
       r.blade.force.y(), r.blade.force.z(), r.blade.edge_force, r.blade.advance, r.blade.release, r.blade.ledger.work,
       r.blade.ledger.surface, r.blade.ledger.crushing, r.blade.ledger.friction, r.blade.ledger.excess,
-      r.blade.ledger.stored, quoted(r.reason));
+      r.blade.ledger.stored, csv_quoted(r.reason));
 }
 
 void write_wound(const std::filesystem::path& file, const Session& session) {

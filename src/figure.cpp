@@ -27,7 +27,7 @@ constexpr std::array shapes{7, 5, 9, 11, 13, 6, 4};
 
 /// A gnuplot string in double quotes with every ASCII character as an octal code (digits too: gnuplot would read them
 /// as part of the code before). So nothing in a label can end the string or run a command.
-std::string quoted(const std::string& text) {
+std::string gnuplot_quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
@@ -40,7 +40,7 @@ std::string quoted(const std::string& text) {
 }
 
 /// Points of a series, one a line; a blank line where points were left out, so that no line is drawn across the gap.
-std::string points(const Figure& figure, const Series& series) {
+std::string point_lines(const Figure& figure, const Series& series) {
   std::string result;
   bool gap = false;
   for (std::size_t i = 0; i < series.x.size(); ++i) {
@@ -77,12 +77,12 @@ std::string script(const Figure& figure, const std::filesystem::path& file) {
     if (series.x.size() != series.y.size())
       throw InputError(fmt::format("figure {}: series '{}' has {} x values and {} y values (must be equal)",
                                    file.string(), series.label, series.x.size(), series.y.size()));
-    const std::string lines = points(figure, series);
+    const std::string lines = point_lines(figure, series);
     if (lines.empty())
       continue;
     data += fmt::format("$data{} << END_OF_DATA\n{}END_OF_DATA\n", drawn, lines);
     plot += fmt::format("{}$data{} using 1:2 {} title {}", drawn > 0 ? ", " : "plot ", drawn, style(series, drawn),
-                        quoted(series.label));
+                        gnuplot_quoted(series.label));
     ++drawn;
   }
   if (drawn == 0)
@@ -95,8 +95,8 @@ std::string script(const Figure& figure, const std::filesystem::path& file) {
                                  "  set terminal png size {0},{1} noenhanced\n"
                                  "}}\n",
                                  figure.width, figure.height);
-  text += fmt::format("set title {}\nset xlabel {}\nset ylabel {}\n", quoted(figure.title), quoted(figure.x_label),
-                      quoted(figure.y_label));
+  text += fmt::format("set title {}\nset xlabel {}\nset ylabel {}\n", gnuplot_quoted(figure.title),
+                      gnuplot_quoted(figure.x_label), gnuplot_quoted(figure.y_label));
   text += "set border 3 lw 1.2\nset tics nomirror out\n"
           "set grid back lt 1 lw 0.8 lc rgb '#d9d9d9'\n"
           "set key outside below center horizontal Left reverse samplen 2.5 height 0.8\n";

@@ -29,9 +29,9 @@ topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
   return topology::read_sheet(file.file, file.scale);
 }
 
-constexpr double same_place = 1e-6;  // edges: nearer to the pose before it a pose is the same
-constexpr double straight = 2e-3;    // edges: a way is, where no pose put off is farther from it
-constexpr double least_share = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
+constexpr double same_edge_place = 1e-6; // edges: nearer to the pose before it a pose is the same
+constexpr double straight = 2e-3;        // edges: a way is, where no pose put off is farther from it
+constexpr double least_overlap = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
 
 /// Part of a sheet's area that lies on the cut so far, 0 to 1, looked at every `edge` m.
 double share_on(const topology::Incision& cut, const topology::SurfaceMesh& sheet, double edge) {
@@ -71,7 +71,7 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
       if (!topology::reaches_inside(sheet, *domain_))
         throw InputError(
             fmt::format("lies outside the organ: no point of its {} triangles is inside", sheet.triangles.size()));
-      if (const double share = incision_ ? share_on(*incision_, sheet, edge) : 0; share > least_share)
+      if (const double share = incision_ ? share_on(*incision_, sheet, edge) : 0; share > least_overlap)
         throw InputError(
             fmt::format("{:.3g} % of its area lie on the precuts before it; allowed: none, sheets may only "
                         "cross",
@@ -169,7 +169,7 @@ topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, 
 
 void IncisionBuilder::put_off(const topology::BladePose& pose) {
   const std::optional<topology::BladePose> last = missed_.empty() ? at_ : missed_.back();
-  if (last && edge_travel(blade_->edge, *last, pose) <= same_place * options_.edge) // however long it rests
+  if (last && edge_travel(blade_->edge, *last, pose) <= same_edge_place * options_.edge) // however long it rests
     return;
   missed_.push_back(pose);
   before_.missed.push_back(pose); // taking the last motion back leaves it

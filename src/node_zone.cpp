@@ -1,6 +1,7 @@
 #include "src/node_zone.hpp"
 
 #include "solvers/contact_rings.hpp"
+#include "src/schedule.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -28,13 +29,6 @@ double size_of(const PrecutSettings& precut, double extent) {
     return std::sqrt(area.norm());
   }
   return extent / 2; // a file: a sheet about as large as the organ
-}
-
-double edge_length(const BladeSettings& blade) {
-  double length = 0;
-  for (std::size_t i = 1; i < blade.edge.size(); ++i)
-    length += (blade.edge[i] - blade.edge[i - 1]).norm();
-  return length;
 }
 
 // m; infinite without cuts.

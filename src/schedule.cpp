@@ -22,10 +22,6 @@ Eigen::Quaterniond orientation(const Vector3& degrees) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle * std::numbers::pi / 180, degrees / angle));
 }
 
-Vector3 placed(const topology::BladePose& pose, const Vector3& point) {
-  return pose.orientation * point + pose.position;
-}
-
 double largest_way(const BladeSettings& blade, const BladePoint& from, const BladePoint& to) {
   const topology::BladePose a{from.time, from.position, orientation(from.rotation)};
   const topology::BladePose b{to.time, to.position, orientation(to.rotation)};
@@ -34,13 +30,6 @@ double largest_way(const BladeSettings& blade, const BladePoint& from, const Bla
   for (const Vector3& point : blade.edge)
     largest = std::max(largest, (to.position - from.position).norm() + turn * point.norm());
   return largest;
-}
-
-double edge_length(const BladeSettings& blade) {
-  double length = 0;
-  for (std::size_t i = 1; i < blade.edge.size(); ++i)
-    length += (blade.edge[i] - blade.edge[i - 1]).norm();
-  return length;
 }
 
 std::vector<double> blade_times(const Scenario& scenario, double stride, double column, int most_triangles) {
@@ -152,6 +141,13 @@ std::vector<topology::BladePose> without_straight(const std::vector<Vector3>& ed
     first = next + 1;
   }
   return kept;
+}
+
+double edge_length(const BladeSettings& blade) {
+  double length = 0;
+  for (std::size_t i = 1; i < blade.edge.size(); ++i)
+    length += (blade.edge[i] - blade.edge[i - 1]).norm();
+  return length;
 }
 
 double blade_travel(const BladeSettings& blade) {

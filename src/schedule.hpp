@@ -27,6 +27,9 @@ topology::BladePose pose_between(const topology::BladePose& from, const topology
 std::vector<topology::BladePose> without_straight(const std::vector<Vector3>& edge, const topology::BladePose& from,
                                                   const std::vector<topology::BladePose>& way, double tolerance);
 
+/// Of the cutting edge, m.
+double edge_length(const BladeSettings& blade);
+
 /// Largest way of a point of the edge from one pose of the path to the next, summed, m.
 double blade_travel(const BladeSettings& blade);
 

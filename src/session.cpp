@@ -26,7 +26,7 @@ constexpr double stiffest_galerkin = 0.49;  // Poisson's ratio
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
-constexpr double crowded_by_sheet = 0.3;    // of the fine spacing: nearer to a sheet no node of a contact is put
+constexpr double contact_crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a contact is put
 
 Organ timed_organ(const OrganSettings& settings, double& seconds) {
   const StageTimer timer(seconds);
@@ -303,7 +303,7 @@ solvers::SprinkleOptions Session::sprinkle_options(const BodyModel& model) const
     options.seeds = contact_seeds(scenario_, *organ_.domain, *zone_contact_, zone_.spacing.fine);
   if (model.incision != nullptr) // nodes on it belong to one of its faces
     std::erase_if(options.seeds, [&](const solvers::SeedNode& seed) {
-      return model.incision->closest(seed.position, crowded_by_sheet * zone_.spacing.fine).has_value();
+      return model.incision->closest(seed.position, contact_crowded_by_sheet * zone_.spacing.fine).has_value();
     });
   options.random_seed = scenario_.nodes.random_seed;
   options.incision = model.incision;

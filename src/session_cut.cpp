@@ -13,7 +13,7 @@ namespace {
 constexpr double rest_tolerance = 1e-4;   // of the fine spacing: of a place carried back to rest
 constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a little, as ahead of a front
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
-constexpr double same_place = 1e-6;       // of the fine spacing: nearer to its path a blade is on it
+constexpr double on_path = 1e-6;          // of the fine spacing: nearer to its path a blade is on it
 
 // The place of a sheet whose faces have parted so that x lies between them: on the straight line from face to face. Out
 // of the body the sheet goes on in its plane. Nothing where x lies in material on one side, or ahead of the front.
@@ -92,7 +92,7 @@ Session::blade_ahead(const StepSample& sample, const std::optional<topology::Bla
   const topology::BladePose& here = *sample.blade;
   std::vector<topology::BladePose> poses;
   const auto scripted = blade_pose(*scenario_.blade, sample.time);
-  if (scripted && edge_travel(edge, *scripted, here) < same_place * fine) {
+  if (scripted && edge_travel(edge, *scripted, here) < on_path * fine) {
     double way = 0;
     for (const StepSample& step : steps_)
       if (step.blade && step.time > sample.time && way < length) {

@@ -12,16 +12,16 @@ namespace spherecut::app {
 namespace {
 
 // In units of the fine spacing:
-constexpr double averaged_over = 1.5; // length along the front over which intensities are averaged
-constexpr double smoothing = 1;       // and motions
-constexpr double slope = 2;           // by which motions differ for each unit of G / G_c, at most
-constexpr double probe = 0.5;         // so far ahead the toughness is looked at
-constexpr double met_reach = 0.3;     // nearer to another sheet a front has met it
-constexpr double overlap = 0.05;      // by which a front runs into the sheet that it meets
-constexpr double smallest_seed = 2;   // least radius of a tear that starts without a cut
-constexpr double ligament = 2;        // between two fronts: a narrower one is not resolved and gives way
-constexpr double joined_reach = 1.5;  // of the ligament: fronts so near to it are those of its sides
-constexpr double approach = 0.4;      // of the gap between two fronts: farther none of them goes in one increment
+constexpr double averaged_over = 1.5;  // length along the front over which intensities are averaged
+constexpr double motion_smoothing = 1; // and motions
+constexpr double motion_slope = 2;     // by which motions differ for each unit of G / G_c, at most
+constexpr double probe = 0.5;          // so far ahead the toughness is looked at
+constexpr double met_reach = 0.3;      // nearer to another sheet a front has met it
+constexpr double overlap = 0.05;       // by which a front runs into the sheet that it meets
+constexpr double smallest_seed = 2;    // least radius of a tear that starts without a cut
+constexpr double ligament = 2;         // between two fronts: a narrower one is not resolved and gives way
+constexpr double joined_reach = 1.5;   // of the ligament: fronts so near to it are those of its sides
+constexpr double gap_share = 0.4;      // of the gap between two fronts: farther none of them goes in one increment
 
 /// Whether another sheet passes through the front there, beside the own one on both of its faces.
 bool has_met(const topology::Incision& incision, const topology::FrontFrame& frame, double fine) {
@@ -76,15 +76,15 @@ topology::FrontGrowth Session::grow_tear(const std::vector<solvers::FrontState>&
   const auto motion = states.empty()
                           ? std::function<Vector3(const topology::FrontFrame&)>(
                                 [&](const topology::FrontFrame& frame) -> Vector3 { return longest * frame.ahead; })
-                          : solvers::tear_motion(states, longest, smoothing * fine, slope * fine);
-  const auto facing = topology::facing_fronts(incision, longest / approach);
+                          : solvers::tear_motion(states, longest, motion_smoothing * fine, motion_slope * fine);
+  const auto facing = topology::facing_fronts(incision, longest / gap_share);
   return topology::grow_front(
       incision,
       [&](const topology::FrontFrame& frame) {
         Vector3 step = motion(frame);
         for (const topology::FacingFronts& pair : facing)
-          if ((pair.middle - frame.point).norm() < sheet_edge(zone_) && step.norm() > approach * pair.across.norm())
-            step *= approach * pair.across.norm() / step.norm();
+          if ((pair.middle - frame.point).norm() < sheet_edge(zone_) && step.norm() > gap_share * pair.across.norm())
+            step *= gap_share * pair.across.norm() / step.norm();
         return up_to_next_sheet(incision, frame, step, fine);
       },
       sheet_edge(zone_));

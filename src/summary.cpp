@@ -9,23 +9,23 @@
 namespace spherecut::app {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-Json json(const Vector3& v) {
+OrderedJson json(const Vector3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
-Json inputs(const Session& session) {
+OrderedJson inputs(const Session& session) {
   const Scenario& scenario = session.scenario();
   const topology::Domain& domain = *session.organ().domain;
-  Json out;
+  OrderedJson out;
   out["scenario"] = scenario.file.string();
   out["scenario_text"] = scenario.text;
   out["method"] = solvers::to_string(scenario.method.method);
   out["young_modulus_Pa"] = scenario.material.young_modulus;
   out["poisson_ratio"] = scenario.material.poisson_ratio;
   out["density_kg_m3"] = scenario.material.density;
-  out["gravity_m_s2"] = scenario.gravity ? json(*scenario.gravity) : Json(nullptr);
+  out["gravity_m_s2"] = scenario.gravity ? json(*scenario.gravity) : OrderedJson(nullptr);
   out["organ"] = {{"triangles", domain.surface().triangles.size()},
                   {"volume_m3", topology::volume(domain.surface())},
                   {"area_m2", topology::area(domain.surface())},
@@ -34,19 +34,19 @@ Json inputs(const Session& session) {
   return out;
 }
 
-Json nodes(const Session& session) {
+OrderedJson nodes(const Session& session) {
   const solvers::SprinkleReport& report = session.sprinkling().report;
   const FineZone& zone = session.zone();
-  Json out = {{"total", session.sprinkling().nodes.size()},
-              {"surface", report.surface_nodes},
-              {"edge", report.edge_nodes},
-              {"interior", report.interior_nodes},
-              {"lip", report.lip_nodes},
-              {"fine_spacing_m", zone.spacing.fine},
-              {"coarse_spacing_m", zone.spacing.coarse},
-              {"fine_radius_m", zone.spacing.radius},
-              {"random_seed", session.scenario().nodes.random_seed}};
-  out["zones"] = Json::array();
+  OrderedJson out = {{"total", session.sprinkling().nodes.size()},
+                     {"surface", report.surface_nodes},
+                     {"edge", report.edge_nodes},
+                     {"interior", report.interior_nodes},
+                     {"lip", report.lip_nodes},
+                     {"fine_spacing_m", zone.spacing.fine},
+                     {"coarse_spacing_m", zone.spacing.coarse},
+                     {"fine_radius_m", zone.spacing.radius},
+                     {"random_seed", session.scenario().nodes.random_seed}};
+  out["zones"] = OrderedJson::array();
   for (const solvers::SprinkleZone& z : report.zones)
     out["zones"].push_back({{"spacing_from_m", z.spacing_from},
                             {"spacing_to_m", z.spacing_to},
@@ -57,7 +57,7 @@ Json nodes(const Session& session) {
   return out;
 }
 
-Json peak(const StepResult& step) {
+OrderedJson peak(const StepResult& step) {
   return {{"newtons", step.force.norm()},
           {"vector_N", json(step.force)},
           {"normal_N", json(step.force - step.tangential)},
@@ -69,9 +69,9 @@ Json peak(const StepResult& step) {
           {"active_nodes", step.active_nodes}};
 }
 
-Json solver(const Session& session, const RunFindings& findings) {
-  Json out = {{"largest_residual", findings.largest_residual},
-              {"largest_rotation_degrees", findings.largest_rotation_degrees}};
+OrderedJson solver(const Session& session, const RunFindings& findings) {
+  OrderedJson out = {{"largest_residual", findings.largest_residual},
+                     {"largest_rotation_degrees", findings.largest_rotation_degrees}};
   if (session.body() != nullptr) {
     const solvers::AssemblyReport& report = session.body()->report();
     out["unknowns"] = report.unknowns;
@@ -82,52 +82,53 @@ Json solver(const Session& session, const RunFindings& findings) {
     out["worst_moment_condition"] = report.worst_moment_condition;
     out["grown_supports"] = report.grown_supports;
   }
-  out["resprinkles"] = Json::array();
+  out["resprinkles"] = OrderedJson::array();
   for (const auto& [time, jump] : findings.resprinkles)
     out["resprinkles"].push_back({{"time_s", time}, {"force_jump", jump}});
   return out;
 }
 
-Json piece_checks(const RunFindings& findings) {
-  Json out = Json::array();
+OrderedJson piece_checks(const RunFindings& findings) {
+  OrderedJson out = OrderedJson::array();
   for (const RunFindings::PieceCheck& check : findings.piece_checks)
-    out.push_back({{"time_s", check.time},
-                   {"pieces", check.pieces},
-                   {"components_agree", check.components_agree},
-                   {"voxel_size_m", check.voxel_size},
-                   {"voxel_volumes_m3", check.voxel_volumes},
-                   {"hausdorff_m", std::isfinite(check.hausdorff) ? Json(check.hausdorff) : Json(nullptr)}});
+    out.push_back(
+        {{"time_s", check.time},
+         {"pieces", check.pieces},
+         {"components_agree", check.components_agree},
+         {"voxel_size_m", check.voxel_size},
+         {"voxel_volumes_m3", check.voxel_volumes},
+         {"hausdorff_m", std::isfinite(check.hausdorff) ? OrderedJson(check.hausdorff) : OrderedJson(nullptr)}});
   return out;
 }
 
-Json cut(const Session& session, const RunFindings& findings) {
+OrderedJson cut(const Session& session, const RunFindings& findings) {
   const CutReport& last = findings.cut;
-  Json out{{"increments", findings.increments},
-           {"refused", findings.refused_cuts},
-           {"area_m2", last.area},
-           {"front_m", last.front_length},
-           {"sheets", last.sheets},
-           {"pieces", last.pieces},
-           {"unheld_pieces", last.unheld},
-           {"volumes_m3", last.volumes},
-           {"piece_checks", piece_checks(findings)},
-           {"opening_m", last.opening},
-           {"largest_opening_m", findings.largest_opening},
-           {"opening_volume_m3", last.opening_volume},
-           {"lip_pairs", last.lip_pairs},
-           {"closed_pairs", last.closed_pairs},
-           {"lips", solvers::to_string(session.scenario().cut.lips)},
-           {"surface_hash", hash_text(last.surface_hash)}};
+  OrderedJson out{{"increments", findings.increments},
+                  {"refused", findings.refused_cuts},
+                  {"area_m2", last.area},
+                  {"front_m", last.front_length},
+                  {"sheets", last.sheets},
+                  {"pieces", last.pieces},
+                  {"unheld_pieces", last.unheld},
+                  {"volumes_m3", last.volumes},
+                  {"piece_checks", piece_checks(findings)},
+                  {"opening_m", last.opening},
+                  {"largest_opening_m", findings.largest_opening},
+                  {"opening_volume_m3", last.opening_volume},
+                  {"lip_pairs", last.lip_pairs},
+                  {"closed_pairs", last.closed_pairs},
+                  {"lips", solvers::to_string(session.scenario().cut.lips)},
+                  {"surface_hash", hash_text(last.surface_hash)}};
   if (session.blade() != nullptr)
     for (const AccountEntry& entry : account_of(last.blade.ledger))
       out["blade"][entry.key] = entry.joules;
   return out;
 }
 
-Json tear(const RunFindings& findings) {
+OrderedJson tear(const RunFindings& findings) {
   const EnergyLedger& ledger = findings.tear.ledger;
   const std::optional<double> open = ledger.open_share();
-  Json systems = Json::object();
+  OrderedJson systems = OrderedJson::object();
   for (const SystemUpdate update : {SystemUpdate::updated, SystemUpdate::condensed_anew, SystemUpdate::rebuilt}) {
     const auto known = findings.tear_updates.find(update);
     systems[std::string(to_string(update))] = known == findings.tear_updates.end() ? 0 : known->second;
@@ -144,11 +145,11 @@ Json tear(const RunFindings& findings) {
           {"surface_J", ledger.surface},
           {"dissipation_J", ledger.dissipation},
           {"imbalance_J", ledger.imbalance()},
-          {"energy_balance", open ? Json(*open) : Json(nullptr)},
+          {"energy_balance", open ? OrderedJson(*open) : OrderedJson(nullptr)},
           {"last_reason", findings.tear.reason}};
 }
 
-Json timings(const SessionProfile& profile) {
+OrderedJson timings(const SessionProfile& profile) {
   return {{"organ", profile.organ},       {"topology", profile.topology},     {"level_sets", profile.level_sets},
           {"sprinkle", profile.sprinkle}, {"discretise", profile.discretise}, {"condense", profile.condense},
           {"press", profile.press},       {"evaluate", profile.evaluate},     {"intensities", profile.intensities}};
@@ -159,7 +160,7 @@ Json timings(const SessionProfile& profile) {
 std::string summary_json(const Session& session, const RunOutput& output, RunStatus status,
                          const std::string& message) {
   const RunFindings& findings = output.findings();
-  Json summary;
+  OrderedJson summary;
   summary["spherecut"] = version();
   summary["title"] = session.scenario().title;
   summary["status"] = status == RunStatus::complete      ? "complete"
@@ -170,9 +171,9 @@ std::string summary_json(const Session& session, const RunOutput& output, RunSta
     summary["message"] = message;
   summary["touched"] = findings.touched;
   summary["steps"] = {{"done", findings.steps}, {"planned", findings.planned}};
-  summary["peak_force"] = findings.touched ? peak(findings.peak) : Json(nullptr);
-  summary["cut"] = session.cuts() ? cut(session, findings) : Json(nullptr);
-  summary["tear"] = session.tears() ? tear(findings) : Json(nullptr);
+  summary["peak_force"] = findings.touched ? peak(findings.peak) : OrderedJson(nullptr);
+  summary["cut"] = session.cuts() ? cut(session, findings) : OrderedJson(nullptr);
+  summary["tear"] = session.tears() ? tear(findings) : OrderedJson(nullptr);
   summary["nodes"] = nodes(session);
   summary["solver"] = solver(session, findings);
   summary["timings_s"] = timings(session.profile());
@@ -181,7 +182,7 @@ std::string summary_json(const Session& session, const RunOutput& output, RunSta
   summary["warnings"] = warnings;
   summary["files"] = output.files();
   summary["inputs"] = inputs(session);
-  return summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return summary.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
 }
 
 } // namespace spherecut::app

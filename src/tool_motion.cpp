@@ -56,7 +56,7 @@ Vector3 position_at(const std::vector<PathPoint>& path, double time) {
   return path.back().position;
 }
 
-std::string text_of(const Vector3& v) {
+std::string metres_text(const Vector3& v) {
   return fmt::format("[{:.4g}, {:.4g}, {:.4g}] m", v.x(), v.y(), v.z());
 }
 
@@ -96,8 +96,8 @@ std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::Co
     throw InputError(fmt::format("{}: the tool starts inside the organ, {:.3g} mm deep at t = {:g} s; allowed: a start "
                                  "outside",
                                  std::holds_alternative<Approach>(tool.motion)
-                                     ? fmt::format("tool.approach: its start at {}", text_of(pose.point))
-                                     : fmt::format("tool.path[1].position = {}", text_of(pose.point)),
+                                     ? fmt::format("tool.approach: its start at {}", metres_text(pose.point))
+                                     : fmt::format("tool.path[1].position = {}", metres_text(pose.point)),
                                  1e3 * std::max(contact.depth, -domain.signed_distance(pose.point)),
                                  motion.front().time));
   return motion;

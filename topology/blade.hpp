@@ -22,6 +22,11 @@ struct BladePose {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
 };
 
+/// Where a point of the blade's frame is.
+inline Vector3 placed(const BladePose& pose, const Vector3& point) {
+  return pose.orientation * point + pose.position;
+}
+
 /// Throws InputError unless the blade has 2 finite points or more, none on its neighbour, and a positive radius.
 void check(const Blade& blade);
 

@@ -29,7 +29,7 @@ using FclModel = fcl::BVHModel<fcl::OBBRSSd>;
 struct WalkSurface {
   const SurfaceWalk& walk;
 
-  [[nodiscard]] NearestPoint nearest(const Vector3& x, double /*expected*/, int hint, double enough) const noexcept {
+  [[nodiscard]] WalkPoint nearest(const Vector3& x, double /*expected*/, int hint, double enough) const noexcept {
     return walk.nearest(x, hint, enough);
   }
   [[nodiscard]] NearestToSegment nearest_to_segment(const Vector3& start, const Vector3& end, double within,
@@ -48,7 +48,7 @@ class FclSurface {
   FclSurface(const SurfaceWalk& surface, std::shared_ptr<FclModel> model)
       : walk(surface), model_(std::move(model)), organ_(model_) {}
 
-  [[nodiscard]] NearestPoint nearest(const Vector3& x, double expected, int /*hint*/, double /*enough*/) const {
+  [[nodiscard]] WalkPoint nearest(const Vector3& x, double expected, int /*hint*/, double /*enough*/) const {
     std::vector<int> found = touching(std::make_shared<fcl::Sphered>(enlarged(expected)), at(x));
     if (found.empty()) {
       const double radius = 1e-3 * std::abs(expected) + 1e-9;
@@ -173,7 +173,7 @@ SurfaceContact ContactQuery::closest_point(const Vector3& x) const {
   const int triangle = static_cast<int>(primitive - impl_->triangles.cbegin());
   const Vector3 closest(point.x(), point.y(), point.z());
   const std::array<int, 1> one{impl_->walk.internal(triangle)};
-  const NearestPoint side = impl_->walk.nearest_among(x, one);
+  const WalkPoint side = impl_->walk.nearest_among(x, one);
   const double distance = (x - closest).norm();
   return {closest, side.normal, side.signed_distance < 0 ? distance : -distance, triangle, x};
 }

@@ -3,7 +3,7 @@
 //
 // A `Surface` has
 //   const SurfaceWalk& walk                            the flat arrays;
-//   NearestPoint nearest(x, expected, hint, enough)    as SurfaceWalk::nearest; `expected`: a guess of the distance;
+//   WalkPoint nearest(x, expected, hint, enough)    as SurfaceWalk::nearest; `expected`: a guess of the distance;
 //   NearestToSegment nearest_to_segment(start, end, within, hint);
 //   LastCrossing last_crossing(start, end).
 #pragma once
@@ -17,7 +17,7 @@
 namespace spherecut::topology {
 
 struct Deepest {
-  NearestPoint surface; // nearest to tool_point
+  WalkPoint surface; // nearest to tool_point
   Vector3 tool_point = Vector3::Zero();
   double depth = 0; // m
 };
@@ -32,7 +32,7 @@ struct Deepest {
 /// highest bound is cut where its two chords meet, until no bound beats the best.
 template <class Surface>
 Deepest deepest_inside(const Surface& surface, const Vector3& start, const Vector3& direction, double length,
-                       double radius, const NearestPoint& at_start, const NearestPoint& at_end, Deepest best) {
+                       double radius, const WalkPoint& at_start, const WalkPoint& at_end, Deepest best) {
   struct End {
     double along, depth; // m; depth without radius
     int triangle;
@@ -67,7 +67,7 @@ Deepest deepest_inside(const Surface& surface, const Vector3& start, const Vecto
     *highest = open[--count];
     const Vector3 x = start + i.cut * direction;
     const bool nearer_from = i.cut - i.from.along < i.to.along - i.cut;
-    const NearestPoint nearest = surface.nearest(x, i.bound, nearer_from ? i.from.triangle : i.to.triangle, 0.0);
+    const WalkPoint nearest = surface.nearest(x, i.bound, nearer_from ? i.from.triangle : i.to.triangle, 0.0);
     const double depth = -nearest.signed_distance;
     if (depth + radius > best.depth)
       best = {nearest, x, depth + radius};
@@ -80,7 +80,7 @@ Deepest deepest_inside(const Surface& surface, const Vector3& start, const Vecto
 template <class Surface>
 Deepest deepest_of_sphere(const Surface& surface, const SphereTip& tip, const ToolPose& pose, int hint) {
   const Vector3 centre = pose.point + tip.radius * pose.axis;
-  const NearestPoint nearest = surface.nearest(centre, tip.radius, hint, 0.0);
+  const WalkPoint nearest = surface.nearest(centre, tip.radius, hint, 0.0);
   return {nearest, centre, tip.radius - nearest.signed_distance};
 }
 
@@ -89,7 +89,7 @@ Deepest deepest_of_laparoscope(const Surface& surface, const Laparoscope& scope,
                                const SurfaceContact& last) {
   const int hint = surface.walk.internal(last.triangle);
   const Vector3 centre = pose.point + scope.tip_radius * pose.axis;
-  const NearestPoint at_tip = surface.nearest(centre, scope.tip_radius, hint, 0.0);
+  const WalkPoint at_tip = surface.nearest(centre, scope.tip_radius, hint, 0.0);
   Deepest best{at_tip, centre, scope.tip_radius - at_tip.signed_distance};
 
   const double length = scope.shaft_length;
@@ -101,7 +101,7 @@ Deepest deepest_of_laparoscope(const Surface& surface, const Laparoscope& scope,
     const double reach = end_inside ? length : crossing.along * length;
     const Vector3 x = centre + reach * pose.axis;
     const std::array<int, 1> crossed{std::max(crossing.triangle, 0)};
-    const NearestPoint at_reach =
+    const WalkPoint at_reach =
         end_inside ? surface.nearest(x, length, hint, 0.0) : surface.walk.nearest_among(x, crossed);
     if (scope.shaft_radius - at_reach.signed_distance > best.depth)
       best = {at_reach, x, scope.shaft_radius - at_reach.signed_distance};
@@ -114,7 +114,7 @@ Deepest deepest_of_laparoscope(const Surface& surface, const Laparoscope& scope,
     if (nearest.triangle >= 0) {
       const Vector3 x = centre + nearest.along * length * pose.axis;
       const std::array<int, 1> one{nearest.triangle};
-      const NearestPoint at = surface.walk.nearest_among(x, one);
+      const WalkPoint at = surface.walk.nearest_among(x, one);
       best = {at, x, scope.shaft_radius - std::abs(at.signed_distance)};
     }
   }
@@ -125,7 +125,7 @@ template <class Surface>
 Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const ToolPose& pose,
                          const SurfaceContact& last, std::array<int, 10>& end_triangles) {
   const auto hint = [&](int i) { return surface.walk.internal(end_triangles[i]); };
-  const NearestPoint at_centre = surface.nearest(pose.point, punch.radius, hint(9), 0.0);
+  const WalkPoint at_centre = surface.nearest(pose.point, punch.radius, hint(9), 0.0);
   Deepest best{at_centre, pose.point, -at_centre.signed_distance};
   end_triangles[9] = surface.walk.original(at_centre.triangle);
 
@@ -157,7 +157,7 @@ Deepest deepest_of_punch(const Surface& surface, const FlatPunch& punch, const T
     const Vector3 x = position(i);
     // Nearer to the surface than the depth to beat: not deeper, whichever side it is on.
     const double enough = std::max(0.0, best.depth + margin);
-    const NearestPoint nearest = surface.nearest(x, punch.radius, hint(i), enough);
+    const WalkPoint nearest = surface.nearest(x, punch.radius, hint(i), enough);
     end_triangles[i] = surface.walk.original(nearest.triangle);
     if (-nearest.signed_distance > best.depth + margin)
       best = {nearest, x, -nearest.signed_distance};

@@ -3,6 +3,7 @@
 #include "topology/errors.hpp"
 #include "topology/exact_points.hpp"
 #include "topology/overlap_tree.hpp"
+#include "topology/triangle_corners.hpp"
 #include "topology/triangle_meeting.hpp"
 
 #include <Eigen/Geometry>
@@ -38,28 +39,7 @@ Triangle sorted(Triangle t) {
   return t;
 }
 
-bool has(const Triangle& t, int point) {
-  return t[0] == point || t[1] == point || t[2] == point;
-}
-
-int third(const Triangle& t, int u, int v) {
-  for (const int point : t)
-    if (point != u && point != v)
-      return point;
-  return -1;
-}
-
-/// Whether the triangle runs from u to v.
-bool runs(const Triangle& t, int u, int v) {
-  return (t[0] == u && t[1] == v) || (t[1] == u && t[2] == v) || (t[2] == u && t[0] == v);
-}
-
 constexpr int ray_tries = 30;
-
-void keep_once(std::vector<int>& values) {
-  std::sort(values.begin(), values.end());
-  values.erase(std::unique(values.begin(), values.end()), values.end());
-}
 
 } // namespace
 
@@ -105,7 +85,7 @@ struct ExactArrangement::Data {
     const std::vector<int>& shorter = star[u].size() <= star[v].size() ? star[u] : star[v];
     const int other = &shorter == &star[u] ? v : u;
     for (const int f : shorter)
-      if (has(pieces[f].facet.points, other) && (pieces[f].facet.source < surface_count) == surface)
+      if (has_corner(pieces[f].facet.points, other) && (pieces[f].facet.source < surface_count) == surface)
         found.push_back(f);
   }
 
@@ -128,7 +108,7 @@ struct ExactArrangement::Data {
     const Triangle& t = sources[source];
     bool any = false;
     for (const std::vector<int>& ends : found) {
-      if (std::all_of(ends.begin(), ends.end(), [&](int p) { return has(t, p); }))
+      if (std::all_of(ends.begin(), ends.end(), [&](int p) { return has_corner(t, p); }))
         continue;
       any = true;
       if (ends.size() == 2)
@@ -201,10 +181,10 @@ struct ExactArrangement::Data {
   [[nodiscard]] Place place_at_edge(int f, int u, int v, const std::vector<int>& surface) const {
     int from = -1, to = -1; // the solid lies counter-clockwise from `from` to `to` about u -> v
     for (const int s : surface)
-      (runs(pieces[s].facet.points, u, v) ? to : from) = third(pieces[s].facet.points, u, v);
+      (runs(pieces[s].facet.points, u, v) ? to : from) = third_corner(pieces[s].facet.points, u, v);
     if (from < 0 || to < 0)
       throw NumericalError(fmt::format("the surface is not closed at the edge of points {} and {}", u, v));
-    return before(u, v, from, third(pieces[f].facet.points, u, v), to) ? Place::inside : Place::outside;
+    return before(u, v, from, third_corner(pieces[f].facet.points, u, v), to) ? Place::inside : Place::outside;
   }
 
   /// 1 when the segment passes the triangle along its normal, -1 against it, 0 when it misses it; nothing when it
@@ -462,7 +442,7 @@ void ExactArrangement::facets_at_edge(int from, int to, std::vector<int>& found)
 void ExactArrangement::sort_about_edge(int from, int to, std::vector<int>& facets) const {
   if (facets.size() < 3)
     return;
-  const auto opposite = [&](int f) { return third(facet(f).points, from, to); };
+  const auto opposite = [&](int f) { return third_corner(facet(f).points, from, to); };
   const int start = opposite(facets.front());
   std::sort(facets.begin() + 1, facets.end(),
             [&](int f, int g) { return f != g && data_->before(from, to, start, opposite(f), opposite(g)); });

@@ -8,7 +8,7 @@ namespace spherecut::topology {
 
 namespace {
 
-constexpr int leaf_size = 4;
+constexpr int largest_leaf = 4;
 
 bool meet(const BoundingBox& a, const BoundingBox& b) {
   return (a.lower.array() <= b.upper.array()).all() && (b.lower.array() <= a.upper.array()).all();
@@ -55,7 +55,7 @@ void OverlapTree::build(const std::vector<BoundingBox>& boxes, int begin, int en
   }
   const int node = static_cast<int>(nodes_.size());
   nodes_.push_back({box, begin, end, -1});
-  if (end - begin <= leaf_size)
+  if (end - begin <= largest_leaf)
     return;
   Eigen::Index axis = 0;
   centres.extent().maxCoeff(&axis);

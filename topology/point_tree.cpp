@@ -7,7 +7,7 @@
 namespace spherecut::topology {
 
 namespace {
-constexpr int leaf_size = 8;
+constexpr int points_in_leaf = 8;
 }
 
 PointTree::PointTree(const std::vector<Vector3>& points)
@@ -21,7 +21,7 @@ PointTree::PointTree(const std::vector<Vector3>& points)
 }
 
 void PointTree::build(int begin, int end, int axis) {
-  if (end - begin <= leaf_size)
+  if (end - begin <= points_in_leaf)
     return;
   const int middle = (begin + end) / 2;
   std::nth_element(index_.begin() + begin, index_.begin() + middle, index_.begin() + end, [&](int a, int b) {
@@ -37,7 +37,7 @@ void PointTree::within(const Vector3& x, double radius, std::vector<Found>& foun
 
 void PointTree::within(int begin, int end, int axis, const Vector3& x, double squared_radius,
                        std::vector<Found>& found) const {
-  if (end - begin <= leaf_size) {
+  if (end - begin <= points_in_leaf) {
     for (int k = begin; k < end; ++k) {
       const double squared = (points_[k] - x).squaredNorm();
       if (squared < squared_radius)
@@ -75,7 +75,7 @@ void PointTree::nearest(int begin, int end, int axis, const Vector3& x, Found& b
     if (squared < best.squared_distance || (squared == best.squared_distance && index_[k] < best.index))
       best = {squared, index_[k]};
   };
-  while (end - begin > leaf_size) {
+  while (end - begin > points_in_leaf) {
     const int middle = (begin + end) / 2;
     const double offset = x[axis] - points_[middle][axis];
     axis = (axis + 1) % 3;

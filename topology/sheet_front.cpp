@@ -115,14 +115,14 @@ double area_inside(const std::array<Vector3, 3>& p, const std::array<double, 3>&
 }
 
 /// A half-edge of the border.
-struct BorderEdge {
+struct LoopEdge {
   int from, to, triangle;
 };
 
 /// Loops of the border, each starting where it enters the body if it ever leaves it.
-std::vector<std::vector<BorderEdge>> border_loops(const SurfaceMesh& sheet, const Neighbours& neighbours,
-                                                  const Domain& domain, double tolerance) {
-  std::vector<BorderEdge> edges;
+std::vector<std::vector<LoopEdge>> border_loops(const SurfaceMesh& sheet, const Neighbours& neighbours,
+                                                const Domain& domain, double tolerance) {
+  std::vector<LoopEdge> edges;
   std::unordered_map<int, int> leaving; // border edge that starts at a vertex
   for (int t = 0; t < std::ssize(sheet.triangles); ++t)
     for (int e = 0; e < 3; ++e)
@@ -130,17 +130,17 @@ std::vector<std::vector<BorderEdge>> border_loops(const SurfaceMesh& sheet, cons
         leaving.emplace(sheet.triangles[t][e], static_cast<int>(edges.size()));
         edges.push_back({sheet.triangles[t][e], sheet.triangles[t][(e + 1) % 3], t});
       }
-  std::vector<std::vector<BorderEdge>> loops;
+  std::vector<std::vector<LoopEdge>> loops;
   std::vector<bool> taken(edges.size(), false);
   for (int start = 0; start < std::ssize(edges); ++start) {
     if (taken[start])
       continue;
-    std::vector<BorderEdge>& loop = loops.emplace_back();
+    std::vector<LoopEdge>& loop = loops.emplace_back();
     for (int e = start; !taken[e]; e = leaving.at(edges[e].to)) {
       taken[e] = true;
       loop.push_back(edges[e]);
     }
-    const auto outside = std::find_if(loop.begin(), loop.end(), [&](const BorderEdge& edge) {
+    const auto outside = std::find_if(loop.begin(), loop.end(), [&](const LoopEdge& edge) {
       return domain.signed_distance(sheet.vertices[edge.from]) >= -tolerance;
     });
     if (outside != loop.end())
@@ -296,7 +296,7 @@ std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const
   std::vector<FrontPiece> front;
   for (int s = 0; s < std::ssize(sheets); ++s) {
     const SurfaceMesh& sheet = sheets[s];
-    for (const std::vector<BorderEdge>& loop : border_loops(sheet, neighbours[s], domain, surface_tolerance)) {
+    for (const std::vector<LoopEdge>& loop : border_loops(sheet, neighbours[s], domain, surface_tolerance)) {
       const int count = static_cast<int>(loop.size());
       std::vector<FrontEnd> own(count), joint(count); // of edge i, and where edge i - 1 meets edge i
       for (int i = 0; i < count; ++i) {

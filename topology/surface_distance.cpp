@@ -23,7 +23,7 @@ struct Node {
   int next; // inner node: second child; leaf: first place in tree order
 };
 
-constexpr int leaf_size = 8;
+constexpr int triangles_in_leaf = 8;
 
 /// Lower bound of the squared distance from x to anything in the node.
 double squared_bound(const Node& node, const Vector3& x) {
@@ -173,7 +173,7 @@ struct SurfaceDistance::Impl {
                      last - first,
                      {above(upper.x()), above(upper.y()), above(upper.z())},
                      first});
-    if (last - first <= leaf_size)
+    if (last - first <= triangles_in_leaf)
       return;
     Vector3 lower_centre = centres[tree_order[first]], upper_centre = lower_centre;
     for (int i = first + 1; i < last; ++i) {

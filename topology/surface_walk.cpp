@@ -10,7 +10,7 @@
 namespace spherecut::topology {
 namespace {
 
-constexpr int leaf_size = 4;        // the lanes of a leaf
+constexpr int leaf_lanes = 4;       // the lanes of a leaf
 constexpr int longest_walk = 8;     // steps; over a longer way the tree is faster
 constexpr float flat = 0.1F;        // half the height of a disc that is, over its radius
 constexpr double same_place = 1e-9; // fraction of a segment
@@ -159,7 +159,7 @@ void SurfaceWalk::build_tree(const SurfaceMesh& mesh) {
   };
   /// Halves the triangles begin .. end - 1 at the median of their longest extent; the middle. Leaves stay whole.
   const auto split = [&](int begin, int end) {
-    if (end - begin <= leaf_size)
+    if (end - begin <= leaf_lanes)
       return end;
     Vector3 lower = centroids[original_[begin]], upper = lower;
     for (int i = begin; i < end; ++i) {
@@ -189,7 +189,7 @@ void SurfaceWalk::build_tree(const SurfaceMesh& mesh) {
     for (int child = 0; child < 4; ++child) {
       const int begin = cuts[child], end = cuts[child + 1], count = end - begin;
       int first = -1;
-      if (count > leaf_size) {
+      if (count > leaf_lanes) {
         first = static_cast<int>(nodes_.size());
         nodes_.emplace_back();
         open.push_back({begin, end, first});
@@ -201,7 +201,7 @@ void SurfaceWalk::build_tree(const SurfaceMesh& mesh) {
       if (count > 0)
         set_disc(nodes_[range.node], child, begin, end);
       nodes_[range.node].first[child] = first;
-      nodes_[range.node].count[child] = count <= leaf_size ? count : 0;
+      nodes_[range.node].count[child] = count <= leaf_lanes ? count : 0;
     }
   }
 
@@ -248,7 +248,7 @@ void SurfaceWalk::build_adjacency(const SurfaceMesh& mesh) {
 void SurfaceWalk::build_leaves() {
   for (std::size_t l = 0; l < leaves_.size(); ++l) {
     Leaf& leaf = leaves_[l];
-    for (int lane = 0; lane < leaf_size; ++lane) {
+    for (int lane = 0; lane < leaf_lanes; ++lane) {
       const int triangle = std::min<int>(leaf.first + lane, static_cast<int>(corners_.size()) - 1);
       const Corners& t = corners_[triangle];
       // Smallest circle around the triangle: on its longest edge, or through its corners.
@@ -348,13 +348,13 @@ inline Vector3 SurfaceWalk::pseudonormal(int triangle, TriangleFeature feature) 
   }
 }
 
-inline NearestPoint SurfaceWalk::finish(const Vector3& x, const Candidate& best) const noexcept {
+inline WalkPoint SurfaceWalk::finish(const Vector3& x, const Candidate& best) const noexcept {
   const Vector3 normal = pseudonormal(best.triangle, best.at.feature);
   const double distance = (x - best.at.point).norm();
   return {best.at.point, normal, normal.dot(x - best.at.point) < 0 ? -distance : distance, best.triangle};
 }
 
-NearestPoint SurfaceWalk::nearest(const Vector3& x, int hint, double enough) const noexcept {
+WalkPoint SurfaceWalk::nearest(const Vector3& x, int hint, double enough) const noexcept {
   Candidate best;
   const double enough2 = enough * enough;
   if (hint >= 0 && hint < std::ssize(corners_)) {
@@ -394,7 +394,7 @@ NearestPoint SurfaceWalk::nearest(const Vector3& x, int hint, double enough) con
   return finish(x, best);
 }
 
-NearestPoint SurfaceWalk::nearest_among(const Vector3& x, std::span<const int> triangles) const noexcept {
+WalkPoint SurfaceWalk::nearest_among(const Vector3& x, std::span<const int> triangles) const noexcept {
   Candidate best;
   best.triangle = triangles.front();
   for (const int triangle : triangles)
@@ -500,7 +500,7 @@ LastCrossing SurfaceWalk::last_crossing(const Vector3& start, const Vector3& end
   }
 }
 
-Vector3 SurfaceWalk::smooth_normal(const NearestPoint& at) const noexcept {
+Vector3 SurfaceWalk::smooth_normal(const WalkPoint& at) const noexcept {
   const Corners& t = corners_[at.triangle];
   const Vector3 ab = t.b - t.a, ac = t.c - t.a, ap = at.point - t.a, normal = ab.cross(ac);
   const double area2 = normal.squaredNorm();

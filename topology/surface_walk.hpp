@@ -15,7 +15,7 @@
 namespace spherecut::topology {
 
 /// The surface point nearest to some x.
-struct NearestPoint {
+struct WalkPoint {
   Vector3 point = Vector3::Zero();  // m
   Vector3 normal = Vector3::Zero(); // unit angle-weighted pseudonormal there [Baerentzen and Aanaes 2005]
   double signed_distance = 0;       // m, of x; negative inside
@@ -44,7 +44,7 @@ class SurfaceWalk {
 
   /// Nearest surface point to x, globally. The search walks from the triangle `hint` (-1: none is known nearby). It may
   /// stop early once the distance is known to be below `enough`, and then gives some surface point nearer than that.
-  [[nodiscard]] NearestPoint nearest(const Vector3& x, int hint, double enough = 0) const noexcept;
+  [[nodiscard]] WalkPoint nearest(const Vector3& x, int hint, double enough = 0) const noexcept;
 
   /// Nearest surface point to the segment among those nearer than `within`.
   [[nodiscard]] NearestToSegment nearest_to_segment(const Vector3& start, const Vector3& end, double within,
@@ -53,7 +53,7 @@ class SurfaceWalk {
   [[nodiscard]] LastCrossing last_crossing(const Vector3& start, const Vector3& end) const noexcept;
 
   /// The same three over the given triangles alone, for candidates found by other means. At least one triangle.
-  [[nodiscard]] NearestPoint nearest_among(const Vector3& x, std::span<const int> triangles) const noexcept;
+  [[nodiscard]] WalkPoint nearest_among(const Vector3& x, std::span<const int> triangles) const noexcept;
   [[nodiscard]] NearestToSegment nearest_to_segment_among(const Vector3& start, const Vector3& end, double within,
                                                           std::span<const int> triangles) const noexcept;
   [[nodiscard]] LastCrossing last_crossing_among(const Vector3& start, const Vector3& end,
@@ -63,7 +63,7 @@ class SurfaceWalk {
   [[nodiscard]] double distance_to_triangle(const Vector3& x, int triangle) const noexcept;
 
   /// Normal interpolated linearly between the corners' pseudonormals; continuous over the surface.
-  [[nodiscard]] Vector3 smooth_normal(const NearestPoint& at) const noexcept;
+  [[nodiscard]] Vector3 smooth_normal(const WalkPoint& at) const noexcept;
 
   [[nodiscard]] int original(int triangle) const noexcept { return original_[triangle]; }
   /// Internal index of a triangle of the mesh; of any other number, some triangle.
@@ -118,7 +118,7 @@ class SurfaceWalk {
   [[nodiscard]] static Lanes squared_distance_bounds(const Node& node, const Eigen::Vector3f& x, double best) noexcept;
   void try_triangle(const Vector3& x, int triangle, Candidate& best) const noexcept;
   void descend(const Vector3& x, Candidate& best) const noexcept;
-  [[nodiscard]] NearestPoint finish(const Vector3& x, const Candidate& best) const noexcept;
+  [[nodiscard]] WalkPoint finish(const Vector3& x, const Candidate& best) const noexcept;
   [[nodiscard]] Vector3 pseudonormal(int triangle, TriangleFeature feature) const noexcept;
   void keep_crossing(const Vector3& start, const Vector3& end, int triangle, LastCrossing& last) const noexcept;
 

@@ -1,5 +1,7 @@
 #include "topology/triangle_meeting.hpp"
 
+#include "topology/triangle_corners.hpp"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
@@ -9,22 +11,6 @@ namespace spherecut::topology {
 namespace {
 
 using Signs = std::array<int, 3>;
-
-bool has(const Triangle& t, int point) {
-  return t[0] == point || t[1] == point || t[2] == point;
-}
-
-int third(const Triangle& t, int u, int v) {
-  for (const int point : t)
-    if (point != u && point != v)
-      return point;
-  return -1;
-}
-
-void keep_once(std::vector<int>& values) {
-  std::sort(values.begin(), values.end());
-  values.erase(std::unique(values.begin(), values.end()), values.end());
-}
 
 bool all_on_one_side(const Signs& side) {
   return side[0] != 0 && side[0] == side[1] && side[1] == side[2];
@@ -45,7 +31,7 @@ bool within(const ExactPoints& points, int p, const Triangle& t, int axis) {
 Signs sides(const ExactPoints& points, const Triangle& a, const Triangle& b) {
   Signs side{};
   for (int c = 0; c < 3; ++c)
-    side[c] = has(b, a[c]) ? 0 : points.orientation(b[0], b[1], b[2], a[c]);
+    side[c] = has_corner(b, a[c]) ? 0 : points.orientation(b[0], b[1], b[2], a[c]);
   return side;
 }
 
@@ -93,12 +79,13 @@ bool surely_apart(const ExactPoints& points, const Triangle& a, const Triangle& 
   Triangle shared{-1, -1, -1};
   int count = 0;
   for (const int p : a)
-    if (has(b, p))
+    if (has_corner(b, p))
       shared[count++] = p;
   if (count == 3)
     return true;
   if (count == 2)
-    return points.same_side(shared[0], shared[1], third(a, shared[0], shared[1]), third(b, shared[0], shared[1])) < 0;
+    return points.same_side(shared[0], shared[1], third_corner(a, shared[0], shared[1]),
+                            third_corner(b, shared[0], shared[1])) < 0;
   const Vector3& origin = points.position(count == 1 ? shared[0] : a[0]);
   Vector3 direction = Vector3::Zero();
   double extent = 0;

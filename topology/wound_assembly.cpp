@@ -1,6 +1,7 @@
 #include "topology/wound_assembly.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/triangle_corners.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -16,15 +17,6 @@ namespace {
 
 int corner_at(const Triangle& t, int point) {
   return t[0] == point ? 0 : t[1] == point ? 1 : 2;
-}
-
-bool runs(const Triangle& t, int from, int to) {
-  return t[(corner_at(t, from) + 1) % 3] == to;
-}
-
-void keep_once(std::vector<int>& values) {
-  std::sort(values.begin(), values.end());
-  values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
 double angle_between(const Vector3& a, const Vector3& b) {

@@ -7,7 +7,7 @@
 
 namespace spherecut::experiments {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 Vector3 CutFrame::local(const Vector3& x) const {
   const Vector3 d = x - origin;

@@ -10,9 +10,9 @@ namespace spherecut::experiments::ledger {
 
 namespace {
 
-constexpr std::array<std::array<int, 2>, 6> edge_of{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
+constexpr std::array<std::array<int, 2>, 6> cell_edges{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 
-double cross(const Vector2& a, const Vector2& b) {
+double plane_cross(const Vector2& a, const Vector2& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
@@ -21,7 +21,7 @@ std::vector<Vector2> left_of(const std::vector<Vector2>& polygon, const Vector2&
   std::vector<Vector2> kept;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Vector2 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    const double da = cross(to - from, a - from), db = cross(to - from, b - from);
+    const double da = plane_cross(to - from, a - from), db = plane_cross(to - from, b - from);
     if (da >= 0)
       kept.push_back(a);
     if ((da < 0) != (db < 0))
@@ -35,12 +35,12 @@ struct PlanePoint {
 };
 /// Six points, exact to degree 4 [Dunavant 1985].
 constexpr double a1 = 0.445948490915965, w1 = 0.223381589678011, a2 = 0.091576213509771, w2 = 0.109951743655322;
-constexpr std::array<PlanePoint, 6> six_points{{{1 - 2 * a1, a1, a1, w1},
-                                                {a1, 1 - 2 * a1, a1, w1},
-                                                {a1, a1, 1 - 2 * a1, w1},
-                                                {1 - 2 * a2, a2, a2, w2},
-                                                {a2, 1 - 2 * a2, a2, w2},
-                                                {a2, a2, 1 - 2 * a2, w2}}};
+constexpr std::array<PlanePoint, 6> plane_points{{{1 - 2 * a1, a1, a1, w1},
+                                                  {a1, 1 - 2 * a1, a1, w1},
+                                                  {a1, a1, 1 - 2 * a1, w1},
+                                                  {1 - 2 * a2, a2, a2, w2},
+                                                  {a2, 1 - 2 * a2, a2, w2},
+                                                  {a2, a2, 1 - 2 * a2, w2}}};
 
 } // namespace
 
@@ -118,7 +118,7 @@ ShapeValues StraightCell::at(const std::array<double, 4>& l) const {
     s.gradient.col(k) = (4 * l[k] - 1) * flat_.col(k);
   }
   for (int k = 0; k < 6; ++k) {
-    const auto [a, b] = edge_of[k];
+    const auto [a, b] = cell_edges[k];
     s.value[4 + k] = 4 * l[a] * l[b];
     s.gradient.col(4 + k) = 4 * (l[a] * flat_.col(b) + l[b] * flat_.col(a));
   }
@@ -196,7 +196,7 @@ std::vector<Vector3> crossings(const StraightCell& cell, const Scenario& scenari
   std::array<double, 4> height;
   for (std::size_t k = 0; k < 4; ++k)
     height[k] = scenario.height(cell.corner(k));
-  for (const auto& [a, b] : edge_of)
+  for (const auto& [a, b] : cell_edges)
     if ((height[a] < 0) != (height[b] < 0))
       points.emplace_back(cell.corner(a) + height[a] / (height[a] - height[b]) * (cell.corner(b) - cell.corner(a)));
   if (points.size() < 3)
@@ -223,11 +223,11 @@ std::vector<CutPoint> cut_points(const StraightCell& cell, const Scenario& scena
   const int parts = state == CellState::front ? 4 : 1; // a side of a triangle
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
     const Vector2 u = (polygon[i] - polygon[0]) / parts, v = (polygon[i + 1] - polygon[0]) / parts;
-    const double area = 0.5 * cross(u, v);
+    const double area = 0.5 * plane_cross(u, v);
     for (int a = 0; a < parts; ++a)
       for (int b = 0; a + b < parts; ++b)
         for (int turned = 0; turned < (a + b + 1 < parts ? 2 : 1); ++turned)
-          for (const PlanePoint& p : six_points) {
+          for (const PlanePoint& p : plane_points) {
             const double s = turned != 0 ? a + 1 - p.l1 : a + p.l1, t = turned != 0 ? b + 1 - p.l2 : b + p.l2;
             points.push_back({cell.place(scenario.in_space(polygon[0] + s * u + t * v)), area * p.weight});
           }

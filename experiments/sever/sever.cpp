@@ -11,12 +11,16 @@
 #include "solvers/galerkin.hpp"
 #include "src/figure.hpp"
 #include "topology/cut_sheets.hpp"
+#include "topology/errors.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+
+extern "C" void dgesdd_(const char* job, const int* m, const int* n, double* a, const int* lda, double* s, double* u,
+                        const int* ldu, double* vt, const int* ldvt, double* work, const int* lwork, int* iwork,
+                        int* info);
 
 namespace spherecut::experiments {
 
@@ -67,6 +71,20 @@ std::vector<solvers::Anchor> anchors_in(const solvers::Discretisation& body) {
                                                        : solvers::stiffness_of(body).anchors;
 }
 
+/// Of a square matrix, descending.
+VectorX singular_values(MatrixX matrix) {
+  const int n = static_cast<int>(matrix.rows()), size = 64 * n + 7 * n;
+  VectorX values(n), work(size);
+  std::vector<int> whole(static_cast<std::size_t>(8) * n);
+  const int one = 1;
+  int info = 0;
+  dgesdd_("N", &n, &n, matrix.data(), &n, values.data(), nullptr, &one, nullptr, &one, work.data(), &size, whole.data(),
+          &info);
+  if (info != 0)
+    throw NumericalError(fmt::format("the singular values of {} rows were not found (LAPACK dgesdd {})", n, info));
+  return values;
+}
+
 /// Singular values of the matrix of a free piece below 1e-11 of the largest; the springs that hold it are taken off.
 int free_motions(const solvers::Discretisation& body, const solvers::Piece& piece) {
   const solvers::Problem& problem = body.problem();
@@ -83,7 +101,7 @@ int free_motions(const solvers::Discretisation& body, const solvers::Piece& piec
     matrix.block<3, 3>(3 * place[anchor.node], 3 * place[anchor.node]) -=
         problem.material.young_modulus * problem.nodes.spacings[anchor.node] * anchor.direction *
         anchor.direction.transpose();
-  const VectorX values = Eigen::BDCSVD<MatrixX>(matrix).singularValues(); // descending
+  const VectorX values = singular_values(std::move(matrix));
   int count = 0;
   for (double value : values)
     count += value < 1e-11 * values[0] ? 1 : 0;

@@ -10,7 +10,7 @@ namespace {
 constexpr double softening = 50;     // per second, at most, by which the rendered share of the force falls
 constexpr double hardening = 2;      // the same as it rises
 constexpr double out_of_body = 1e-3; // m, over which a blade's edge comes clear of the surface
-constexpr double rim = 0.8;          // of the candidates' reach: a contact beyond it takes the patch along
+constexpr double patch_rim = 0.8;    // of the candidates' reach: a contact beyond it takes the patch along
 
 const topology::ToolShape edge_point = topology::SphereTip{1e-9};
 
@@ -122,7 +122,7 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
     Vector3 away = contact_.point - snapshot_->contact.point;
     away -= away.dot(contact_.normal) * contact_.normal;
     const double distance = away.norm();
-    if (const double reach = rim * snapshot_->reach; distance > reach) {
+    if (const double reach = patch_rim * snapshot_->reach; distance > reach) {
       pose.point -= (1 - reach / distance) * away;
       outside = true;
     }

@@ -17,7 +17,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "recordings are written as they lie in memory");
 
-constexpr std::string_view magic = "SPHCREC\n";
+constexpr std::string_view signature = "SPHCREC\n";
 constexpr std::uint32_t header_lot = 1, tick_lot = 2, solve_lot = 3, end_lot = 4;
 constexpr std::size_t lot_head = 16; // kind, size of the payload, its checksum
 constexpr std::size_t tick_size = 112, solve_size = 64;
@@ -185,7 +185,7 @@ RecordingHeader recording_header(const Scenario& scenario, const topology::Surfa
 }
 
 RecordingWriter::RecordingWriter(std::filesystem::path file, const RecordingHeader& header) : file_(std::move(file)) {
-  std::string start(magic);
+  std::string start(signature);
   put(start, recording_version);
   put(start, std::uint32_t{0});
   file_.write(start);
@@ -269,15 +269,16 @@ Recording read_recording(const std::filesystem::path& file) {
   const auto refuse = [&](std::size_t at, const std::string& what) {
     throw InputError(fmt::format("{}: byte {}: {}", file.string(), at, what));
   };
-  if (!bytes.starts_with(magic))
+  if (!bytes.starts_with(signature))
     refuse(0, "not a recording of a haptic session");
-  Reader start(std::string_view(bytes).substr(magic.size()), file, magic.size());
+  Reader start(std::string_view(bytes).substr(signature.size()), file, signature.size());
   if (const auto version = start.get<std::uint32_t>(); version != recording_version)
-    refuse(magic.size(), fmt::format("a recording of format {}; this program reads {}", version, recording_version));
+    refuse(signature.size(),
+           fmt::format("a recording of format {}; this program reads {}", version, recording_version));
   static_cast<void>(start.get<std::uint32_t>());
   Recording recording;
   bool named = false;
-  for (std::size_t at = magic.size() + 8; at < bytes.size();) {
+  for (std::size_t at = signature.size() + 8; at < bytes.size();) {
     Reader head(std::string_view(bytes).substr(at), file, at);
     const auto cut_off = [&] {
       refuse(at, fmt::format("the file is cut off here, after {} whole ticks", recording.ticks.size()));

@@ -1,5 +1,7 @@
 #include "src/haptics/viewer_feed.hpp"
 
+#include "src/cut_output.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,11 +13,6 @@ constexpr double share = 0.2; // of the simulation thread's time that frames may
 
 double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
-}
-
-double von_mises(const Matrix3& stress) {
-  const Matrix3 deviator = stress - stress.trace() / 3 * Matrix3::Identity();
-  return std::sqrt(1.5) * deviator.norm();
 }
 
 /// u_h of every node of a body that is solved, m.

@@ -10,7 +10,7 @@
 namespace spherecut::app {
 namespace {
 
-constexpr std::uint64_t flush_ticks = 256;               // between two writes of a recording
+constexpr std::uint64_t recording_flush_ticks = 256;     // between two writes of a recording
 constexpr std::uint64_t most_recorded_ticks = 3'600'000; // an hour: then it ends
 constexpr int solver_niceness = 5;                       // the viewer that draws beside the solver goes before it
 constexpr double parking = 0.15;                         // of the organ's diagonal, beyond where the tool starts
@@ -118,7 +118,7 @@ void LiveSession::note(const TickRecord& record) {
     const bool full = record.device.tick >= most_recorded_ticks;
     try {
       writer_->add(record);
-      if (record.device.tick % flush_ticks == flush_ticks - 1)
+      if (record.device.tick % recording_flush_ticks == recording_flush_ticks - 1)
         writer_->flush();
     } catch (const InputError& error) {
       const std::lock_guard lock(failures_mutex_);

@@ -186,6 +186,10 @@ struct WebServer::Data::Client : std::enable_shared_from_this<Client> {
   void close(const CloseReason& why) {
     if (closing || gone)
       return;
+    if (!opened) { // its handshake is being answered: Beast cannot close what is not open
+      drop();
+      return;
+    }
     closing = true;
     websocket::close_reason reason(static_cast<std::uint16_t>(why.code));
     reason.reason = beast::string_view(why.text).substr(0, 120);

@@ -13,7 +13,7 @@ static_assert(std::endian::native == std::endian::little, "messages are little-e
 constexpr std::uint8_t topology_message = 1;
 constexpr std::uint8_t frame_message = 2;
 
-enum Section : std::uint32_t {
+enum class WireSection : std::uint32_t {
   rest_vertices = 1,
   triangles = 2,
   vertex_tags = 3,
@@ -63,7 +63,7 @@ class Writer {
   }
   void end_block() { set(2, static_cast<std::uint16_t>(bytes_.size())); }
 
-  void begin(Section kind) {
+  void begin(WireSection kind) {
     put(static_cast<std::uint32_t>(kind));
     put(std::uint32_t{0});
     start_ = bytes_.size();
@@ -73,7 +73,7 @@ class Writer {
     bytes_.resize((bytes_.size() + 3) / 4 * 4, '\0');
   }
   template <typename T>
-  void section(Section kind, const std::vector<T>& values) {
+  void section(WireSection kind, const std::vector<T>& values) {
     begin(kind);
     put_all(values);
     end();
@@ -135,7 +135,7 @@ void put_colours(std::uint32_t quantity, const std::vector<float>& values, Write
   if (values.empty())
     return;
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
-  out.begin(Section::colours);
+  out.begin(WireSection::colours);
   out.put(quantity);
   out.put(*least);
   out.put(*most);
@@ -144,7 +144,7 @@ void put_colours(std::uint32_t quantity, const std::vector<float>& values, Write
 }
 
 void put_nodes(const std::vector<ViewerFrame::Node>& list, Writer& out) {
-  out.begin(Section::nodes);
+  out.begin(WireSection::nodes);
   out.put(static_cast<std::uint32_t>(list.size()));
   for (const ViewerFrame::Node& node : list) {
     for (int axis = 0; axis < 3; ++axis)
@@ -157,7 +157,7 @@ void put_nodes(const std::vector<ViewerFrame::Node>& list, Writer& out) {
 }
 
 void put_pick(const PickedNode& pick, Writer& out) {
-  out.begin(Section::picked_node);
+  out.begin(WireSection::picked_node);
   out.put(static_cast<std::uint32_t>(pick.node));
   out.put(static_cast<std::uint32_t>(pick.seen.size()));
   out.put(static_cast<std::uint32_t>(pick.hidden.size()));
@@ -169,7 +169,7 @@ void put_pick(const PickedNode& pick, Writer& out) {
 }
 
 void put_slice(const FieldSlice& field, Writer& out) {
-  out.begin(Section::slice);
+  out.begin(WireSection::slice);
   out.put(static_cast<std::uint32_t>(field.count));
   for (const Vector3& x : {field.corner, field.along, field.up})
     out.put_vector(x);
@@ -179,7 +179,7 @@ void put_slice(const FieldSlice& field, Writer& out) {
 }
 
 void put_picture(const ViewerFrame& frame, const Overlays& overlays, int client, Writer& out) {
-  out.section(Section::vertices, frame.vertices);
+  out.section(WireSection::vertices, frame.vertices);
   if (overlays.colour == Overlays::Colour::displacement)
     put_colours(1, frame.displacement, out);
   if (overlays.colour == Overlays::Colour::von_mises)
@@ -192,7 +192,7 @@ void put_picture(const ViewerFrame& frame, const Overlays& overlays, int client,
   for (const FieldSlice& field : frame.slices)
     if (overlays.slice && field.key == client)
       put_slice(field, out);
-  out.begin(Section::volumes);
+  out.begin(WireSection::volumes);
   for (const double volume : frame.topology->volumes)
     out.put_float(volume);
   out.end();
@@ -209,12 +209,12 @@ std::string encode_topology(const ViewerTopology& topology, std::uint32_t messag
   out.put(static_cast<std::uint32_t>(topology.triangles.size()));
   out.put(static_cast<std::uint32_t>(topology.volumes.size()));
   out.end_block();
-  out.section(Section::rest_vertices, topology.vertices);
-  out.section(Section::triangles, topology.triangles);
-  out.section(Section::vertex_tags, topology.tags);
-  out.section(Section::triangle_parts, topology.parts);
-  out.section(Section::triangle_pieces, topology.pieces);
-  out.section(Section::lip_pairs, topology.lip_pairs);
+  out.section(WireSection::rest_vertices, topology.vertices);
+  out.section(WireSection::triangles, topology.triangles);
+  out.section(WireSection::vertex_tags, topology.tags);
+  out.section(WireSection::triangle_parts, topology.parts);
+  out.section(WireSection::triangle_pieces, topology.pieces);
+  out.section(WireSection::lip_pairs, topology.lip_pairs);
   return out.finish();
 }
 
@@ -229,7 +229,7 @@ std::string encode_frame(const ViewerFrame& frame, const LiveTick& tick, const F
     put_picture(frame, overlays, client, out);
   if (overlays.stages) {
     const SessionProfile& profile = frame.profile;
-    out.begin(Section::stages);
+    out.begin(WireSection::stages);
     out.put_floats({profile.press, profile.sprinkle, profile.discretise, profile.condense, profile.topology,
                     profile.level_sets, profile.evaluate, frame.picture_seconds});
     out.end();

@@ -14,7 +14,6 @@ using spherecut::tests::stress;
 using spherecut::tests::stress_divergence;
 
 namespace {
-constexpr double pi = std::numbers::pi;
 const solvers::Material material{2.0, 0.3, 0};
 const CutFrame frame = tilted_frame({0.1, -0.2, 0.3}, {0.3, -0.2, 0.15});
 } // namespace
@@ -43,10 +42,10 @@ TEST_CASE("The three modes at a straight front are in equilibrium, with free fac
       const Matrix3 sigma = stress(material, tip.gradient);
       CHECK(sigma.col(1).norm() < 1e-10);
     }
-    // Ahead of the front the stress is K / sqrt(2 pi r) in the mode's own component.
+    // Ahead of the front the stress is K / sqrt(2 std::numbers::pi r) in the mode's own component.
     const auto tip = solvers::tip_field(material, k, 0.5, 0);
     const Matrix3 sigma = stress(material, tip.gradient);
-    CHECK(sigma(mode == 0 ? 1 : mode == 1 ? 0 : 2, 1) == Approx(1 / std::sqrt(pi)).epsilon(1e-10));
+    CHECK(sigma(mode == 0 ? 1 : mode == 1 ? 0 : 2, 1) == Approx(1 / std::sqrt(std::numbers::pi)).epsilon(1e-10));
   }
 }
 
@@ -68,7 +67,7 @@ TEST_CASE("The pressurised penny is in equilibrium, carries the pressure and ope
   double volume = 0;
   for (int i = 0; i < 2000; ++i) {
     const double r = a * (i + 0.5) / 2000;
-    volume += 2 * pi * r * a / 2000 * penny_opening(material, a, p, r);
+    volume += 2 * std::numbers::pi * r * a / 2000 * penny_opening(material, a, p, r);
   }
   CHECK(volume == Approx(penny_opening_volume(material, a, p)).epsilon(1e-4));
 }
@@ -95,12 +94,13 @@ TEST_CASE(
     "The tilted penny has the intensities of pressure and shear, and strips those of the half-plane at small cracks") {
   const double a = 0.9;
   const auto straight = tilted_penny_intensities(material, a, 2, 0, 1);
-  CHECK(straight[0] == Approx(4 * std::sqrt(a / pi)));
+  CHECK(straight[0] == Approx(4 * std::sqrt(a / std::numbers::pi)));
   CHECK(straight.tail<2>().norm() < 1e-14);
   const auto ahead = tilted_penny_intensities(material, a, 2, 0.5, 0),
-             beside = tilted_penny_intensities(material, a, 2, 0.5, pi / 2);
+             beside = tilted_penny_intensities(material, a, 2, 0.5, std::numbers::pi / 2);
   CHECK(ahead[2] == Approx(0).margin(1e-14));
   CHECK(beside[1] == Approx(0).margin(1e-14));
   CHECK(std::abs(beside[2] / ahead[1]) == Approx(1 - material.poisson_ratio));
-  CHECK(edge_notched_strip_intensity(3, 1e-4, 1) == Approx(1.1215 * 3 * std::sqrt(pi * 1e-4)).epsilon(2e-3));
+  CHECK(edge_notched_strip_intensity(3, 1e-4, 1) ==
+        Approx(1.1215 * 3 * std::sqrt(std::numbers::pi * 1e-4)).epsilon(2e-3));
 }

@@ -17,8 +17,6 @@ using solvers::NodeKind;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 /// Nodes in a box, `h` apart below the height `split`, `h / 3` above it.
 NodeCloud graded_grid(const Vector3& lower, const Vector3& upper, double h, double split) {
   NodeCloud nodes;
@@ -94,9 +92,10 @@ TEST_CASE("Background cells of a half ball converge in volume and moments") {
     NodeCloud nodes;
     nodes.add({0, 0, 0.5}, h, NodeKind::interior);
     const BackgroundCells cells = background_cells(*domain, nodes, {1.0, 2});
-    volume.push_back(std::abs(integral(cells, [](const Vector3&) { return 1.0; }) / (2 * pi / 3) - 1));
-    height.push_back(std::abs(integral(cells, [](const Vector3& x) { return x.z(); }) / (pi / 4) - 1));
-    inertia.push_back(std::abs(integral(cells, [](const Vector3& x) { return x.squaredNorm(); }) / (2 * pi / 5) - 1));
+    volume.push_back(std::abs(integral(cells, [](const Vector3&) { return 1.0; }) / (2 * std::numbers::pi / 3) - 1));
+    height.push_back(std::abs(integral(cells, [](const Vector3& x) { return x.z(); }) / (std::numbers::pi / 4) - 1));
+    inertia.push_back(
+        std::abs(integral(cells, [](const Vector3& x) { return x.squaredNorm(); }) / (2 * std::numbers::pi / 5) - 1));
     for (const solvers::QuadraturePoint& point : cells.points)
       CHECK(domain->signed_distance(point.position) < 0.05 * h);
   }
@@ -110,8 +109,8 @@ TEST_CASE("Background cells of a half ball converge in volume and moments") {
 TEST_CASE("Surface quadrature gives the area of the tessellation and closes") {
   for (const auto& [domain, exact] :
        {std::pair{topology::make_box_domain(Vector3::Zero(), Vector3(1, 2, 0.5), 0.3), 7.0},
-        std::pair{topology::make_hemisphere_domain(1, 0.1), 3 * pi},
-        std::pair{topology::make_cylinder_domain(0.5, 2, 0.1), 2.5 * pi}}) {
+        std::pair{topology::make_hemisphere_domain(1, 0.1), 3 * std::numbers::pi},
+        std::pair{topology::make_cylinder_domain(0.5, 2, 0.1), 2.5 * std::numbers::pi}}) {
     NodeCloud nodes;
     nodes.add({0.2, 0.2, 0.2}, 0.4, NodeKind::surface);
     const std::vector<solvers::SurfacePoint> points = solvers::surface_quadrature(*domain, nodes);

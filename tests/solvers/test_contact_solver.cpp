@@ -27,7 +27,7 @@ using topology::ToolShape;
 
 namespace {
 
-const std::array<Method, 2> both{Method::collocation, Method::galerkin};
+const std::array<Method, 2> contact_methods{Method::collocation, Method::galerkin};
 
 Vector3 reaction(const PressedBlock& on, const ContactState& state) {
   Vector3 total = Vector3::Zero();
@@ -43,7 +43,7 @@ Vector3 place(const ContactPatch& patch, const ContactState& state, std::size_t 
 } // namespace
 
 TEST_CASE("A pressed tool leaves no penetration and no tension, and its force is the reaction") {
-  for (Method method : both)
+  for (Method method : contact_methods)
     for (const ToolShape& tool : {ToolShape(SphereTip{0.01}), ToolShape(FlatPunch{0.012, 0.05})})
       for (const Vector3& axis : {Vector3(0, 0, 1), Vector3(0.2, -0.1, 1)}) {
         const PressedBlock& on = pressed_block(method);
@@ -87,7 +87,7 @@ TEST_CASE("A shallow sphere on a thick block presses about as Hertz says") {
   const double radius = 0.06, depth = 0.0012;
   const solvers::Material& material = pressed_block(Method::galerkin).body->problem().material;
   const double exact = experiments::hertz_contact(material, radius, depth).force;
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     const ContactState state =
         press(pressed_block(method).patch, SphereTip{radius}, {{0, 0, -depth}, Vector3::UnitZ()});
     const double ratio = state.tool_force.z() / exact;
@@ -99,7 +99,7 @@ TEST_CASE("A shallow sphere on a thick block presses about as Hertz says") {
 }
 
 TEST_CASE("A tool that does not touch feels nothing") {
-  for (Method method : both)
+  for (Method method : contact_methods)
     for (ContactCondition condition : {ContactCondition::frictionless, ContactCondition::bonded}) {
       ContactOptions options;
       options.condition = condition;
@@ -114,7 +114,7 @@ TEST_CASE("A tool that does not touch feels nothing") {
 }
 
 TEST_CASE("Pressing on and drawing back traces one force curve, back to nothing") {
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     const ContactPatch& patch = pressed_block(method).patch;
     const SphereTip tool{0.012};
     std::vector<double> depths, forces;
@@ -141,7 +141,7 @@ TEST_CASE("Pressing on and drawing back traces one force curve, back to nothing"
 }
 
 TEST_CASE("A bonded punch is stiffer than a frictionless one and carries its nodes along") {
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     const ContactPatch& patch = pressed_block(method).patch;
     const FlatPunch tool{0.012, 0.05};
     ContactOptions bonded;
@@ -170,7 +170,7 @@ TEST_CASE("A bonded punch is stiffer than a frictionless one and carries its nod
 }
 
 TEST_CASE("A press as deep as the tip's radius converges") {
-  for (Method method : both)
+  for (Method method : contact_methods)
     for (double radius : {0.012, 0.015, 0.018}) { // a node slips off a ball of about its own spacing
       const ContactState state =
           press(pressed_block(method).patch, SphereTip{radius}, {{0, 0, -radius}, Vector3::UnitZ()});
@@ -185,7 +185,7 @@ TEST_CASE("A press as deep as the tip's radius converges") {
 TEST_CASE("A ball presses the same whichever way its shaft leans") {
   // Deep enough that its tangent cone matters; the shaft itself stays clear of the block.
   const Vector3 centre(0.001, 0.002, 0.0035);
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     const PressedBlock& on = pressed_block(method);
     const auto force = [&](const ToolShape& tool, const Vector3& axis) {
       const ContactState state = press(on.patch, tool, {centre - topology::tip_radius(tool) * axis, axis});
@@ -202,7 +202,7 @@ TEST_CASE("A ball presses the same whichever way its shaft leans") {
 }
 
 TEST_CASE("Prescribed displacements of the patch are met and give the condensed stiffness") {
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     const ContactPatch& patch = pressed_block(method).patch;
     std::vector<Vector3> values;
     for (std::size_t c = 0; c < patch.nodes.size(); ++c)
@@ -237,7 +237,7 @@ TEST_CASE("Turning body and tool by right angles turns the force") {
   // Right angles keep a box a box, and cells, shares and background cells turn with it.
   Matrix3 turn;
   turn << 0, 0, 1, 1, 0, 0, 0, 1, 0; // z to x, x to y, y to z
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     const solvers::Problem problem = held_box({0, 0, 0}, {0.05, 0.04, 0.03}, 0.01, 0.2, {5e3, 0.3, 1000}, 9);
     solvers::Problem turned = problem;
     const Vector3 lower = turn * Vector3::Zero(), upper = turn * Vector3(0.05, 0.04, 0.03);
@@ -265,7 +265,7 @@ TEST_CASE("Turning body and tool by right angles turns the force") {
 
 TEST_CASE("A coupled far boundary follows the half-space under the tool's force") {
   // All faces but the top are far; a unit force then moves them as Boussinesq says and the force leaves through them.
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     solvers::Problem problem = held_box({-0.04, -0.04, -0.04}, {0.04, 0.04, 0}, 0.01, 0.1, {5e3, 0.3, 1000}, 3);
     problem.prescribed.clear();
     problem.prescribed_region = [](const Vector3& x, const Vector3&) { return x.z() < -1e-9; };
@@ -301,7 +301,7 @@ TEST_CASE("A coupled far boundary follows the half-space under the tool's force"
 }
 
 TEST_CASE("Candidates that cannot be pressed on are refused") {
-  for (Method method : both) {
+  for (Method method : contact_methods) {
     const solvers::Discretisation& body = *pressed_block(method).body;
     CHECK_THROWS_AS(solvers::condense(body, {}), InputError);
     CHECK_THROWS_WITH(solvers::condense(body, {-1}), Catch::Contains("does not exist"));

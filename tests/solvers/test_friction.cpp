@@ -21,8 +21,6 @@ using topology::ToolPose;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 ContactOptions with_friction(double coefficient) {
   ContactOptions options;
   options.condition = ContactCondition::frictional;
@@ -44,12 +42,12 @@ ContactPatch half_space(int n, double h, double shear_modulus, double nu) {
   const auto count = std::ssize(patch.nodes);
   patch.base_displacement = VectorX::Zero(3 * count);
   patch.compliance = MatrixX::Zero(3 * count, 3 * count);
-  const double scale = 1 / (2 * pi * shear_modulus);
+  const double scale = 1 / (2 * std::numbers::pi * shear_modulus);
   for (Eigen::Index c = 0; c < count; ++c)
     for (Eigen::Index d = 0; d < count; ++d) {
       Matrix3 green = Matrix3::Zero();
       if (c == d) {
-        const double radius = h / std::sqrt(pi);
+        const double radius = h / std::sqrt(std::numbers::pi);
         green.diagonal() = 2 / radius * Vector3(1 - nu / 2, 1 - nu / 2, 1 - nu);
       } else {
         const Vector3 way = patch.rest[c] - patch.rest[d];

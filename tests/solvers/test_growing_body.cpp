@@ -11,7 +11,7 @@ using Scene = spherecut::tests::GrowingScene;
 
 namespace {
 
-Vector3 sum(const std::vector<Vector3>& forces) {
+Vector3 sum_of(const std::vector<Vector3>& forces) {
   Vector3 total = Vector3::Zero();
   for (const Vector3& force : forces)
     total += force;
@@ -72,7 +72,7 @@ TEST_CASE("A body that has followed its cut is in balance and equals the body bu
       for (int axis = 0; axis < 3; ++axis) {
         CHECK(body.residual(responses[axis], {node}, {Vector3::Unit(axis)}) < 1e-9);
         CHECK(body.residual(responses[axis], {}, {}) > 1e-3);
-        CHECK((sum(body.constraint_forces(responses[axis])) + Vector3::Unit(axis)).norm() < 1e-8);
+        CHECK((sum_of(body.constraint_forces(responses[axis])) + Vector3::Unit(axis)).norm() < 1e-8);
       }
       CHECK((body.contact_point(node) - ordinary->contact_point(node)).norm() < 1e-15);
     }

@@ -13,8 +13,9 @@ using namespace spherecut::solvers;
 
 namespace {
 
-struct Scene : tests::GrowingScene {
-  explicit Scene(double nu, double lower = -depth, double half_width = 0.02) : GrowingScene(lower, half_width) {
+struct CollocationScene : tests::GrowingScene {
+  explicit CollocationScene(double nu, double lower = -depth, double half_width = 0.02)
+      : GrowingScene(lower, half_width) {
     method = Method::collocation;
     poisson_ratio = nu;
   }
@@ -28,7 +29,7 @@ double largest_difference(const SparseMatrix& a, const SparseMatrix& b) {
   return SparseMatrix(a - b).coeffs().cwiseAbs().maxCoeff() / a.coeffs().cwiseAbs().maxCoeff();
 }
 
-std::vector<int> patch_of(const Scene& scene) { // ahead of the cut, and a lip
+std::vector<int> patch_of(const CollocationScene& scene) { // ahead of the cut, and a lip
   std::vector<int> patch;
   for (int i = 0; i < scene.nodes.size() && patch.size() < 5; ++i)
     if (scene.nodes.kinds[i] == NodeKind::surface && scene.nodes.normals[i].z() > 0.9 &&
@@ -41,7 +42,7 @@ std::vector<int> patch_of(const Scene& scene) { // ahead of the cut, and a lip
 
 TEST_CASE("Balance rows that have followed a cut are those of a body built anew, and so are its fields") {
   for (const double nu : {0.3, 0.46}) {
-    Scene scene(nu, -Scene::depth, 0.09);
+    CollocationScene scene(nu, -CollocationScene::depth, 0.09);
     GrowthOptions options = scene.options();
     options.contact = patch_of(scene);
     const auto body = make_growable(scene.problem(), options);
@@ -91,7 +92,7 @@ TEST_CASE("Balance rows that have followed a cut are those of a body built anew,
 }
 
 TEST_CASE("An update of the balance that the window does not cover is declined, or condensed anew") {
-  Scene scene(0.3);
+  CollocationScene scene(0.3);
   GrowthOptions options = scene.options();
   options.way = topology::make_rectangle_sheet({0.02, 0.015, -0.02}, Vector3::UnitX(), Vector3::UnitZ(), 0.004, 0.004,
                                                0.002); // where the blade does not go
@@ -110,7 +111,7 @@ TEST_CASE("An update of the balance that the window does not cover is declined, 
 }
 
 TEST_CASE("A load that throws leaves the body whose balance follows a cut as it was") {
-  Scene scene(0.3);
+  CollocationScene scene(0.3);
   const auto body = make_growable(scene.problem(), scene.options());
   const Field before = body->solve();
   const int count = scene.nodes.size();
@@ -128,7 +129,7 @@ TEST_CASE("A load that throws leaves the body whose balance follows a cut as it 
 }
 
 TEST_CASE("A body whose balance becomes singular with its cut is made again as it was") {
-  Scene scene(0.3);
+  CollocationScene scene(0.3);
   GrowthOptions options = scene.options();
   options.way = topology::make_rectangle_sheet({0, 0, -0.015}, Vector3::UnitY(), Vector3::UnitZ(), 0.06, 0.03, 0.004);
   options.contact = patch_of(scene);
@@ -151,7 +152,7 @@ TEST_CASE("A body whose balance becomes singular with its cut is made again as i
 }
 
 TEST_CASE("A piece that comes free is not covered by an update of the balance either") {
-  Scene scene(0.3, -0.034); // through the whole height
+  CollocationScene scene(0.3, -0.034); // through the whole height
   const auto held_end = [&] {
     Problem p = scene.problem();
     p.prescribed.clear();
@@ -178,7 +179,7 @@ TEST_CASE("A piece that comes free is not covered by an update of the balance ei
 }
 
 TEST_CASE("What cannot follow its cut by an update is refused") {
-  Scene scene(0.3);
+  CollocationScene scene(0.3);
   GrowthOptions options = scene.options();
   options.way = {};
   CHECK_THROWS_WITH(make_growable(scene.problem(), options), Catch::Contains("way of the cut is empty"));

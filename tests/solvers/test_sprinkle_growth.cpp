@@ -13,7 +13,7 @@ using namespace spherecut::tests;
 
 namespace {
 
-std::shared_ptr<const topology::Domain> block() {
+std::shared_ptr<const topology::Domain> growing_block() {
   return topology::make_box_domain({0, 0, 0}, {0.1, 0.08, 0.06}, 0.02);
 }
 
@@ -116,7 +116,7 @@ void check_grown(const topology::Domain& domain, const SprinkleOptions& options,
 } // namespace
 
 TEST_CASE("A cut grown by twenty increments keeps distant nodes and stays as full as one made at once") {
-  const auto domain = block();
+  const auto domain = growing_block();
   for (double h : {0.01, 0.0075}) {
     INFO("h " << h);
     SprinkleOptions options;
@@ -162,7 +162,7 @@ TEST_CASE("A cut grown by twenty increments keeps distant nodes and stays as ful
 }
 
 TEST_CASE("Nothing happens where the cut has not grown, and bad increments are refused") {
-  const auto domain = block();
+  const auto domain = growing_block();
   SprinkleOptions options;
   options.spacing.fine = options.spacing.coarse = 0.01;
   options.incision = edge_cut(domain, 5);
@@ -176,7 +176,7 @@ TEST_CASE("Nothing happens where the cut has not grown, and bad increments are r
 }
 
 TEST_CASE("An increment found twice is the same to the bit") {
-  const auto domain = block();
+  const auto domain = growing_block();
   SprinkleOptions options;
   options.spacing.fine = options.spacing.coarse = 0.01;
   options.incision = edge_cut(domain, 5);
@@ -191,7 +191,7 @@ TEST_CASE("An increment found twice is the same to the bit") {
 }
 
 TEST_CASE("Sprinkling anew around a grown cut keeps the lips it had and all nodes away from it") {
-  const auto domain = block();
+  const auto domain = growing_block();
   SprinkleOptions options;
   options.spacing.fine = options.spacing.coarse = 0.009;
   options.incision = edge_cut(domain, 6);

@@ -2,29 +2,22 @@
 #include "src/haptics/haptic_tick.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
+#include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/allocation_counter.hpp"
-#include "tests/support/temporary_folder.hpp"
 #include "topology/errors.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <fstream>
 #include <numbers>
 
 using namespace spherecut;
 using namespace spherecut::app;
 using spherecut::tests::replaced;
+using spherecut::tests::scenario_of;
 using spherecut::tests::small_scenario;
-using spherecut::tests::TemporaryFolder;
 
 namespace {
-
-Scenario scenario_of(const std::string& text) {
-  const TemporaryFolder folder;
-  std::ofstream(folder.path() / "s.toml") << text;
-  return read_scenario(folder.path() / "s.toml");
-}
 
 Scenario small(const std::string& method, const std::string& condition = "frictionless") {
   return scenario_of(small_scenario + "[method]\nname = \"" + method + "\"\n[contact]\ncondition = \"" + condition +

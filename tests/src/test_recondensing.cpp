@@ -30,7 +30,7 @@ time = 1
 position = [-0.043, 0.001, 0.010]
 )";
 
-std::unique_ptr<solvers::Discretisation> from_scratch(const Session& session) {
+std::unique_ptr<solvers::Discretisation> rebuilt_from_scratch(const Session& session) {
   solvers::DiscretisationOptions method = session.scenario().method;
   method.unheld = session.scenario().cut.unheld;
   return solvers::discretise(session.body()->problem(), method);
@@ -72,7 +72,7 @@ TEST_CASE("A body that takes over from the background is the one built from scra
     ++taken;
     CHECK_FALSE(session.recondensing());
     CHECK_FALSE(session.swap_body());
-    const solvers::Field now = session.body()->solve(), scratch = from_scratch(session)->solve();
+    const solvers::Field now = session.body()->solve(), scratch = rebuilt_from_scratch(session)->solve();
     CHECK((now.coefficients - scratch.coefficients).norm() <= 1e-9 * scratch.coefficients.norm());
     CHECK((now.coefficients - before.coefficients).norm() < 2e-3 * scratch.coefficients.norm()); // finer cells
   }
@@ -97,7 +97,7 @@ TEST_CASE("A cut during condensing is repeated on the new body, and when a threa
   CHECK(taken == taken_slowly);
   CHECK(a == b);
   // It has followed: its nodes are those of the session, and it is near to a body built anew on them.
-  const solvers::Field now = quick.body()->solve(), scratch = from_scratch(quick)->solve();
+  const solvers::Field now = quick.body()->solve(), scratch = rebuilt_from_scratch(quick)->solve();
   CHECK(quick.body()->problem().nodes.positions == quick.sprinkling().nodes.positions);
   CHECK((now.coefficients - scratch.coefficients).norm() < 2e-3 * scratch.coefficients.norm());
 }

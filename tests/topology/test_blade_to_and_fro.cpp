@@ -10,7 +10,7 @@ using namespace spherecut::topology;
 
 namespace {
 
-constexpr double edge = 0.004, cell = 0.0005, half = 0.03, height = 0.03;
+constexpr double edge_of_sheet = 0.004, cell = 0.0005, half = 0.03, height = 0.03;
 constexpr int across = static_cast<int>(2 * half / cell), upright = static_cast<int>(height / cell);
 
 struct Place {
@@ -43,7 +43,7 @@ struct Swept {
   }
   // Whether all cells of the plane within 0.75 edges of this one are as it is.
   [[nodiscard]] bool is_deep(int i, int k) const {
-    const int reach = static_cast<int>(0.75 * edge / cell);
+    const int reach = static_cast<int>(0.75 * edge_of_sheet / cell);
     for (int p = std::max(0, i - reach); p <= std::min(across - 1, i + reach); ++p)
       for (int q = std::max(0, k - reach); q <= std::min(upright - 1, k + reach); ++q)
         if (std::hypot(p - i, q - k) <= reach && at(p, q) != at(i, k))
@@ -66,7 +66,7 @@ TEST_CASE("A blade that goes to and fro in a plane cuts what its edge sweeps, on
     };
     const double lean = between(-0.6, 0.6);
     const Vector3 top = 0.035 * Vector3(0, std::tan(lean), 1);
-    BladeSweep sweep({{Vector3::Zero(), top}, 1e-4}, block, {.edge = edge});
+    BladeSweep sweep({{Vector3::Zero(), top}, 1e-4}, block, {.edge = edge_of_sheet});
     Swept swept;
     double y = -0.045, z = between(0.006, 0.024), time = 0;
     const auto move = [&](double to_y, double to_z) {

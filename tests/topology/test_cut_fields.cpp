@@ -14,7 +14,7 @@ using namespace spherecut::topology;
 
 namespace {
 
-std::shared_ptr<const Domain> block() {
+std::shared_ptr<const Domain> voxel_block() {
   return make_box_domain(Vector3(0, 0, 0), Vector3(0.1, 0.1, 0.05), 0.02);
 }
 
@@ -38,7 +38,7 @@ TEST_CASE("The cut's fields hold the distance to the sheet and the place relativ
   const Vector3 centre(0.048, 0.052, 0.026), normal = Vector3(0.2, 0.3, 1).normalized();
   const double radius = 0.02, voxel = 0.001;
   const auto incision =
-      std::make_shared<const Incision>(std::vector{make_disc_sheet(centre, normal, radius, 0.002)}, block());
+      std::make_shared<const Incision>(std::vector{make_disc_sheet(centre, normal, radius, 0.002)}, voxel_block());
   CutFields fields(voxel);
   fields.update(incision);
   const auto voxels = fields.voxels();
@@ -70,7 +70,7 @@ TEST_CASE("The cut's fields hold the distance to the sheet and the place relativ
 TEST_CASE("Fields updated increment by increment are those built from scratch, bit for bit", "[cut_fields]") {
   SweepOptions options;
   options.edge = 0.002;
-  BladeSweep sweep({{Vector3(0, 0, 0.06), Vector3(0, 0, 0.03), Vector3(0.004, 0, 0)}, 1e-4}, block(), options);
+  BladeSweep sweep({{Vector3(0, 0, 0.06), Vector3(0, 0, 0.03), Vector3(0.004, 0, 0)}, 1e-4}, voxel_block(), options);
   CutFields fields(0.001);
   BladePose pose;
   int compared = 0;
@@ -98,7 +98,7 @@ TEST_CASE("Fields updated increment by increment are those built from scratch, b
   CHECK(compared > 12);
   // Another cut altogether.
   const auto other = std::make_shared<const Incision>(
-      std::vector{make_disc_sheet(Vector3(0.05, 0.05, 0.02), Vector3(1, 1, 0), 0.01, 0.002)}, block());
+      std::vector{make_disc_sheet(Vector3(0.05, 0.05, 0.02), Vector3(1, 1, 0), 0.01, 0.002)}, voxel_block());
   fields.update(other);
   CHECK(differing(fields.voxels(), from_scratch(other, 0.001)) == 0);
 }
@@ -110,7 +110,8 @@ TEST_CASE("Sheets that start, turn and cross anywhere leave the same fields howe
   options.edge = 0.005;
   int sheets = 0;
   for (int trial = 0; trial < 25; ++trial) {
-    BladeSweep sweep({{Vector3(0, 0, 0.02), Vector3(0, 0.004, 0), Vector3(0.01, 0, -0.02)}, 1e-4}, block(), options);
+    BladeSweep sweep({{Vector3(0, 0, 0.02), Vector3(0, 0.004, 0), Vector3(0.01, 0, -0.02)}, 1e-4}, voxel_block(),
+                     options);
     CutFields fields(0.002);
     BladePose pose;
     for (int k = 0; k < 14; ++k) {
@@ -138,7 +139,7 @@ TEST_CASE("Cut fields refuse voxels that make no sense", "[cut_fields]") {
   CutFields fields(1e-7);
   CHECK_THROWS_AS(fields.update(nullptr), InputError);
   const auto incision = std::make_shared<const Incision>(
-      std::vector{make_disc_sheet(Vector3(0.05, 0.05, 0.02), Vector3(1, 1, 0), 0.01, 0.002)}, block());
+      std::vector{make_disc_sheet(Vector3(0.05, 0.05, 0.02), Vector3(1, 1, 0), 0.01, 0.002)}, voxel_block());
   CHECK_THROWS_WITH(fields.update(incision), Catch::Contains("GB"));
   CHECK(fields.voxels().empty());
 }

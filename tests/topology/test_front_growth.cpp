@@ -20,7 +20,7 @@ namespace {
 const Vector3 lower(-0.05, -0.04, -0.03), upper(0.05, 0.04, 0.03);
 const Vector3 normal = Vector3(0.1, 0.15, 1).normalized();
 
-std::shared_ptr<const Domain> block() {
+std::shared_ptr<const Domain> growth_block() {
   return make_box_domain(lower, upper, 0.01);
 }
 
@@ -32,7 +32,7 @@ bool continues(const SurfaceMesh& before, const SurfaceMesh& after) {
 } // namespace
 
 TEST_CASE("A straight front through a block moves as told and stays a sheet", "[front_growth]") {
-  const auto domain = block();
+  const auto domain = growth_block();
   // From the side x < 0 to the front at about x = 0.
   const Vector3 along = Vector3(1, 0.1, -0.1).normalized();
   const SurfaceMesh sheet = make_rectangle_sheet(Vector3(-0.04, 0.001, 0.002), normal, along, 0.12, 0.08, 0.004);
@@ -63,7 +63,7 @@ TEST_CASE("A straight front through a block moves as told and stays a sheet", "[
 
 TEST_CASE("A front that turns inwards goes on reaching through the surface", "[front_growth]") {
   // Its ends would sink into the body after two steps, and a ligament along the sides would stay.
-  const auto domain = block();
+  const auto domain = growth_block();
   const Vector3 up = (normal - normal.x() * Vector3::UnitX()).normalized(), sideways = up.cross(Vector3::UnitX());
   std::vector<SurfaceMesh> sheets{
       make_rectangle_sheet(Vector3(-0.04, 0.001, 0.002), up, Vector3::UnitX(), 0.084, 0.08, 0.004)};
@@ -95,7 +95,7 @@ TEST_CASE("A front that turns inwards goes on reaching through the surface", "[f
 }
 
 TEST_CASE("A buried disc grows to a larger disc", "[front_growth]") {
-  const auto domain = block();
+  const auto domain = growth_block();
   const double radius = 0.01, step = 0.006;
   const Vector3 centre(0.002, -0.001, 0.003);
   const Incision incision({make_disc_sheet(centre, normal, radius, 0.002)}, domain);
@@ -114,7 +114,7 @@ TEST_CASE("A buried disc grows to a larger disc", "[front_growth]") {
 }
 
 TEST_CASE("Part of a front moves, the rest stays", "[front_growth]") {
-  const auto domain = block();
+  const auto domain = growth_block();
   const Vector3 centre(0.002, -0.001, 0.003);
   const Incision incision({make_disc_sheet(centre, normal, 0.01, 0.002)}, domain);
   const FrontGrowth growth = grow_front(
@@ -138,7 +138,7 @@ TEST_CASE("Part of a front moves, the rest stays", "[front_growth]") {
 }
 
 TEST_CASE("A front that is told nonsense is refused", "[front_growth]") {
-  const Incision incision({make_disc_sheet(Vector3(0, 0, 0), normal, 0.01, 0.002)}, block());
+  const Incision incision({make_disc_sheet(Vector3(0, 0, 0), normal, 0.01, 0.002)}, growth_block());
   const auto nowhere = [](const FrontFrame&) -> Vector3 {
     return Vector3::Constant(std::numeric_limits<double>::quiet_NaN());
   };

@@ -13,7 +13,7 @@ using namespace spherecut::topology;
 
 namespace {
 
-std::shared_ptr<const Domain> block() {
+std::shared_ptr<const Domain> joining_block() {
   return make_box_domain({-0.05, -0.04, -0.03}, {0.05, 0.04, 0.03}, 0.01);
 }
 
@@ -29,7 +29,7 @@ std::vector<SurfaceMesh> half_cuts(double gap, double apart, bool same_way_round
 } // namespace
 
 TEST_CASE("Two coplanar fronts that face each other join and part the body", "[front_growth]") {
-  const auto domain = block();
+  const auto domain = joining_block();
   const double gap = 0.004;
   for (const bool same_way_round : {true, false})
     for (const double apart : {0.0, 1e-9, 0.001}) {
@@ -58,7 +58,7 @@ TEST_CASE("Two coplanar fronts that face each other join and part the body", "[f
 
 TEST_CASE("Fronts that are too far apart, turn their backs or have a sheet between them do not join",
           "[front_growth]") {
-  const auto domain = block();
+  const auto domain = joining_block();
   CHECK(join_fronts(Incision(half_cuts(0.004, 0), domain), 0.003).triangles == 0);
   // A disc: its own front runs away from itself.
   const Incision disc({make_disc_sheet(Vector3::Zero(), Vector3::UnitZ(), 0.003, 0.001)}, domain);
@@ -70,7 +70,7 @@ TEST_CASE("Fronts that are too far apart, turn their backs or have a sheet betwe
 }
 
 TEST_CASE("A front that faces another one in part joins there, and the end of the strip is front", "[front_growth]") {
-  const auto domain = block();
+  const auto domain = joining_block();
   std::vector<SurfaceMesh> sheets = half_cuts(0.004, 0);
   // Half as wide: from y = -0.04 beyond the middle.
   sheets[1] = make_rectangle_sheet(Vector3(0.032, -0.025, 0), Vector3::UnitZ(), Vector3::UnitX(), 0.05, 0.06, 0.0053);

@@ -1,6 +1,7 @@
 #include "topology/incision.hpp"
 
 #include "tests/support/allocation_counter.hpp"
+#include "tests/support/sheets.hpp"
 #include "topology/errors.hpp"
 #include "topology/lip_lift.hpp"
 #include "topology/proximity.hpp"
@@ -27,23 +28,8 @@ Vector3 in_box(Random& random, const Vector3& lower, const Vector3& upper) {
   return Vector3::NullaryExpr([&](Eigen::Index d) { return uniform(random, lower[d], upper[d]); });
 }
 
-/// Grid of n x m quads over [0, 1]^2, halved, mapped by `place`.
-SurfaceMesh grid_sheet(int n, int m, const std::function<Vector3(double, double)>& place) {
-  SurfaceMesh mesh;
-  for (int j = 0; j <= m; ++j)
-    for (int i = 0; i <= n; ++i)
-      mesh.vertices.push_back(place(double(i) / n, double(j) / m));
-  for (int j = 0; j < m; ++j)
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i, b = a + 1, c = b + n + 1, d = a + n + 1;
-      mesh.triangles.push_back({a, b, c});
-      mesh.triangles.push_back({a, c, d});
-    }
-  return mesh;
-}
-
 SurfaceMesh rectangle(const Vector3& corner, const Vector3& u, const Vector3& v, int n, int m) {
-  return grid_sheet(n, m, [&](double s, double t) { return Vector3(corner + s * u + t * v); });
+  return tests::grid_sheet(n, m, [&](double s, double t) { return Vector3(corner + s * u + t * v); });
 }
 
 /// Disc of the given radius as `rings` rings of 6 i triangles, polygon of 6 rings sides.
@@ -76,7 +62,7 @@ std::shared_ptr<const Domain> unit_box() {
 SurfaceMesh wavy(Random& random) {
   const double p = uniform(random, 0, 6), q = uniform(random, 0, 6);
   const Eigen::Quaterniond turn = Eigen::Quaterniond::UnitRandom();
-  return grid_sheet(12, 9, [&](double s, double t) {
+  return tests::grid_sheet(12, 9, [&](double s, double t) {
     return Vector3(turn * Vector3(0.8 * s - 0.4, 0.6 * t - 0.3, 0.08 * std::sin(5 * s + p) * std::cos(4 * t + q)) +
                    Vector3(0.5, 0.5, 0.5));
   });
@@ -407,7 +393,7 @@ TEST_CASE("The detour is the shortest clear way over the front", "[incision]") {
 TEST_CASE("From the face of a rough cut there is a detour over the front") {
   // What a blade leaves that is drawn in small steps while the tissue moves: bumps of 0.4 % of the width.
   const auto rough = [](double height) {
-    return grid_sheet(40, 40, [&](double s, double t) {
+    return tests::grid_sheet(40, 40, [&](double s, double t) {
       const bool bump = (std::lround(40 * s) * 7 + std::lround(40 * t) * 3) % 5 < 2;
       return Vector3(0.2 + 0.4 * s, 0.2 + 0.6 * t, 0.5 + (bump ? height : 0));
     });

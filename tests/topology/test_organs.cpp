@@ -15,8 +15,6 @@ using spherecut::tests::require_closed_sphere;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 double mean_edge(const SurfaceMesh& mesh) {
   double sum = 0;
   for (const Triangle& t : mesh.triangles)
@@ -46,7 +44,8 @@ TEST_CASE("A block coarser than itself is a cube of twelve triangles", "[organs]
 
 TEST_CASE("A cylinder's volume and area converge with the square of the edge", "[organs]") {
   const double radius = 0.04, height = 0.07;
-  const double exact_volume = pi * radius * radius * height, exact_area = 2 * pi * radius * (radius + height);
+  const double exact_volume = std::numbers::pi * radius * radius * height,
+               exact_area = 2 * std::numbers::pi * radius * (radius + height);
   double last_volume_error = 0, last_area_error = 0;
   for (const double edge : {0.02, 0.01, 0.005, 0.0025}) {
     const SurfaceMesh mesh = make_cylinder(radius, height, edge);
@@ -72,7 +71,8 @@ TEST_CASE("A cylinder's volume and area converge with the square of the edge", "
 
 TEST_CASE("A hemisphere's volume and area converge with the square of the edge", "[organs]") {
   const double radius = 0.05;
-  const double exact_volume = 2 * pi / 3 * std::pow(radius, 3), exact_area = 3 * pi * radius * radius;
+  const double exact_volume = 2 * std::numbers::pi / 3 * std::pow(radius, 3),
+               exact_area = 3 * std::numbers::pi * radius * radius;
   double last_volume_error = 0, last_area_error = 0;
   for (const double edge : {0.016, 0.008, 0.004, 0.002}) {
     const SurfaceMesh mesh = make_hemisphere(radius, edge);

@@ -11,8 +11,6 @@
 namespace spherecut::topology {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 struct Case {
   const char* name;
   ToolShape shape;
@@ -213,9 +211,11 @@ TEST_CASE("Tool meshes are closed, outward, on the tool, and hold its volume") {
   const double r = 0.006, s = 0.003, L = 0.02, R = 0.007;
   // The shaft leaves the tip where its cylinder meets the ball: tip + cylinder + half ball - the lens inside the tip.
   const double exit = std::sqrt(r * r - s * s), cap_height = r - exit;
-  const double cap = pi * cap_height * cap_height * (3 * r - cap_height) / 3;
-  const double scope_volume = 4 * pi / 3 * r * r * r - cap + pi * s * s * (L - exit) + 2 * pi / 3 * s * s * s;
-  const std::vector<double> volumes{4 * pi / 3 * R * R * R, pi * 0.006 * 0.006 * 0.015, scope_volume};
+  const double cap = std::numbers::pi * cap_height * cap_height * (3 * r - cap_height) / 3;
+  const double scope_volume = 4 * std::numbers::pi / 3 * r * r * r - cap + std::numbers::pi * s * s * (L - exit) +
+                              2 * std::numbers::pi / 3 * s * s * s;
+  const std::vector<double> volumes{4 * std::numbers::pi / 3 * R * R * R, std::numbers::pi * 0.006 * 0.006 * 0.015,
+                                    scope_volume};
   const std::vector<Case> all = cases();
   for (std::size_t i = 0; i < all.size(); ++i) {
     INFO(all[i].name);

@@ -18,8 +18,6 @@ using topology::voronoi_cells;
 
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
 struct Nodes {
   std::vector<Vector3> positions;
   std::vector<double> spacings;
@@ -203,9 +201,9 @@ TEST_CASE("Cells of a half ball converge in volume and area") {
     CHECK(cells.empty_cells == 0);
     CHECK(worst_closure(cells, nodes) < 1e-10);
     check_faces(cells, nodes);
-    volume_error.push_back(std::abs(total_volume(cells) / (2 * pi / 3) - 1));
-    area_error.push_back(std::abs(curved_area(cells) / (2 * pi) - 1));
-    const double base = std::abs(planar_area(cells, 0) / pi - 1);
+    volume_error.push_back(std::abs(total_volume(cells) / (2 * std::numbers::pi / 3) - 1));
+    area_error.push_back(std::abs(curved_area(cells) / (2 * std::numbers::pi) - 1));
+    const double base = std::abs(planar_area(cells, 0) / std::numbers::pi - 1);
     CHECK(base < 0.1 * h * h);
     for (const BoundaryFace& face : cells.boundary)
       if (face.plane < 0) {
@@ -228,9 +226,9 @@ TEST_CASE("Cells of a cylinder converge in volume and keep its planar ends") {
     CHECK(cells.empty_cells == 0);
     CHECK(worst_closure(cells, nodes) < 1e-10);
     check_faces(cells, nodes);
-    error.push_back(std::abs(total_volume(cells) / (pi * 0.05 * 0.05 * 0.08) - 1));
+    error.push_back(std::abs(total_volume(cells) / (std::numbers::pi * 0.05 * 0.05 * 0.08) - 1));
     for (int end : {0, 1})
-      CHECK(planar_area(cells, end) == Approx(pi * 0.05 * 0.05).epsilon(0.05 * h * h / (0.05 * 0.05)));
+      CHECK(planar_area(cells, end) == Approx(std::numbers::pi * 0.05 * 0.05).epsilon(0.05 * h * h / (0.05 * 0.05)));
   }
   CHECK(error[0] < 0.01);
   CHECK(error[1] < 0.3 * error[0]);

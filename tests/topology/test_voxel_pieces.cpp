@@ -26,7 +26,7 @@ struct Body {
 };
 
 /// Half-open boxes of voxel centres tile a block exactly: 50 x 40 x 30 mm with voxels of 1 mm, shifted by 0.4 mm.
-const Body& block() {
+const Body& block_body() {
   static const Body body(make_block(Vector3(0.0004, 0.0004, 0.0004), Vector3(0.0504, 0.0404, 0.0304), 0.005));
   return body;
 }
@@ -36,20 +36,20 @@ const Body& block() {
 TEST_CASE("Whole, slit and severed bodies are counted by flooding voxels", "[voxel_pieces]") {
   const double volume = 0.05 * 0.04 * 0.03;
   const Vector3 normal = Vector3(1, 0.3, 0.2).normalized(), centre(0.0204, 0.0203, 0.0151);
-  const VoxelPieces whole = block().cut({});
+  const VoxelPieces whole = block_body().cut({});
   REQUIRE(whole.volumes.size() == 1);
   CHECK(whole.volumes[0] == Approx(volume));
   // A buried disc and an edge cut leave one piece.
-  CHECK(block().cut({make_disc_sheet(centre, normal, 0.01, 0.002)}).volumes.size() == 1);
+  CHECK(block_body().cut({make_disc_sheet(centre, normal, 0.01, 0.002)}).volumes.size() == 1);
   const Vector3 up(0, 0, 1);
-  CHECK(
-      block().cut({make_rectangle_sheet(centre + Vector3(0, 0.01, 0), normal, up, 0.08, 0.06, 0.004)}).volumes.size() ==
-      2);
-  CHECK(block()
+  CHECK(block_body()
+            .cut({make_rectangle_sheet(centre + Vector3(0, 0.01, 0), normal, up, 0.08, 0.06, 0.004)})
+            .volumes.size() == 2);
+  CHECK(block_body()
             .cut({make_rectangle_sheet(centre + Vector3(0, 0.015, 0), normal, up, 0.04, 0.06, 0.004)})
             .volumes.size() == 1);
   // Through: the volume left of the tilted plane through `centre` is that of a prism.
-  const VoxelPieces halves = block().cut({make_rectangle_sheet(centre, normal, up, 0.08, 0.08, 0.004)});
+  const VoxelPieces halves = block_body().cut({make_rectangle_sheet(centre, normal, up, 0.08, 0.08, 0.004)});
   REQUIRE(halves.volumes.size() == 2);
   const Vector3 middle(0.0254, 0.0204, 0.0154); // of the block: at mean y and z the plane is at this x
   const double x = centre.x() - ((middle - centre).tail<2>().dot(normal.tail<2>())) / normal.x();
@@ -59,13 +59,13 @@ TEST_CASE("Whole, slit and severed bodies are counted by flooding voxels", "[vox
   CHECK(std::accumulate(halves.volumes.begin(), halves.volumes.end(), halves.crumbs) == Approx(volume));
   // Two crossing cuts leave four pieces.
   const Vector3 across = normal.cross(up).normalized();
-  CHECK(block()
+  CHECK(block_body()
             .cut({make_rectangle_sheet(centre, normal, up, 0.09, 0.09, 0.004),
                   make_rectangle_sheet(centre, across, up, 0.09, 0.09, 0.004)})
             .volumes.size() == 4);
   // A closed sheet sets its inside free.
   const SurfaceMesh bubble = make_block(Vector3(0.0151, 0.0152, 0.0103), Vector3(0.0252, 0.0254, 0.0207), 0.002);
-  const VoxelPieces freed = block().cut({bubble});
+  const VoxelPieces freed = block_body().cut({bubble});
   REQUIRE(freed.volumes.size() == 2);
   CHECK(freed.volumes[1] == Approx(std::abs(topology::volume(bubble))).epsilon(0.08));
 }
@@ -78,7 +78,7 @@ TEST_CASE("A bridge of two voxels beside a cut keeps the halves one piece", "[vo
   for (const Vector3& x : sheet.vertices)
     far = std::max(far, x.y());
   CHECK(0.0404 - far == Approx(0.0025));
-  CHECK(block().cut({sheet}).volumes.size() == 1);
+  CHECK(block_body().cut({sheet}).volumes.size() == 1);
 }
 
 TEST_CASE("A liver cut across is two pieces whose volumes add up to it", "[voxel_pieces]") {

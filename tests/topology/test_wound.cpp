@@ -20,7 +20,7 @@ using spherecut::tests::grid_sheet;
 namespace {
 
 /// 100 x 60 x 40 mm on z = 0, edges of 10 mm on a lattice.
-SurfaceMesh block() {
+SurfaceMesh block_surface() {
   return make_block({0.1, 0.06, 0.04}, 0.01);
 }
 
@@ -96,7 +96,7 @@ TEST_CASE("A cut from the top opens a rim and two walls, and leaves one sphere",
   const bool turned = GENERATE(false, true);
   // Plane x = 3 mm (off the lattice), 30 mm wide, 25 mm deep from the top.
   const auto sheet = flat_sheet({0.003, -0.015, 0.015}, {0, 0.03, 0}, {0, 0, 0.05}, 15, 20);
-  const Cut result = cut(block(), placed({sheet}, turned));
+  const Cut result = cut(block_surface(), placed({sheet}, turned));
   const Wound& wound = result.wound;
   REQUIRE(wound.components.size() == 1);
   CHECK(wound.components[0].euler == 2);
@@ -126,7 +126,7 @@ TEST_CASE("A cut from the top opens a rim and two walls, and leaves one sphere",
 TEST_CASE("A cut through the block leaves two pieces with exact volumes", "[wound]") {
   const bool turned = GENERATE(false, true);
   const auto sheet = flat_sheet({0.013, -0.05, -0.03}, {0, 0.1, 0}, {0, 0, 0.1}, 8, 9);
-  const Cut result = cut(block(), placed({sheet}, turned));
+  const Cut result = cut(block_surface(), placed({sheet}, turned));
   REQUIRE(result.wound.pieces.size() == 2);
   REQUIRE(result.wound.components.size() == 2);
   for (const WoundComponent& component : result.wound.components)
@@ -141,7 +141,7 @@ TEST_CASE("A cut through the block leaves two pieces with exact volumes", "[woun
 TEST_CASE("Wedge off a corner: the plane's exact volume", "[wound]") {
   // Plane through (0.05, y, 0.01), (0.02, y, 0.04): prism of triangle 30 x 30 mm.
   const auto sheet = flat_sheet({0.06, -0.04, 0}, {0, 0.08, 0}, {-0.06, 0, 0.06}, 7, 11);
-  const Cut result = cut(block(), {sheet});
+  const Cut result = cut(block_surface(), {sheet});
   REQUIRE(result.wound.pieces.size() == 2);
   CHECK(result.volumes[0] == Approx(0.5 * 0.03 * 0.03 * 0.06).epsilon(1e-12));
 }
@@ -149,7 +149,7 @@ TEST_CASE("Wedge off a corner: the plane's exact volume", "[wound]") {
 TEST_CASE("A buried sheet is a cavity of no volume in the same piece", "[wound]") {
   const int columns = GENERATE(1, 2, 6);
   const auto sheet = flat_sheet({-0.012, -0.009, 0.0173}, {0.02, 0.003, 0.001}, {0.002, 0.02, 0.004}, columns, columns);
-  const Cut result = cut(block(), {sheet});
+  const Cut result = cut(block_surface(), {sheet});
   const Wound& wound = result.wound;
   REQUIRE(wound.components.size() == 2);
   REQUIRE(wound.pieces.size() == 1);
@@ -166,7 +166,7 @@ TEST_CASE("A buried sheet is a cavity of no volume in the same piece", "[wound]"
 
 TEST_CASE("A buried sheet of a single triangle is cut as well", "[wound]") {
   const SurfaceMesh sheet{{{0.001, 0.002, 0.01}, {0.021, 0.003, 0.012}, {0.004, 0.018, 0.019}}, {{0, 1, 2}}};
-  const Cut result = cut(block(), {sheet});
+  const Cut result = cut(block_surface(), {sheet});
   REQUIRE(result.wound.components.size() == 2);
   CHECK(walls(result.wound) == 6);
 }
@@ -176,7 +176,7 @@ TEST_CASE("Pieces own the cavities inside them", "[wound]") {
   const auto through = flat_sheet({0.013, -0.05, -0.03}, {0, 0.1, 0}, {0, 0, 0.1}, 3, 3);
   const auto left = flat_sheet({-0.03, -0.01, 0.021}, {0.01, 0, 0}, {0, 0.01, 0.001}, 2, 2);
   const auto right = flat_sheet({0.02, -0.01, 0.021}, {0.02, 0, 0}, {0, 0.02, 0.001}, 3, 3);
-  const Wound wound = cut(block(), {through, left, right}).wound;
+  const Wound wound = cut(block_surface(), {through, left, right}).wound;
   REQUIRE(wound.pieces.size() == 2);
   for (int t = 0; t < std::ssize(wound.part); ++t) {
     Vector3 middle = Vector3::Zero();
@@ -195,7 +195,7 @@ TEST_CASE("A curved sheet cuts like a flat one", "[wound]") {
     const double y = -0.04 + 0.08 * s, z = 0.012 + 0.05 * t;
     return Vector3(0.0031 + 0.01 * std::sin(60 * y) + 0.004 * std::sin(90 * z), y, z);
   });
-  const Cut partial = cut(block(), {sheet});
+  const Cut partial = cut(block_surface(), {sheet});
   REQUIRE(partial.wound.components.size() == 1);
   CHECK(partial.wound.components[0].euler == 2);
 }
@@ -203,7 +203,7 @@ TEST_CASE("A curved sheet cuts like a flat one", "[wound]") {
 TEST_CASE("A path that turns: two sheets joined in a corner act as one", "[wound]") {
   const auto first = flat_sheet({-0.0213, 0.0021, 0.0117}, {0.03, 0, 0}, {0, 0, 0.04}, 10, 12);
   const auto second = flat_sheet({0.0087, 0.0021, 0.0117}, {0, 0.02, 0}, {0, 0, 0.04}, 7, 12);
-  const Wound wound = cut(block(), {first, second}).wound;
+  const Wound wound = cut(block_surface(), {first, second}).wound;
   REQUIRE(wound.components.size() == 1);
   CHECK(wound.components[0].euler == 2);
   // Along the corner inside, each point has one copy in the corner and one around it.
@@ -218,7 +218,7 @@ TEST_CASE("Two cuts that cross leave four pieces when through, and four copies a
   const bool turned = GENERATE(false, true);
   const auto first = flat_sheet({0.013, -0.06, -0.04}, {0, 0.12, 0}, {0, 0, 0.12}, 8, 9);
   const auto second = flat_sheet({-0.09, 0.0072, -0.04}, {0.18, 0, 0}, {0, 0, 0.12}, 12, 7);
-  const Cut result = cut(block(), placed({first, second}, turned));
+  const Cut result = cut(block_surface(), placed({first, second}, turned));
   REQUIRE(result.wound.pieces.size() == 4);
   for (const WoundComponent& component : result.wound.components)
     CHECK(component.euler == 2);
@@ -238,7 +238,7 @@ TEST_CASE("Two partial cuts that cross leave one piece", "[wound]") {
   const bool turned = GENERATE(false, true);
   const auto first = flat_sheet({0.013, -0.013, 0.011}, {0, 0.03, 0}, {0, 0, 0.05}, 8, 9);
   const auto second = flat_sheet({-0.02, 0.0072, 0.0163}, {0.05, 0, 0}, {0, 0, 0.05}, 12, 7);
-  const Wound wound = cut(block(), placed({first, second}, turned)).wound;
+  const Wound wound = cut(block_surface(), placed({first, second}, turned)).wound;
   REQUIRE(wound.components.size() == 1);
   CHECK(wound.components[0].euler == 2);
 }
@@ -261,7 +261,7 @@ TEST_CASE("A closed sheet from the top cuts out a core", "[wound]") {
   };
   const double base = 0.5 * sides * radius * radius * std::sin(2 * std::numbers::pi / sides);
   SECTION("through") {
-    const Cut result = cut(block(), {tube(-0.01)});
+    const Cut result = cut(block_surface(), {tube(-0.01)});
     REQUIRE(result.wound.pieces.size() == 2);
     CHECK(result.volumes[0] == Approx(base * 0.04).epsilon(1e-12));
     const bool first_is_core = result.wound.components[0].volume < result.wound.components[1].volume;
@@ -269,7 +269,7 @@ TEST_CASE("A closed sheet from the top cuts out a core", "[wound]") {
     CHECK(result.wound.components[first_is_core ? 1 : 0].euler == 0); // a ring
   }
   SECTION("partial") {
-    const Cut result = cut(block(), {tube(0.0113)});
+    const Cut result = cut(block_surface(), {tube(0.0113)});
     REQUIRE(result.wound.pieces.size() == 1);
     CHECK(result.wound.components[0].euler == 2); // one side through the core, one around it
   }
@@ -280,7 +280,7 @@ TEST_CASE("A closed buried sheet cuts out an inner piece", "[wound]") {
   sheet = tests::moved(sheet, [](const Vector3& x) -> Vector3 {
     return Eigen::AngleAxisd(0.4, Vector3(1, 2, 3).normalized()) * x + Vector3(0.001, 0.002, 0.013);
   });
-  const Cut result = cut(block(), {sheet});
+  const Cut result = cut(block_surface(), {sheet});
   REQUIRE(result.wound.components.size() == 3);
   REQUIRE(result.wound.pieces.size() == 2);
   CHECK(result.volumes[0] == Approx(0.02 * 0.015 * 0.01).epsilon(1e-9));
@@ -293,13 +293,13 @@ TEST_CASE("A closed buried sheet cuts out an inner piece", "[wound]") {
 TEST_CASE("Cutting in the same place again changes nothing", "[wound]") {
   const bool turned = GENERATE(false, true);
   const auto sheet = placed({flat_sheet({0.003, -0.015, 0.015}, {0, 0.03, 0}, {0, 0, 0.05}, 15, 20)}, turned)[0];
-  const Wound once = cut(block(), {sheet}).wound;
-  const Wound twice = cut(block(), {sheet, sheet}).wound;
+  const Wound once = cut(block_surface(), {sheet}).wound;
+  const Wound twice = cut(block_surface(), {sheet, sheet}).wound;
   CHECK(surface_hash(once.surface) == surface_hash(twice.surface));
   SurfaceMesh reversed = sheet;
   for (Triangle& t : reversed.triangles)
     std::swap(t[1], t[2]);
-  const Wound back = cut(block(), {sheet, reversed}).wound;
+  const Wound back = cut(block_surface(), {sheet, reversed}).wound;
   CHECK(surface_hash(once.surface) == surface_hash(back.surface));
   CHECK(walls(once) == walls(back));
 }
@@ -308,7 +308,7 @@ TEST_CASE("A coplanar overlap counts once", "[wound]") {
   // Same plane, other steps, half a step further: the union of both rectangles is cut.
   const auto first = flat_sheet({0.003, -0.0151, 0.0153}, {0, 0.02, 0}, {0, 0, 0.05}, 5, 7);
   const auto second = flat_sheet({0.003, -0.0037, 0.0113}, {0, 0.02, 0}, {0, 0, 0.05}, 6, 9);
-  const Wound wound = cut(block(), {first, second}).wound;
+  const Wound wound = cut(block_surface(), {first, second}).wound;
   const double overlap = (0.0049 - -0.0037) * 0.0247;
   CHECK(wall_area(wound, WoundPart::wall_plus) == Approx(0.02 * 0.0247 + 0.02 * 0.0287 - overlap));
   REQUIRE(wound.components.size() == 1);
@@ -319,39 +319,39 @@ TEST_CASE("Sheets through vertices and along edges of the organ's mesh", "[wound
   // Lattice planes of the block: x = 0 lies in a row of edges, and z = 0.01 ends the sheet on a row of vertices.
   SECTION("partial, front ends at vertices") {
     const auto sheet = flat_sheet({0, -0.02, 0.01}, {0, 0.04, 0}, {0, 0, 0.03}, 4, 3);
-    const Wound wound = cut(block(), {sheet}).wound;
+    const Wound wound = cut(block_surface(), {sheet}).wound;
     CHECK(wound.components.size() == 1);
     CHECK(wall_area(wound, WoundPart::wall_plus) == Approx(0.04 * 0.03));
   }
   SECTION("through along edges") {
     const auto sheet = flat_sheet({0, -0.03, 0}, {0, 0.06, 0}, {0, 0, 0.04}, 6, 4);
-    const Cut result = cut(block(), {sheet});
+    const Cut result = cut(block_surface(), {sheet});
     REQUIRE(result.wound.pieces.size() == 2);
     CHECK(result.volumes[0] == Approx(0.5 * block_volume).epsilon(1e-12));
   }
   SECTION("through the diagonal") {
     const auto sheet = flat_sheet({-0.03, -0.03, -0.01}, {0.06, 0.06, 0}, {0, 0, 0.06}, 6, 6);
-    const Cut result = cut(block(), {sheet});
+    const Cut result = cut(block_surface(), {sheet});
     REQUIRE(result.wound.pieces.size() == 2);
     CHECK(result.volumes[0] == Approx(0.5 * block_volume).epsilon(1e-12));
   }
   SECTION("front touches the far face from within") {
     const auto sheet = flat_sheet({0.003, -0.02, 0}, {0, 0.04, 0}, {0, 0, 0.05}, 4, 5);
-    const Cut result = cut(block(), {sheet});
+    const Cut result = cut(block_surface(), {sheet});
     // Cut down to the base on a line: a slit through, but the block still holds on both sides.
     CHECK(result.wound.pieces.size() == 1);
     CHECK(result.wound.components[0].euler == 0);
   }
   SECTION("wider than the slit") {
     const auto sheet = flat_sheet({0.003, -0.03, 0}, {0, 0.06, 0}, {0, 0, 0.05}, 4, 5);
-    const Cut result = cut(block(), {sheet});
+    const Cut result = cut(block_surface(), {sheet});
     REQUIRE(result.wound.pieces.size() == 2);
     CHECK(result.volumes[0] == Approx(0.047 * 0.06 * 0.04).epsilon(1e-12));
   }
 }
 
 TEST_CASE("Blades that only touch, lie in the surface or miss cut nothing", "[wound]") {
-  const SurfaceMesh organ = block();
+  const SurfaceMesh organ = block_surface();
   const std::vector<SurfaceMesh> idle = {
       flat_sheet({-0.02, -0.01, 0.04}, {0.03, 0, 0}, {0, 0.02, 0}, 5, 3),    // in the top
       flat_sheet({-0.083, -0.05, 0.04}, {0.17, 0, 0}, {0, 0.1, 0}, 3, 2),    // in the plane of the top, beyond it
@@ -369,7 +369,7 @@ TEST_CASE("Blades that only touch, lie in the surface or miss cut nothing", "[wo
 TEST_CASE("A grazing plane shaves off what lies above it", "[wound]") {
   const double depth = GENERATE(1e-3, 1e-6, 1e-9, 1e-12);
   const auto sheet = flat_sheet({-0.06, -0.04, 0.04 - depth}, {0.12, 0, 0}, {0, 0.08, 0}, 7, 5);
-  const Cut result = cut(block(), {sheet});
+  const Cut result = cut(block_surface(), {sheet});
   REQUIRE(result.wound.pieces.size() == 2);
   CHECK(result.volumes[0] == Approx(0.1 * 0.06 * (0.04 - (0.04 - depth))).epsilon(1e-2).margin(1e-17));
 }
@@ -381,7 +381,7 @@ TEST_CASE("A sheet that crosses itself parts material on all sides", "[wound]") 
     return Vector3(0.003 + 0.012 * std::cos(a) * (1 - 0.4 * s), 0.001 + 0.012 * std::sin(a) + 0.006 * s,
                    0.0071 + 0.05 * t);
   });
-  const Wound wound = cut(block(), {sheet}).wound;
+  const Wound wound = cut(block_surface(), {sheet}).wound;
   CHECK(wound.pieces.size() == 1); // the loop holds at the bottom
   CHECK(wound.components[0].euler == 2);
 }
@@ -422,7 +422,7 @@ TEST_CASE("Growing step by step gives the surface of the cut at once", "[wound]"
 
 TEST_CASE("Growth severs a piece at the increment that passes through", "[wound]") {
   const SurfaceMesh whole = flat_sheet({0.0137, -0.041, -0.013}, {0, 0.082, 0}, {0, 0, 0.07}, 41, 6);
-  IncrementalWound growing(block());
+  IncrementalWound growing(block_surface());
   for (int c = 1; c <= 41; ++c) {
     SurfaceMesh part = whole;
     part.triangles.resize(2 * 6 * c);
@@ -434,7 +434,7 @@ TEST_CASE("Growth severs a piece at the increment that passes through", "[wound]
 
 TEST_CASE("Refused input leaves the wound as it was", "[wound]") {
   const auto sheet = flat_sheet({0.003, -0.015, 0.015}, {0, 0.03, 0}, {0, 0, 0.05}, 5, 5);
-  IncrementalWound wound(block());
+  IncrementalWound wound(block_surface());
   wound.grow({sheet});
   const std::uint64_t before = surface_hash(wound.wound().surface);
   SurfaceMesh bad = sheet;
@@ -446,10 +446,10 @@ TEST_CASE("Refused input leaves the wound as it was", "[wound]") {
   CHECK_THROWS_AS(wound.grow({}), InputError);
   CHECK_THROWS_AS(wound.grow({tests::moved(sheet, [](const Vector3& x) -> Vector3 { return 1.1 * x; })}), InputError);
   CHECK(surface_hash(wound.wound().surface) == before);
-  SurfaceMesh open = block();
+  SurfaceMesh open = block_surface();
   open.triangles.pop_back();
   CHECK_THROWS_AS(cut_surface(open, {sheet}), InputError);
-  SurfaceMesh inward = block();
+  SurfaceMesh inward = block_surface();
   for (Triangle& t : inward.triangles)
     std::swap(t[0], t[1]);
   CHECK_THROWS_AS(cut_surface(inward, {sheet}), InputError);
@@ -457,8 +457,8 @@ TEST_CASE("Refused input leaves the wound as it was", "[wound]") {
 
 TEST_CASE("Triangles without area in a sheet are left out", "[wound]") {
   SurfaceMesh sheet = flat_sheet({0.003, -0.015, 0.015}, {0, 0.03, 0}, {0, 0, 0.05}, 5, 5);
-  const std::uint64_t plain = surface_hash(cut(block(), {sheet}).wound.surface);
+  const std::uint64_t plain = surface_hash(cut(block_surface(), {sheet}).wound.surface);
   sheet.triangles.push_back({0, 0, 1});
   sheet.triangles.push_back({0, 1, 2});
-  CHECK(surface_hash(cut(block(), {sheet}).wound.surface) == plain);
+  CHECK(surface_hash(cut(block_surface(), {sheet}).wound.surface) == plain);
 }

@@ -301,3 +301,28 @@ TEST_CASE("More clients than allowed are turned away until one goes") {
   CHECK(soon([&] { return server.closed == 1; }));
   CHECK(WebSocketClient(server.port()).open());
 }
+
+TEST_CASE("A server that ends while clients come in leaves none of them hanging") {
+  WebServerOptions options;
+  options.tick = std::chrono::milliseconds(1);
+  for (int round = 0; round < 40; ++round) {
+    auto server = std::make_unique<TestServer>(options);
+    const int port = server->port();
+    std::atomic<bool> ended{false};
+    std::vector<std::thread> visitors;
+    for (int k = 0; k < 2; ++k)
+      visitors.emplace_back([&] {
+        while (!ended)
+          try {
+            const WebSocketClient client(port);
+          } catch (const std::exception&) { // refused: the server is gone
+            std::this_thread::yield();
+          }
+      });
+    CHECK(soon([&] { return server->opened > round % 4; }));
+    server.reset();
+    ended = true;
+    for (std::thread& visitor : visitors)
+      visitor.join();
+  }
+}
