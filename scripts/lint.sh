@@ -109,7 +109,8 @@ check_unit() { # CACHE BUILD KEY UNIT SETTINGS
 }
 export -f check_unit
 if [ ${#pending[@]} -gt 0 ]; then
-  printf '%s\n' "${pending[@]}" | xargs -P "$jobs" -L 1 bash -c 'check_unit "$@"' lint "$cache" "$build" || status=1
+  # Those that the analyzer looks at take longest and come first.
+  printf '%s\n' "${pending[@]}" | LC_ALL=C sort -k 3,3r -k 2,2 | xargs -P "$jobs" -L 1 bash -c 'check_unit "$@"' lint "$cache" "$build" || status=1
 fi
 if [ "$status" = 0 ]; then printf 'lint: clean\n'; else printf 'lint: see above\n' >&2; fi
 exit "$status"

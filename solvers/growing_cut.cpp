@@ -224,17 +224,106 @@ GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
   return report;
 }
 
+/// What an increment would change, before any cell is evaluated. Throws InputError where it names nodes that are not
+/// there.
+GrowingCut::State::Increment
+GrowingCut::State::increment(const NodeChange& change,
+                             const std::shared_ptr<const topology::Incision>& incision) const {
+  if (incision == nullptr)
+    throw InputError("a growing cut needs an incision");
+  for (int node : change.removed)
+    if (node < 0 || node >= problem.nodes.size() || removed[node] != 0)
+      throw InputError(fmt::format("node {} cannot be removed: it is not there", node));
+
+  Increment increment;
+  Problem& next = increment.next = problem;
+  std::vector<char>& gone = increment.removed = removed;
+  for (int node : change.removed) {
+    gone[node] = 1;
+    next.nodes.kinds[node] = NodeKind::interior; // it has no share of the surface any more
+  }
+  for (int k = 0; k < change.added.size(); ++k)
+    next.nodes.add(change.added.positions[k], change.added.spacings[k], change.added.kinds[k], change.added.normals[k]);
+  gone.resize(next.nodes.size(), 0);
+  const topology::Incision* const before = problem.incision.get();
+  next.incision = incision;
+  if (change.prescribed)
+    next.prescribed = *change.prescribed;
+  if (change.loads)
+    next.loads = *change.loads;
+  for (const Prescribed& entry : next.prescribed)
+    if (entry.node < 0 || entry.node >= next.nodes.size() || gone[entry.node] != 0)
+      throw InputError(fmt::format("node {} is prescribed; the cut cannot remove it", entry.node));
+  const auto uncovered = [&](const char* why) {
+    increment.uncovered = why;
+    return std::move(increment);
+  };
+  if (!continues(before, *incision))
+    return uncovered("the sheets do not continue those before");
+  if (next_room + change.added.size() > window->contact_begin() / 3)
+    return uncovered("no room for the added nodes");
+  for (int node : change.removed)
+    if (slot[node] < 0)
+      return uncovered("a removed node lies outside the window");
+
+  const Stopwatch sphere_watch;
+  const std::vector<double>& old_radii = spheres->radii();
+  increment.spheres =
+      std::make_unique<Spheres>(next.nodes.positions, next.nodes.spacings, rho, Basis::linear, worst_moment_condition,
+                                sight_about_cut(next, options.method.sight), gone);
+  std::vector<double> radii = increment.spheres->radii();
+  std::vector<int> changed_nodes = change.removed;
+  for (int i = 0; i < next.nodes.size(); ++i)
+    if (i >= std::ssize(old_radii) || (gone[i] == 0 && old_radii[i] != radii[i]))
+      changed_nodes.push_back(i);
+  increment.spheres_seconds = sphere_watch.seconds();
+
+  const double finest = *std::min_element(next.nodes.spacings.begin(), next.nodes.spacings.end());
+  const double slack = 0.25 * finest;
+  const Changes& changes = increment.changes =
+      changes_between(before, SpacingAt(problem.nodes, removed), *incision, SpacingAt(next.nodes, gone), 2 * slack);
+  for (std::size_t i = 0; i < old_radii.size(); ++i)
+    radii[i] = std::max(radii[i], old_radii[i]);
+  BoundingBox touched{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
+  const auto include = [&](const Vector3& x, double reach) {
+    touched.lower = touched.lower.cwiseMin((x.array() - reach).matrix());
+    touched.upper = touched.upper.cwiseMax((x.array() + reach).matrix());
+  };
+  const double largest = *std::max_element(radii.begin(), radii.end());
+  for (const Vector3& x : changes.faces)
+    include(x, largest);
+  for (const Vector3& x : changes.front)
+    include(x, largest * std::max(1.0, enrichment_reach()));
+  std::vector<Vector3> all_front = changes.front;
+  add_front(before, 2 * slack, all_front);
+  add_front(incision.get(), 2 * slack, all_front);
+  increment.reach.emplace(changes.faces, changes.front, all_front, enrichment_reach(), next.nodes.positions, radii,
+                          slack);
+  for (int i : changed_nodes) {
+    increment.balls.emplace_back(next.nodes.positions[i], radii[i]);
+    include(next.nodes.positions[i], radii[i]);
+  }
+  for (int b = 0; b < std::ssize(boxes); ++b) {
+    const BackgroundBox& leaf = boxes[b].box;
+    if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
+        ((touched.upper - leaf.centre).array() < -leaf.half.array()).any() ||
+        !increment.concerns(leaf.centre, leaf.half.norm(), enrichment_reach()))
+      continue;
+    if (boxes[b].cells.empty())
+      return uncovered("the cut left the predicted way");
+    for (int k = 0; k < change.added.size(); ++k)
+      if (is_too_large(leaf, change.added.positions[k], change.added.spacings[k], background()))
+        return uncovered("the added nodes are finer than the cells");
+    increment.boxes.push_back(b);
+  }
+  return increment;
+}
+
 GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
                               const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) {
   const Stopwatch total;
   GrowthReport report;
   State& s = *state_;
-  if (incision == nullptr)
-    throw InputError("a growing cut needs an incision");
-  for (int node : change.removed)
-    if (node < 0 || node >= s.problem.nodes.size() || s.removed[node] != 0)
-      throw InputError(fmt::format("node {} cannot be removed: it is not there", node));
-
   const auto anew = [&](const char* reason, Problem problem, std::vector<char> removed, bool is_overwritten = false) {
     report.reason = reason;
     if (only_update && !is_overwritten) {
@@ -254,98 +343,23 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     return report;
   };
 
-  Problem next = s.problem;
-  std::vector<char> removed = s.removed;
-  for (int node : change.removed) {
-    removed[node] = 1;
-    next.nodes.kinds[node] = NodeKind::interior; // it has no share of the surface any more
-  }
-  for (int k = 0; k < change.added.size(); ++k)
-    next.nodes.add(change.added.positions[k], change.added.spacings[k], change.added.kinds[k], change.added.normals[k]);
-  removed.resize(next.nodes.size(), 0);
-  const std::shared_ptr<const topology::Incision> before = s.problem.incision;
-  next.incision = incision;
-  if (change.prescribed)
-    next.prescribed = *change.prescribed;
-  if (change.loads)
-    next.loads = *change.loads;
-  for (const Prescribed& entry : next.prescribed)
-    if (entry.node < 0 || entry.node >= next.nodes.size() || removed[entry.node] != 0)
-      throw InputError(fmt::format("node {} is prescribed; the cut cannot remove it", entry.node));
-  if (!continues(before.get(), *incision))
-    return anew("the sheets do not continue those before", std::move(next), std::move(removed));
-  if (s.next_room + change.added.size() > s.window->contact_begin() / 3)
-    return anew("no room for the added nodes", std::move(next), std::move(removed));
-  for (int node : change.removed)
-    if (s.slot[node] < 0)
-      return anew("a removed node lies outside the window", std::move(next), std::move(removed));
-
-  // New spheres; the state changes only when all touched cells are known to lie in the window.
-  const Stopwatch sphere_watch;
-  const std::vector<double> old_radii = s.spheres->radii();
-  auto fresh_spheres =
-      std::make_unique<Spheres>(next.nodes.positions, next.nodes.spacings, s.rho, Basis::linear, worst_moment_condition,
-                                sight_about_cut(next, s.options.method.sight), removed);
-  std::vector<int> changed_nodes = change.removed;
-  for (int i = 0; i < next.nodes.size(); ++i)
-    if (i >= std::ssize(old_radii) || (removed[i] == 0 && old_radii[i] != fresh_spheres->radii()[i]))
-      changed_nodes.push_back(i);
-  report.spheres_seconds = sphere_watch.seconds();
-
   const Stopwatch cell_watch;
-  const double finest = *std::min_element(next.nodes.spacings.begin(), next.nodes.spacings.end());
-  const double slack = 0.25 * finest;
-  const Changes changes = changes_between(before.get(), SpacingAt(s.problem.nodes, s.removed), *incision,
-                                          SpacingAt(next.nodes, removed), 2 * slack);
+  State::Increment increment = s.increment(change, incision);
+  report.spheres_seconds = increment.spheres_seconds;
+  Problem& next = increment.next;
+  std::vector<char>& removed = increment.removed;
+  std::unique_ptr<Spheres>& fresh_spheres = increment.spheres;
+  const Changes& changes = increment.changes;
+  const std::vector<int>& touched_boxes = increment.boxes;
+  if (increment.uncovered != nullptr)
+    return anew(increment.uncovered, std::move(next), std::move(removed));
+
+  // The state changes only when all touched cells are known to lie in the window.
+  const char* outside = nullptr;
   std::vector<int> new_slot = s.slot;
   for (int k = 0; k < change.added.size(); ++k)
     new_slot.push_back(s.next_room + k);
   std::vector<std::pair<int, State::Box>> exchanged;
-  BoundingBox touched{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
-  const auto include = [&](const Vector3& x, double reach) {
-    touched.lower = touched.lower.cwiseMin((x.array() - reach).matrix());
-    touched.upper = touched.upper.cwiseMax((x.array() + reach).matrix());
-  };
-  const double largest = std::max(*std::max_element(old_radii.begin(), old_radii.end()),
-                                  *std::max_element(fresh_spheres->radii().begin(), fresh_spheres->radii().end()));
-  for (const Vector3& x : changes.faces)
-    include(x, largest);
-  for (const Vector3& x : changes.front)
-    include(x, largest * std::max(1.0, s.enrichment_reach()));
-  std::vector<double> radii = fresh_spheres->radii();
-  for (std::size_t i = 0; i < old_radii.size(); ++i)
-    radii[i] = std::max(radii[i], old_radii[i]);
-  std::vector<Vector3> all_front = changes.front;
-  add_front(before.get(), 2 * slack, all_front);
-  add_front(incision.get(), 2 * slack, all_front);
-  const Reach reach(changes.faces, changes.front, all_front, s.enrichment_reach(), next.nodes.positions, radii, slack);
-  std::vector<std::pair<Vector3, double>> balls;
-  for (int i : changed_nodes) {
-    const double radius = std::max(i < std::ssize(old_radii) ? old_radii[i] : 0.0, fresh_spheres->radii()[i]);
-    balls.emplace_back(next.nodes.positions[i], radius);
-    include(next.nodes.positions[i], radius);
-  }
-  const char* outside = nullptr;
-  std::vector<int> touched_boxes;
-  for (int b = 0; b < std::ssize(s.boxes); ++b) {
-    const BackgroundBox& leaf = s.boxes[b].box;
-    if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
-        ((touched.upper - leaf.centre).array() < -leaf.half.array()).any())
-      continue;
-    const double half = leaf.half.norm();
-    const bool is_touched =
-        reach.sees(leaf.centre, half) || reach.near_front(leaf.centre, half, std::max(1.0, s.enrichment_reach())) ||
-        std::any_of(balls.begin(), balls.end(),
-                    [&](const auto& ball) { return (ball.first - leaf.centre).norm() < ball.second + half; });
-    if (!is_touched)
-      continue;
-    if (s.boxes[b].cells.empty())
-      return anew("the cut left the predicted way", std::move(next), std::move(removed));
-    for (int k = 0; k < change.added.size(); ++k)
-      if (is_too_large(leaf, change.added.positions[k], change.added.spacings[k], s.background()))
-        return anew("the added nodes are finer than the cells", std::move(next), std::move(removed));
-    touched_boxes.push_back(b);
-  }
   std::vector<State::Box> fresh_boxes(touched_boxes.size());
   {
     const SharedSightTime shared_sight;
@@ -371,11 +385,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   // The same for means over the surface: those whose points see the change have new weights, and where the faces or
   // surface nodes come near the shares themselves are new.
   const auto is_near = [&](const DisplacementMean& mean) {
-    const double share = 0.5 * s.radius_at(mean.centroid);
-    return reach.sees(mean.centroid, share) ||
-           reach.near_front(mean.centroid, share, std::max(1.0, s.enrichment_reach())) ||
-           std::any_of(balls.begin(), balls.end(),
-                       [&](const auto& ball) { return (ball.first - mean.centroid).norm() < ball.second + share; });
+    return increment.concerns(mean.centroid, 0.5 * s.radius_at(mean.centroid), s.enrichment_reach());
   };
   std::vector<Vector3> surface_changes = changes.faces;
   for (int node : change.removed)
@@ -480,7 +490,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
 
   try {
     s.find_loads();
-    report.cells_seconds = cell_watch.seconds();
+    report.cells_seconds = cell_watch.seconds() - report.spheres_seconds;
     const Stopwatch factor_watch;
     std::vector<Vector3> places = changes.faces;
     places.insert(places.end(), changes.front.begin(), changes.front.end());
@@ -520,22 +530,23 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   return report;
 }
 
-double GrowingCut::prepare(const topology::SurfaceMesh& next) {
+double GrowingCut::prepare(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision) {
   const Stopwatch watch;
   State& s = *state_;
+  const State::Increment next = s.increment(change, incision);
+  if (next.uncovered != nullptr)
+    return watch.seconds();
   std::vector<char> kept(s.window->slots(), 0);
   const auto keep = [&](int node) {
-    if (const int block = s.slot[node]; block >= 0)
+    if (const int block = node < std::ssize(s.slot) ? s.slot[node] : -1; block >= 0)
       std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
   };
-  const auto in_reach = s.reach_of(next, false);
-  for (const State::Box& box : s.boxes)
-    if (!box.cells.empty() && in_reach(box.box.centre, box.box.half.norm()))
-      for (const CellShapes& cell : box.cells)
-        for (int node : cell.nodes)
-          keep(node);
+  for (const int b : next.boxes)
+    for (const CellShapes& cell : s.boxes[b].cells)
+      for (int node : cell.nodes)
+        keep(node);
   for (const DisplacementMean& mean : s.held)
-    if (in_reach(mean.centroid, 0.5 * s.radius_at(mean.centroid)))
+    if (next.concerns(mean.centroid, 0.5 * s.radius_at(mean.centroid), s.enrichment_reach()))
       for (int node : mean.nodes)
         keep(node);
   s.window->prepare(kept);

@@ -65,10 +65,10 @@ class GrowingCut {
   GrowthReport grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
                     const std::function<topology::SurfaceMesh()>& way_ahead = {}, bool only_update = false);
 
-  /// Work ahead of the next increment, whose new faces are expected along `next`: eliminates the part of the window
-  /// that it will not touch. Returns the seconds it took (those of the background, not of the increment). A wrong guess
-  /// costs the increment the whole window, no more.
-  double prepare(const topology::SurfaceMesh& next);
+  /// Work ahead of the next increment, where it is known: eliminates the part of the window that it will not touch.
+  /// Returns the seconds it took (those of the background, not of the increment). Another increment than this one costs
+  /// the whole window, no more. Throws as grow() does.
+  double prepare(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision);
 
   /// Condenses anew about another predicted way (in the background of a real-time loop, from a copy of problem()).
   GrowthReport condense_anew(topology::SurfaceMesh way);

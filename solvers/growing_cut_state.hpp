@@ -59,7 +59,30 @@ struct GrowingCut::State {
   MatrixX compliance;
   VectorX base;
 
+  /// An increment before any of its cells is evaluated.
+  struct Increment {
+    Problem next;
+    std::vector<char> removed;
+    const char* uncovered = nullptr; // why the window cannot take it; what follows is then not complete
+    std::unique_ptr<Spheres> spheres{};
+    double spheres_seconds = 0;
+    Changes changes{};
+    std::optional<Reach> reach{};
+    std::vector<std::pair<Vector3, double>> balls{}; // places and radii of the spheres that change
+    std::vector<int> boxes{};                        // touched
+
+    /// Whether something within `half` m of x changes; `enriched`: reach of the enrichment in sphere radii.
+    [[nodiscard]] bool concerns(const Vector3& x, double half, double enriched) const {
+      return reach->sees(x, half) || reach->near_front(x, half, std::max(1.0, enriched)) ||
+             std::any_of(balls.begin(), balls.end(),
+                         [&](const auto& ball) { return (ball.first - x).norm() < ball.second + half; });
+    }
+  };
+
   State(Problem p, GrowthOptions o);
+
+  [[nodiscard]] Increment increment(const NodeChange& change,
+                                    const std::shared_ptr<const topology::Incision>& incision) const;
 
   [[nodiscard]] BackgroundOptions background() const { return {options.method.cell_size, options.method.quadrature}; }
   [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {

@@ -106,8 +106,6 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
     double seconds = 0;
     for (int k = 0; k < increments; ++k) {
       const auto before = scene.sweep.incision();
-      if (!fan)
-        prepare_seconds += cut.prepare(scene.strip(heading, step));
       scene.advance();
       const auto sprinkle_start = std::chrono::steady_clock::now();
       scene.sprinkling.incision = scene.sweep.incision();
@@ -120,7 +118,10 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
         scene.nodes.add(increment.added.positions[j], increment.added.spacings[j], increment.added.kinds[j],
                         increment.added.normals[j]);
       scene.retired.resize(scene.nodes.size(), false);
-      const GrowthReport report = cut.grow({increment.removed, increment.added}, scene.sweep.incision());
+      const NodeChange change{increment.removed, increment.added};
+      if (!fan) // the path is scripted: the next increment is known before the blade is there
+        prepare_seconds += cut.prepare(change, scene.sweep.incision());
+      const GrowthReport report = cut.grow(change, scene.sweep.incision());
       condensed += report.condensed_anew ? 1 : 0;
       seconds += report.total_seconds;
       worst = std::max(worst, report.total_seconds);

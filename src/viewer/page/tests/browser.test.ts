@@ -125,9 +125,8 @@ test('Nodes, supports and level sets show what the method sees', async () => {
 test('A second viewer watches and cannot drive until the tool is let go', async () => {
   const second = await openPage(browser, served.address, { width: 800, height: 600 });
   await until(second.tab, 'it sees frames', () => globalThis.spherecut?.frame != null);
-  const watching = await look(second.tab);
-  assert.match(watching.role, /^watching/);
-  assert.ok(watching.lips > 2e-4, 'it does not see the wound');
+  await until(second.tab, 'it sees the wound', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4);
+  assert.match((await look(second.tab)).role, /^watching/);
   assert.ok(await second.tab.isDisabled('#take'));
   if (out) await sideBySide(browser, [await shot(first.tab), await shot(second.tab)], out, 'two');
   assert.ok(await second.tab.isDisabled('#reset'));
