@@ -1,6 +1,7 @@
 #include "src/cut_reader.hpp"
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <fmt/format.h>
 
 namespace spherecut::app {
@@ -20,6 +21,28 @@ RectangleSheet rectangle(const Section& section, const std::string& name, Offenc
   return sheet;
 }
 
+/// Between two poses a blade turns by the shorter way. Where it goes half way round or more about one axis, poses in
+/// between tell which way that is.
+std::vector<BladePoint> with_half_turns(const std::vector<BladePoint>& path) {
+  constexpr double most = 90; // degrees from one pose to the next
+  std::vector<BladePoint> all;
+  for (const BladePoint& to : path) {
+    if (!all.empty()) {
+      const BladePoint from = all.back();
+      const Vector3 turn = to.rotation - from.rotation;
+      const bool one_axis = from.rotation.cross(to.rotation).norm() <= 1e-9 * from.rotation.norm() * to.rotation.norm();
+      const int parts = one_axis && turn.norm() >= 180 ? static_cast<int>(std::ceil(turn.norm() / most)) : 1;
+      for (int k = 1; k < parts; ++k) {
+        const double share = static_cast<double>(k) / parts;
+        all.push_back({from.time + share * (to.time - from.time), from.position + share * (to.position - from.position),
+                       from.rotation + share * turn});
+      }
+    }
+    all.push_back(to);
+  }
+  return all;
+}
+
 std::vector<BladePoint> blade_path(const Section& blade, Offences& offences) {
   std::vector<BladePoint> path;
   for (const Section& section : blade.tables("path")) {
@@ -33,7 +56,7 @@ std::vector<BladePoint> blade_path(const Section& blade, Offences& offences) {
   if (path.size() < 2)
     offences.add(blade.line("path"), fmt::format("blade.path has {} pose{}; allowed: two or more", path.size(),
                                                  path.size() == 1 ? "" : "s"));
-  return path;
+  return with_half_turns(path);
 }
 
 } // namespace

@@ -184,8 +184,10 @@ int run(int argc, char** argv) {
   haptics->add_option("--duration", haptic.duration, "Length of the session, s; default 10");
   haptics->add_flag("--virtual", haptic.in_virtual_time,
                     "Without clock and threads: a solve every budget, the same bits every time");
-  haptics->add_option("--solved-every", haptic.solved_stride,
-                      "Afterwards solve at every so many ticks for the model's error; 0: not; default 10");
+  haptics
+      ->add_option("--solved-every", haptic.solved_stride,
+                   "Afterwards solve at every so many ticks for the model's error; 0: not; default 10")
+      ->check(CLI::NonNegativeNumber);
 
   add_threads(haptics, "one a core but one, at most 16");
 

@@ -1,9 +1,11 @@
 #include "src/organ.hpp"
 
+#include "topology/errors.hpp"
 #include "topology/organs.hpp"
 #include "topology/surface_check.hpp"
 
 #include <algorithm>
+#include <fmt/format.h>
 #include <mutex>
 
 namespace spherecut::app {
@@ -38,7 +40,11 @@ struct Maker {
     topology::CheckedSurface surface = topology::read_surface(organ.file, organ.scale);
     std::vector<std::string> remarks = std::move(surface.mended);
     remarks.insert(remarks.end(), surface.warnings.begin(), surface.warnings.end());
-    return {topology::make_organ_domain(std::move(surface.mesh), settings.voxel_size), std::move(remarks)};
+    try {
+      return {topology::make_organ_domain(std::move(surface.mesh), settings.voxel_size), std::move(remarks)};
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{} (organ.scale = {:g}): {}", organ.file.string(), organ.scale, error.what()));
+    }
   }
 };
 

@@ -31,8 +31,11 @@ OrganSettings organ(const Section& section, const std::filesystem::path& scenari
     const std::filesystem::path file = scenario.parent_path() / section.text("file");
     std::error_code ignored;
     if (!std::filesystem::is_regular_file(file, ignored))
-      offences.add(section.line("file"), fmt::format("organ.file = \"{}\": there is no file {}", section.text("file"),
-                                                     file.lexically_normal().string()));
+      offences.add(section.line("file"),
+                   fmt::format("organ.file = \"{}\": {} {}", section.text("file"),
+                               std::filesystem::exists(file, ignored) ? "this is no file, but a folder or a device:"
+                                                                      : "there is no file",
+                               file.lexically_normal().string()));
     organ.shape = FileOrgan{file, section.number("scale")};
   }
   organ.edge = section.optional_number("edge").value_or(0);

@@ -47,7 +47,7 @@ constexpr std::array keys = {
     ScenarioKey{"organ.scale", number, "", "1", "Metres per unit of the file (0.001 for millimetres).", above(0, 1e6),
                 "", "shape = file"},
     ScenarioKey{"organ.voxel_size", number, "m", "", "Voxel of the level set; left out: 1/128 of the largest extent.",
-                above(0, 1), "", "shape = liver, file"},
+                from(2e-5, 1), "", "shape = liver, file"},
 
     ScenarioKey{"material", table, "", "required", "Isotropic linear elasticity."},
     ScenarioKey{"material.young_modulus", number, "Pa", "required", "Young's modulus E. Liver: about 5e3 to 1e4.",
@@ -334,7 +334,8 @@ constexpr std::array keys = {
     ScenarioKey{
         "blade.path[].rotation", vector, "degrees", "[0, 0, 0]",
         "Turn of the blade's frame: about the axis along this vector, by its length. [0, 0, 90]: a quarter turn "
-        "about z.",
+        "about z. From one pose to the next about one axis it turns by the difference, however far; else by the "
+        "shorter way.",
         from(-360, 360)},
 
     ScenarioKey{"tearing", table, "", "",

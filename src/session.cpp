@@ -1,6 +1,7 @@
 #include "src/session.hpp"
 
 #include "solvers/tangential_force.hpp"
+#include "src/dropped_nodes.hpp"
 #include "src/process_settings.hpp"
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
@@ -75,7 +76,11 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
     incisions_ = std::make_unique<IncisionBuilder>(scenario_, organ_.domain, sheet_edge(zone_));
     model_.incision = incisions_->incision();
     incisions_->update_fields();
-    require_pieces(incisions_->wound(), zone_.spacing);
+    try {
+      require_pieces(incisions_->wound(), zone_.spacing);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}:{}: {}", scenario_.file.string(), scenario_.precuts.front().line, error.what()));
+    }
   }
   watch_blade_way();
   make_blade_force();
@@ -355,7 +360,7 @@ void Session::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead,
 
 void Session::condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
   const StageTimer timer(profile_.condense);
-  app::condense(candidates, model, for_few_presses);
+  app::condense(without_dropped(candidates, scenario_, *model.body), model, for_few_presses);
 }
 
 void Session::solve(const StepSample& sample, BodyModel& model) {
@@ -399,7 +404,8 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
 // Surface nodes that the tool has gone into although they were not candidates.
 std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const {
   const solvers::NodeCloud& nodes = model.sprinkling.nodes;
-  std::vector<char> known(nodes.positions.size(), 0);
+  std::vector<char> known = dropped_nodes(scenario_, *model.body);
+  known.resize(nodes.positions.size(), 0);
   for (const int node : model.patch.nodes)
     known[node] = 1;
   for (const solvers::Prescribed& entry : model.body->problem().prescribed)

@@ -283,7 +283,9 @@ void Session::check_held(double time) {
       fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region", unheld.size(),
                   tissue_pieces(wound).size(), volume, unheld.size() == 1 ? "is" : "are");
   if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
-    throw InputError(fmt::format("{}; allowed by cut.unheld = \"refuse\": none", what));
+    throw InputError(fmt::format("{}:{}: t = {:g} s: {}; cut.unheld = \"refuse\" allows none", scenario_.file.string(),
+                                 scenario_.precuts.empty() ? scenario_.blade->line : scenario_.precuts.front().line,
+                                 time, what));
   warn(fmt::format("unheld {}", unheld.size()),
        fmt::format("t = {:g} s: {}: {}", time, what,
                    scenario_.cut.unheld == solvers::UnheldPieces::hold ? "soft springs hold it"

@@ -1,5 +1,6 @@
 // A body that follows the tool or a cut that was put off, made beside the steps: the body as it is goes on meanwhile.
 #include "solvers/cut_sight.hpp"
+#include "src/dropped_nodes.hpp"
 #include "src/session.hpp"
 #include "src/stage_timer.hpp"
 
@@ -63,7 +64,7 @@ void Session::begin_following(const topology::SurfaceContact& centre) {
     model.coarseness = coarseness;
     const std::vector<int> near = touchable_nodes(scenario, *domain, model.sprinkling.nodes, centre, reach);
     app::assemble(scenario, domain, model, {}, near);
-    app::condense(near, model);
+    app::condense(without_dropped(near, scenario, *model.body), model);
     find_lips(model);
     return made;
   };
@@ -127,7 +128,7 @@ std::future<Session::MadeAside> Session::make_beside(std::shared_ptr<const topol
         sight = solvers::sight_seconds() - seen;
       }
       const StageTimer timer(condensing);
-      app::condense(near, model, true);
+      app::condense(without_dropped(near, scenario, *model.body), model, true);
       find_lips(model);
     };
     update.update_reason = renewed;

@@ -18,6 +18,7 @@ namespace {
 constexpr float band_voxels = 4;           // outside
 constexpr double default_resolution = 128; // voxels along the largest extent
 constexpr double least_voxels_across = 4;
+constexpr double smallest_voxel = 2e-5; // m: OpenVDB takes no smaller scale, whose cube it holds for zero
 constexpr double bytes_per_voxel = sizeof(float) + sizeof(std::int32_t);
 constexpr double fill_of_leaves = 0.5; // share of allocated leaf voxels that the body and its band use, at least
 
@@ -45,9 +46,14 @@ double checked_voxel_size(const SurfaceMesh& surface, double voxel_size, std::si
     if (!surface.vertices[v].allFinite())
       throw InputError(fmt::format("level set: vertex {} is not finite", v));
   const Vector3 extent = bounds(surface).extent();
-  if (voxel_size == 0)
-    voxel_size = std::min(extent.maxCoeff() / default_resolution, extent.minCoeff() / least_voxels_across);
   const double limit = extent.minCoeff() / least_voxels_across;
+  if (limit < smallest_voxel)
+    throw InputError(fmt::format("the body measures {:.4g} m across: allowed: at least {:.4g} m; is its scale right?",
+                                 extent.minCoeff(), least_voxels_across * smallest_voxel));
+  if (voxel_size == 0)
+    voxel_size = std::clamp(extent.maxCoeff() / default_resolution, smallest_voxel, limit);
+  if (voxel_size > 0 && voxel_size < smallest_voxel)
+    throw InputError(fmt::format("voxel size = {} m: allowed: at least {:g} m", voxel_size, smallest_voxel));
   if (!(std::isfinite(voxel_size) && voxel_size > 0 && voxel_size <= limit))
     throw InputError(fmt::format("voxel size = {} m: must be positive and at most {:.4g} m, a quarter of the smallest "
                                  "extent of the surface",

@@ -88,6 +88,8 @@ class Checker {
   }
 
   void require_three_dimensions() const {
+    if (!std::isfinite(diagonal_))
+      refuse("coordinates are too large to compute with: their squares are not finite");
     Vector3 mean = Vector3::Zero();
     for (const Vector3& v : mesh_.vertices)
       mean += v / static_cast<double>(mesh_.vertices.size());

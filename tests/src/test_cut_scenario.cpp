@@ -153,3 +153,23 @@ TEST_CASE("Every offence of a cut names file, line, key, value and what is allow
       CHECK_THAT(said, Contains(part));
   }
 }
+
+TEST_CASE("A blade turns about one axis as far as its poses say, by the shorter way otherwise") {
+  const auto path_to = [](const std::string& from, const std::string& to) {
+    return scenario_of(cut_block +
+                       "[blade]\nedge = [[0, 0, -0.01], [0, 0, 0.01]]\n[[blade.path]]\ntime = 0\n"
+                       "position = [0, 0, 0]\nrotation = " +
+                       from + "\n[[blade.path]]\ntime = 3\nposition = [0.03, 0, 0]\nrotation = " + to + "\n")
+        .blade->path;
+  };
+  const std::vector<BladePoint> wide = path_to("[0, 0, -90]", "[0, 0, 180]");
+  REQUIRE(wide.size() == 4);
+  for (std::size_t k = 0; k < wide.size(); ++k) {
+    CHECK(wide[k].time == Approx(static_cast<double>(k)));
+    CHECK(wide[k].rotation.z() == Approx(-90 + 90 * static_cast<double>(k)).margin(1e-9));
+    CHECK(wide[k].position.x() == Approx(0.01 * static_cast<double>(k)).margin(1e-12));
+  }
+  CHECK(path_to("[0, 0, 0]", "[0, 0, 179]").size() == 2);
+  CHECK(path_to("[0, 0, 0]", "[0, 0, 360]").size() == 5);
+  CHECK(path_to("[170, 0, 0]", "[0, 170, 0]").size() == 2);
+}

@@ -213,6 +213,22 @@ TEST_CASE("A severed piece that nothing holds is held, dropped or refused as the
   }
 }
 
+TEST_CASE("A tool meets nothing of a piece that has left the computation, and presses what is there") {
+  const std::string method = GENERATE("galerkin", "collocation");
+  const std::string condition = GENERATE("frictionless", "bonded");
+  const std::string rest =
+      "[cut]\nunheld = \"drop\"\n[method]\nname = \"" + method + "\"\n[contact]\ncondition = \"" + condition + "\"\n";
+  Session gone = session_of(cut_block + ball_tool +
+                            rectangle_precut("[0, 0, 0.0203]", "[0, 0, 1]", "[1, 0, 0]", "0.1", "0.1") + rest);
+  for (const StepResult& result : run(gone))
+    CHECK(result.force.isZero(0));
+  // A corner away from the tool.
+  Session there =
+      session_of(cut_block + ball_tool +
+                 rectangle_precut("[0.024, 0.001, 0.0203]", "[1, 0.02, 0.03]", "[0, 0, 1]", "0.1", "0.1") + rest);
+  CHECK(run(there).back().force.z() > 0);
+}
+
 TEST_CASE("A cut that would leave a piece smaller than the node spacing is refused and changes nothing") {
   Session session =
       session_of(stretched(cut_block) + blade({"[0.0288, 0, 0.036]", "[0.0288, 0, -0.006]"}, 0.04, "0.5"));

@@ -236,3 +236,11 @@ TEST_CASE("An organ domain answers the same from several threads at once", "[dom
   for (const auto& result : results)
     CHECK(result == expected);
 }
+
+TEST_CASE("A voxel is no smaller than what the level set can hold, and a body too small for that is told",
+          "[level_set]") {
+  const auto cube = [](double side) { return make_block(Vector3::Constant(side), side / 4); };
+  CHECK(LevelSet(cube(0.0018), 0).voxel_size() == 2e-5);
+  CHECK_THROWS_WITH(LevelSet(cube(0.0018), 1e-5), Catch::Contains("1e-05") && Catch::Contains("at least 2e-05"));
+  CHECK_THROWS_WITH(LevelSet(cube(6e-5), 0), Catch::Contains("scale"));
+}
