@@ -52,8 +52,6 @@ double checked_voxel_size(const SurfaceMesh& surface, double voxel_size, std::si
                                  extent.minCoeff(), least_voxels_across * smallest_voxel));
   if (voxel_size == 0)
     voxel_size = std::clamp(extent.maxCoeff() / default_resolution, smallest_voxel, limit);
-  if (voxel_size > 0 && voxel_size < smallest_voxel)
-    throw InputError(fmt::format("voxel size = {} m: allowed: at least {:g} m", voxel_size, smallest_voxel));
   if (!(std::isfinite(voxel_size) && voxel_size > 0 && voxel_size <= limit))
     throw InputError(fmt::format("voxel size = {} m: must be positive and at most {:.4g} m, a quarter of the smallest "
                                  "extent of the surface",
@@ -64,6 +62,8 @@ double checked_voxel_size(const SurfaceMesh& surface, double voxel_size, std::si
   if (bytes > static_cast<double>(memory_limit))
     throw InputError(fmt::format("voxel size = {} m would need about {:.2g} GB for the level set: at most {:.2g} GB",
                                  voxel_size, bytes / 1e9, static_cast<double>(memory_limit) / 1e9));
+  if (voxel_size < smallest_voxel)
+    throw InputError(fmt::format("voxel size = {} m: allowed: at least {:g} m", voxel_size, smallest_voxel));
   return voxel_size;
 }
 
