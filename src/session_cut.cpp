@@ -283,9 +283,11 @@ void Session::check_held(double time) {
       fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region", unheld.size(),
                   tissue_pieces(wound).size(), volume, unheld.size() == 1 ? "is" : "are");
   if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
-    throw InputError(fmt::format("{}:{}: t = {:g} s: {}; cut.unheld = \"refuse\" allows none", scenario_.file.string(),
-                                 scenario_.precuts.empty() ? scenario_.blade->line : scenario_.precuts.front().line,
-                                 time, what));
+    throw InputError(fmt::format("{}{}; cut.unheld = \"refuse\" allows none",
+                                 scenario_.blade
+                                     ? std::string() // a motion of it is refused, not a line
+                                     : fmt::format("{}:{}: ", scenario_.file.string(), scenario_.precuts.front().line),
+                                 what));
   warn(fmt::format("unheld {}", unheld.size()),
        fmt::format("t = {:g} s: {}: {}", time, what,
                    scenario_.cut.unheld == solvers::UnheldPieces::hold ? "soft springs hold it"
