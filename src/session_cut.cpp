@@ -284,8 +284,8 @@ void Session::check_held(double time) {
                   tissue_pieces(wound).size(), volume, unheld.size() == 1 ? "is" : "are");
   if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
     throw InputError(fmt::format("{}{}; cut.unheld = \"refuse\" allows none",
-                                 scenario_.blade
-                                     ? std::string() // a motion of it is refused, not a line
+                                 scenario_.blade || scenario_.precuts.empty()
+                                     ? std::string() // a motion or a tear is refused, not a line
                                      : fmt::format("{}:{}: ", scenario_.file.string(), scenario_.precuts.front().line),
                                  what));
   warn(fmt::format("unheld {}", unheld.size()),
