@@ -31,16 +31,16 @@ struct BackgroundCells {
 
 struct BackgroundOptions {
   double cell_size = 1.0; // largest edge of a cell, in units of the local spacing h
-  int gauss = 2;          // points per direction, 1 to 3
+  int quadrature = 2;     // rule of a cell, exact to degree 2 quadrature - 1: 1, 2 or 3
   // Cells shrink towards the front of an incision, in proportion to the distance from front_reach local spacings on and
   // down to the factor front_size: without it the opening in mode II is 2.7 % off, so 1.2 %, from 1 spacing on 1.0 %.
   double front_size = 0.25, front_reach = 0.7;
 };
 
-/// Cells inside the body carry gauss^3 Gauss points. Cells that meet the surface are cut into octants, each of which
-/// carries one point at the centroid of its part inside, weighted by that part's volume. Cells that a sheet of the
-/// incision (null: uncut) may pass through are cut into octants and these by the sheet's plane; the points that do not
-/// see one another make cells of their own.
+/// Cells inside the body carry their centre (rule 1), six points (2) or 3 x 3 x 3 Gauss points (3). Cells that meet the
+/// surface are cut into octants, each of which carries one point at the centroid of its part inside, weighted by that
+/// part's volume. Cells that a sheet of the incision (null: uncut) may pass through are cut into octants and these by
+/// the sheet's plane; the points that do not see one another make cells of their own.
 BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
                                  const BackgroundOptions& options = {}, const topology::Incision* incision = nullptr);
 

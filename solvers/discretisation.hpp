@@ -65,7 +65,7 @@ UnheldPieces unheld_pieces_from_string(std::string_view name);
 struct DiscretisationOptions {
   Method method = Method::galerkin;
   double support_radius = 0;                  // rho, support radius / h; 0: the method's default for this Poisson ratio
-  int quadrature = 2;                         // Gauss points per direction in a background cell (galerkin)
+  int quadrature = 2;                         // rule of a background cell, exact to degree 2 quadrature - 1 (galerkin)
   double cell_size = 0.75;                    // edge of a background cell in units of h (galerkin)
   int tip_node = -1;                          // the tool-tip node of `published`
   SightRule sight = SightRule::enriched;      // only where there is an incision

@@ -159,8 +159,11 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
     std::vector<int> all(static_cast<std::size_t>(end - begin));
     std::iota(all.begin(), all.end(), begin);
     const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, all);
-    for (std::size_t k = 0; k < all.size(); ++k)
+    owners_.resize(static_cast<std::size_t>(end), -1);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      owners_[all[k]] = ids[owners[k]];
       points_of_node_[ids[owners[k]]].push_back(all[k]);
+    }
   }
 }
 
@@ -180,15 +183,30 @@ SurfacePatches::means(const std::vector<int>& nodes, const Spheres& spheres,
   positions.reserve(nodes.size());
   for (int node : nodes)
     positions.push_back(nodes_.positions[node]);
-  const topology::PointTree tree(positions);
-  std::vector<int> in_region;
-  for (int p = 0; p < faces_begin_; ++p)
-    if (held(points_[p].position, points_[p].normal))
-      in_region.push_back(p);
-  const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, in_region);
+  // The nearest surface node of all is the nearest of these, too, where it is one of them.
+  std::vector<int> place(nodes_.size(), -1);
+  bool on_surface = true;
+  for (int k = 0; k < std::ssize(nodes); ++k) {
+    place[nodes[k]] = k;
+    on_surface = on_surface && nodes_.kinds[nodes[k]] != NodeKind::interior && nodes_.kinds[nodes[k]] != NodeKind::lip;
+  }
   std::vector<std::vector<int>> chosen(nodes.size());
-  for (std::size_t k = 0; k < in_region.size(); ++k)
-    chosen[owners[k]].push_back(in_region[k]);
+  std::vector<int> others;
+  for (int p = 0; p < faces_begin_; ++p)
+    if (held(points_[p].position, points_[p].normal)) {
+      if (on_surface && owners_[p] >= 0 && place[owners_[p]] >= 0)
+        chosen[place[owners_[p]]].push_back(p);
+      else
+        others.push_back(p);
+    }
+  if (!others.empty()) {
+    const topology::PointTree tree(positions);
+    const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, others);
+    for (std::size_t k = 0; k < others.size(); ++k)
+      chosen[owners[k]].push_back(others[k]);
+    for (std::vector<int>& points : chosen)
+      std::sort(points.begin(), points.end());
+  }
   std::vector<DisplacementMean> result(nodes.size());
   parallel_ranges(static_cast<int>(nodes.size()), 4, [&](int begin, int end) {
     for (int k = begin; k < end; ++k)

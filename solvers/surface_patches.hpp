@@ -53,6 +53,7 @@ class SurfacePatches {
   std::vector<SurfacePoint> points_; // of the surface, then from faces_begin_ on of the faces
   int faces_begin_ = 0;
   std::vector<std::vector<int>> points_of_node_;
+  std::vector<int> owners_; // node of every point of the surface; -1: the cloud has no surface nodes
 };
 
 } // namespace spherecut::solvers

@@ -141,7 +141,9 @@ constexpr std::array keys = {
     ScenarioKey{"method.support_radius", number, "", "",
                 "Radius of a sphere of influence in units of the local spacing; left out: the method's own.",
                 from(1.2, 4)},
-    ScenarioKey{"method.quadrature", integer, "", "2", "Gauss points per direction in a background cell (galerkin).",
+    ScenarioKey{"method.quadrature", integer, "", "2",
+                "Rule of a background cell (galerkin): 1, its centre; 2, six points, exact to degree three; 3, 27 "
+                "Gauss points.",
                 from(1, 3)},
 
     ScenarioKey{"gravity", table, "", "", "Weight of the organ; left out: none. The given shape is the unloaded one."},
