@@ -76,9 +76,16 @@ const DisplacementMean& GrowingCut::State::mean(int node) const {
     return contact[static_cast<std::size_t>(candidate - options.contact.begin())];
   auto known = means.find(node);
   if (known == means.end()) {
-    if (shares == nullptr)
-      shares = std::make_unique<Shares>(problem, removed);
-    known = means.emplace(node, shares->patches.mean(shares->compact[node], *spheres, problem.prescribed_region)).first;
+    // After an increment the lips are asked for, step by step: their shares are on the faces, and need no skin.
+    const bool of_lip = problem.nodes.kinds[node] == NodeKind::lip;
+    std::unique_ptr<Shares>& known_shares = shares != nullptr || !of_lip ? shares : lip_shares;
+    if (known_shares == nullptr)
+      known_shares = std::make_unique<Shares>(problem, removed, std::nullopt,
+                                              of_lip ? SurfacePatches::Of::faces : SurfacePatches::Of::skin_and_faces);
+    known =
+        means
+            .emplace(node, known_shares->patches.mean(known_shares->compact[node], *spheres, problem.prescribed_region))
+            .first;
   }
   return known->second;
 }
@@ -112,6 +119,7 @@ void GrowingCut::State::condense_all() {
 
   spheres = make_spheres();
   shares.reset();
+  lip_shares.reset();
   means.clear();
   held = stiffness.held;
   for (DisplacementMean& mean : held)
@@ -485,6 +493,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.removed = std::move(removed);
   s.spheres = std::move(fresh_spheres);
   s.shares = std::move(shares);
+  s.lip_shares.reset();
   s.means.clear(); // where lip nodes are sparse a share reaches farther than can be told from its node
   report.boxes = static_cast<int>(exchanged.size());
 

@@ -44,12 +44,12 @@ struct GrowingCut::State {
   std::vector<int> slot;        // block of three slots of every node in the window, -1 outside
   std::vector<int> window_node; // node of every block of slots, -1 for room
   int next_room = 0;
-  VectorX cell_loads;                     // 3N: body force and initial strain
-  VectorX first_loads;                    // 3N at condensation, all loads
-  VectorX external;                       // 3N as they stand, without those of prescribed displacements
-  VectorX loads;                          // 3N as they stand
-  MatrixX reduced_first;                  // by slots
-  mutable std::unique_ptr<Shares> shares; // null: not needed so far
+  VectorX cell_loads;                                 // 3N: body force and initial strain
+  VectorX first_loads;                                // 3N at condensation, all loads
+  VectorX external;                                   // 3N as they stand, without those of prescribed displacements
+  VectorX loads;                                      // 3N as they stand
+  MatrixX reduced_first;                              // by slots
+  mutable std::unique_ptr<Shares> shares, lip_shares; // null: not needed so far
   mutable std::unordered_map<int, DisplacementMean> means; // by node, as they are asked for
   AssemblyReport report;                                   // of the condensation
   std::vector<Anchor> anchors;                             // by ids

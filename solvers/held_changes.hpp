@@ -13,7 +13,8 @@ struct Shares {
   SurfacePatches patches;
 
   Shares(const Problem& problem, const std::vector<char>& removed,
-         const std::optional<BoundingBox>& region = std::nullopt);
+         const std::optional<BoundingBox>& region = std::nullopt,
+         SurfacePatches::Of of = SurfacePatches::Of::skin_and_faces);
 };
 
 /// What each prescribed entry holds, as the ordinary discretisation takes it.

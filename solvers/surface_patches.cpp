@@ -132,11 +132,11 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
                                std::shared_ptr<const topology::Incision> incision,
-                               const std::optional<BoundingBox>& region)
-    : nodes_(nodes), incision_(std::move(incision)),
-      points_(surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision_.get(),
-                                 region ? &*region : nullptr)),
-      points_of_node_(nodes.size()) {
+                               const std::optional<BoundingBox>& region, Of of)
+    : nodes_(nodes), incision_(std::move(incision)), points_of_node_(nodes.size()) {
+  if (of == Of::skin_and_faces)
+    points_ = surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision_.get(),
+                                 region ? &*region : nullptr);
   faces_begin_ = static_cast<int>(points_.size());
   if (incision_ != nullptr) {
     const std::vector<SurfacePoint> faces =
@@ -144,6 +144,9 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
     points_.insert(points_.end(), faces.begin(), faces.end());
   }
   for (const bool lips : {false, true}) {
+    const int begin = lips ? faces_begin_ : 0, end = lips ? static_cast<int>(points_.size()) : faces_begin_;
+    if (begin == end)
+      continue;
     std::vector<Vector3> positions;
     std::vector<int> ids;
     for (int i = 0; i < nodes.size(); ++i)
@@ -155,7 +158,6 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
     if (ids.empty())
       continue;
     const topology::PointTree tree(positions);
-    const int begin = lips ? faces_begin_ : 0, end = lips ? static_cast<int>(points_.size()) : faces_begin_;
     std::vector<int> all(static_cast<std::size_t>(end - begin));
     std::iota(all.begin(), all.end(), begin);
     const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, all);

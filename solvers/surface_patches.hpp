@@ -31,10 +31,13 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x);
 /// surface node or, on a face, lip node that it sees.
 class SurfacePatches {
  public:
-  /// With `region` only the shares of nodes deep enough inside it (two spacings) are meant to be asked for.
+  enum class Of { skin_and_faces, faces };
+
+  /// With `region` only the shares of nodes deep enough inside it (two spacings) are meant to be asked for; of `faces`
+  /// only those of lip nodes.
   SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
                  std::shared_ptr<const topology::Incision> incision = nullptr,
-                 const std::optional<BoundingBox>& region = std::nullopt);
+                 const std::optional<BoundingBox>& region = std::nullopt, Of of = Of::skin_and_faces);
 
   /// Mean over the share of `node` of the surface outside `held` (null: all of it) or, for a lip node, of its face; the
   /// node itself when it has no share.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <functional>
 #include <limits>
 
 namespace spherecut::app {
@@ -341,7 +342,8 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
   solvers::CutContactState remembered;
   remembered.tool.memory = memory;
   const solvers::CutContactState* previous = model.state ? &*model.state : memory ? &remembered : nullptr;
-  if (!model.lips) { // lips that stay apart by themselves need no contact
+  const bool are_open = scenario.cut.lips == solvers::LipCondition::open;
+  if (!model.lips && (!model.lips_touch || are_open)) { // lips that stay apart by themselves need no contact
     solvers::CutContactState state;
     if (in_reach)
       state.tool = grasped != nullptr
@@ -353,12 +355,13 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
     const std::vector<double> openings = normal_openings(model);
     const bool apart =
         std::all_of(openings.begin(), openings.end(), [](double opening) { return opening >= -lip_tolerance; });
-    if (apart || scenario.cut.lips == solvers::LipCondition::open) {
+    if (apart || are_open) {
       model.state = std::move(state);
       return;
     }
-    model.lips = solvers::condense_lips(*model.body, model.pairs, scenario.cut.lips, in_reach ? &model.patch : nullptr);
   }
+  if (!model.lips)
+    model.lips = solvers::condense_lips(*model.body, model.pairs, scenario.cut.lips, in_reach ? &model.patch : nullptr);
   solvers::CutContactState state;
   if (in_reach) {
     const bool goes_on = previous != nullptr && (previous->lips.closed.size() == model.pairs.size() ||
@@ -374,6 +377,7 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
                                      previous ? previous->lips.closed : std::vector<char>{});
     model.field = solvers::deform(model.base, *model.lips, state.lips);
   }
+  model.lips_touch = std::any_of(state.lips.closed.begin(), state.lips.closed.end(), std::identity());
   model.state = std::move(state);
 }
 

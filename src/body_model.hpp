@@ -29,6 +29,7 @@ struct BodyModel {
   solvers::ContactPatch patch;                    // no nodes: the tool is far
   int presses = 0;                                // since it was condensed
   std::optional<solvers::LipPatch> lips;          // empty: no pair has had to be held yet
+  bool lips_touch = false;                        // a pair was held, of this body or of the one before it
   std::optional<solvers::CutContactState> state;  // empty: not solved yet
   solvers::Field field;                           // solution
   mutable solvers::FrontRules front_rules{};      // of these nodes and this cut, found as they are asked for

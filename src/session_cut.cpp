@@ -14,6 +14,7 @@ constexpr double rest_tolerance = 1e-4;   // of the fine spacing: of a place car
 constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a little, as ahead of a front
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
 constexpr double on_path = 1e-6;          // of the fine spacing: nearer to its path a blade is on it
+constexpr double way_detail = 0.25;       // fine spacings from pose to pose of the way ahead
 
 // The place of a sheet whose faces have parted so that x lies between them: on the straight line from face to face. Out
 // of the body the sheet goes on in its plane. Nothing where x lies in material on one side, or ahead of the front.
@@ -93,12 +94,23 @@ Session::blade_ahead(const StepSample& sample, const std::optional<topology::Bla
   std::vector<topology::BladePose> poses;
   const auto scripted = blade_pose(*scenario_.blade, sample.time);
   if (scripted && edge_travel(edge, *scripted, here) < on_path * fine) {
-    double way = 0;
-    for (const StepSample& step : steps_)
-      if (step.blade && step.time > sample.time && way < length) {
-        way += edge_travel(edge, poses.empty() ? here : poses.back(), *step.blade);
-        poses.push_back(*step.blade);
+    // Poses of short steps lie closer than a window can tell apart, and each costs a strip.
+    double way = 0, since_pose = 0;
+    topology::BladePose before = here;
+    for (const StepSample& step : steps_) {
+      if (!step.blade || step.time <= sample.time || way >= length)
+        continue;
+      const double travel = edge_travel(edge, before, *step.blade);
+      way += travel;
+      since_pose += travel;
+      before = *step.blade;
+      if (since_pose >= way_detail * fine || way >= length) {
+        poses.push_back(before);
+        since_pose = 0;
       }
+    }
+    if (since_pose > 0)
+      poses.push_back(before);
   } else if (last) {
     const Vector3 motion = here.position - last->position;
     for (int k = 1; k <= static_cast<int>(std::lround(length / fine)) && motion.norm() > 0; ++k)

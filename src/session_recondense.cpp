@@ -71,14 +71,14 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
   if (dynamic_cast<const solvers::Growable*>(model_.body.get()) != nullptr) {
     if (result.cut->update == SystemUpdate::none)
       return;
+    const bool has_room = 2 * model_.added_nodes < growth_room;
+    if (has_room && model_.window_seen &&
+        edge_travel(scenario_.blade->edge, *model_.window_seen, *sample.blade) < looked_after * fine)
+      return;
     result.residual = residual(model_);
-    const bool is_seen = model_.window_seen &&
-                         edge_travel(scenario_.blade->edge, *model_.window_seen, *sample.blade) < looked_after * fine;
-    const topology::SurfaceMesh way = is_seen ? topology::SurfaceMesh{} : way_of(way_spacings * fine);
-    if (2 * model_.added_nodes < growth_room && result.residual < drifted &&
-        (is_seen || covers(model_.window_way, way, fine))) {
-      if (!way.vertices.empty())
-        model_.window_seen = *sample.blade;
+    const topology::SurfaceMesh way = way_of(way_spacings * fine);
+    if (has_room && result.residual < drifted && covers(model_.window_way, way, fine)) {
+      model_.window_seen = *sample.blade;
       return;
     }
   } else {
@@ -99,7 +99,9 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
     recondensing_way_ = std::move(way);
     return;
   }
-  model_.not_following = too_much_of_body; // and is not asked again before it is built anew
+  // One that does not follow is not asked again before it is built anew; one that does, when the blade has gone on.
+  model_.not_following = too_much_of_body;
+  model_.window_seen = *sample.blade;
 }
 
 // m, from the edge to the surface at rest; 0 inside.
