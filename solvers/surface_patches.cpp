@@ -189,7 +189,8 @@ SurfacePatches::means(const std::vector<int>& nodes, const Spheres& spheres,
   std::vector<int> place(nodes_.size(), -1);
   bool on_surface = true;
   for (int k = 0; k < std::ssize(nodes); ++k) {
-    place[nodes[k]] = k;
+    if (place[nodes[k]] < 0) // of two entries the first, as the search has it
+      place[nodes[k]] = k;
     on_surface = on_surface && nodes_.kinds[nodes[k]] != NodeKind::interior && nodes_.kinds[nodes[k]] != NodeKind::lip;
   }
   std::vector<std::vector<int>> chosen(nodes.size());

@@ -287,6 +287,7 @@ void Session::follow(const StepSample& sample, const topology::SurfaceContact& c
   next.incision = model_.incision;
   sprinkle(&model_.sprinkling.nodes, next);
   build(next);
+  next.lips_touch = model_.lips_touch;
   solve(sample, next);
   model_ = std::move(next);
   result.resprinkled = true;

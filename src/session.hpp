@@ -124,8 +124,8 @@ class Session {
 
   /// On: a body that follows its cut by updates is condensed anew beside them, on a thread of its own, when its window
   /// runs out or it has drifted, and so is one that a blade comes near to for the first time. It takes over where an
-  /// update needs it, which waits for it, or at swap_body(). Cuts then give their residual. When it begins, and what
-  /// it becomes, depends on the steps alone.
+  /// update needs it, which waits for it, or at swap_body(). Cuts then give their residual now and then. When it
+  /// begins, and what it becomes, depends on the steps alone.
   void set_recondensing(bool on);
 
   /// On: nodes that follow a tool are sprinkled, and their body assembled and condensed, on a thread of their own, and

@@ -59,7 +59,7 @@ void write_solves(const std::filesystem::path& file, const std::vector<SolveReco
   for (const SolveRecord& solve : solves)
     text +=
         fmt::format("{},{},{},{},{:d},{:d},{:.3g},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:."
-                    "6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.2g},"
+                    "6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},"
                     "{:d},{:"
                     ".6g}\n",
                     solve.event.sequence, solve.event.pose_tick,
@@ -69,7 +69,7 @@ void write_solves(const std::filesystem::path& file, const std::vector<SolveReco
                     solve.blade_force.norm(), solve.blade_edge, solve.blade_release, solve.blade_contacts,
                     solve.blade_account.work, solve.blade_account.surface, solve.blade_account.crushing,
                     solve.blade_account.friction, solve.blade_account.excess, solve.blade_account.stored, solve.update,
-                    solve.residual, solve.event.swaps, solve.seconds);
+                    solve.residual > 0 ? fmt::format("{:.2g}", solve.residual) : "", solve.event.swaps, solve.seconds);
   out.write(text);
   out.close();
 }

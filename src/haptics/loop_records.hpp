@@ -49,7 +49,7 @@ struct SolveRecord {
   double blade_edge = 0, blade_release = 0; // N, of its edge alone; J/m2, of that on the front
   solvers::BladeLedger blade_account;       // J since the start
   int blade_contacts = 0;                   // pieces of the edge that press
-  double residual = 0;                      // of a body that has followed its cut by an update
+  double residual = 0;                      // of a body that has followed its cut by an update; 0: not looked at
   double cut_area = 0;                      // m2
   std::string_view update;                  // how the system came to the cut of this solve; empty: nothing was cut
   Vector3 force = Vector3::Zero();          // N, of the solve

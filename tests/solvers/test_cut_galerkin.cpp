@@ -336,6 +336,7 @@ TEST_CASE("The share of a node on a face or beside the cut does not reach throug
   const Spheres spheres(block.nodes.positions, block.nodes.spacings, 2.0, Basis::linear, 1e9,
                         {block.incision, SightRule::enriched});
   const SurfacePatches patches(*block.domain, block.nodes, block.incision);
+  const SurfacePatches faces(*block.domain, block.nodes, block.incision, std::nullopt, SurfacePatches::Of::faces);
   double area = 0, face_area = 0;
   for (int i = 0; i < block.nodes.size(); ++i) {
     if (block.nodes.kinds[i] == NodeKind::interior)
@@ -347,6 +348,10 @@ TEST_CASE("The share of a node on a face or beside the cut does not reach throug
       CHECK(side_of(block, block.nodes.positions[mean.nodes[k]]) * side_of(block, block.nodes.positions[i]) > 0);
     }
     CHECK(sum == Approx(1).epsilon(1e-10));
+    if (block.nodes.kinds[i] == NodeKind::lip) { // the faces alone give a lip node the same
+      const DisplacementMean alone = faces.mean(i, spheres);
+      CHECK((alone.nodes == mean.nodes && alone.weights == mean.weights && alone.area == mean.area));
+    }
     (block.nodes.kinds[i] == NodeKind::lip ? face_area : area) += mean.area;
   }
   CHECK(area == Approx(6).epsilon(1e-6));

@@ -78,6 +78,35 @@ TEST_CASE("Held and free shares share out the surface without overlap") {
   CHECK(two[0].area == Approx(0.5).epsilon(0.1));
 }
 
+TEST_CASE("A point of the held surface belongs to the nearest held node, whatever else lies near") {
+  const Cube cube;
+  const auto everywhere = [](const Vector3&, const Vector3&) { return true; };
+  // Every other node of the surface: points whose nearest node is none of them look for another.
+  std::vector<int> some, all;
+  for (int i = 0; i < cube.problem.nodes.size(); ++i)
+    if (cube.problem.nodes.kinds[i] != NodeKind::interior) {
+      all.push_back(i);
+      if (i % 2 == 0)
+        some.push_back(i);
+    }
+  for (const std::vector<int>& nodes : {some, all}) {
+    const std::vector<DisplacementMean> means = cube.patches.means(nodes, cube.spheres, everywhere);
+    double area = 0;
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      area += means[k].area;
+      for (const solvers::QuadraturePoint& point : means[k].share) {
+        int nearest = nodes[k];
+        for (const int other : nodes)
+          if ((cube.problem.nodes.positions[other] - point.position).squaredNorm() <
+              (cube.problem.nodes.positions[nearest] - point.position).squaredNorm() - 1e-12)
+            nearest = other;
+        CHECK(nearest == nodes[k]);
+      }
+    }
+    CHECK(area == Approx(6).epsilon(1e-12));
+  }
+}
+
 TEST_CASE("The value at a point is linear interpolation for linear fields") {
   const Cube cube;
   const Vector3 x(0.31, 0.62, 0.77);
