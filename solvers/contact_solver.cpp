@@ -114,6 +114,9 @@ void hold(const ContactPatch& patch, const std::vector<int>& held, const std::ve
 template <typename Tangential>
 void press_normally(const ContactPatch& patch, const PressingTool& tool, const ContactOptions& options,
                     const std::vector<Vector3>& along, ContactState& state, Tangential&& tangential) {
+  // At the rim of a leaning punch a node can alternate between end face and flank, neither of which keeps it: from this
+  // round on what the flank holds stays with it.
+  constexpr int undecided = 16;
   const int count = size_of(patch);
   MatrixX condensed(count, count);
   VectorX gaps(count);
@@ -126,7 +129,7 @@ void press_normally(const ContactPatch& patch, const PressingTool& tool, const C
     const VectorX base = displacement_of(patch, along);
     for (int c = 0; c < count; ++c) {
       const Vector3 u = state.displacement.segment<3>(3 * c);
-      const Gap gap = contact_gap(tool, patch.rest[c] + u);
+      const Gap gap = contact_gap(tool, patch.rest[c] + u, iteration < undecided ? 0 : flank_hold);
       normals[c] = gap.normal;
       gaps[c] = gap.distance + gap.normal.dot(base.segment<3>(3 * c) - u);
     }
@@ -440,7 +443,7 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
   for (int c = 0; c < size_of(patch); ++c)
     state.largest_penetration =
         std::max(state.largest_penetration,
-                 -contact_gap(pressed, patch.rest[c] + state.displacement.segment<3>(3 * c)).distance);
+                 -contact_gap(pressed, patch.rest[c] + state.displacement.segment<3>(3 * c), flank_hold).distance);
   summarise(patch, state);
   return state;
 }

@@ -13,7 +13,6 @@ namespace {
 /// both methods at three spacings.
 const double flank_sine = std::sin(55 * std::numbers::pi / 180);
 const double flank_cosine = std::cos(55 * std::numbers::pi / 180);
-constexpr double flank_hold = 0.01; // depth below a punch's flank, over that above its end face, up to which it holds
 
 /// Gap to the front of a ball about `centre`, continued by its tangent cone; `front` is the unit direction into the
 /// body.
@@ -44,13 +43,12 @@ PressingTool pressing(const topology::ToolShape& shape, const topology::ToolPose
   return {shape, pose, length > 0 ? Vector3(-outward / length) : Vector3(-pose.axis)};
 }
 
-Gap contact_gap(const PressingTool& tool, const Vector3& x) noexcept {
+Gap contact_gap(const PressingTool& tool, const Vector3& x, double hold) noexcept {
   const topology::ToolPose& pose = tool.pose;
   const double along = (x - pose.point).dot(pose.axis);
   if (const auto* punch = std::get_if<topology::FlatPunch>(&tool.shape)) {
-    // What the flank holds comes to lie within it by rounding; the end face, far off, must not take it from there.
     const double inside = punch->radius - (x - pose.point - along * pose.axis).norm();
-    if (inside > 0 && inside > flank_hold * along && along < 0.5 * punch->length)
+    if (inside > 0 && inside > hold * along && along < 0.5 * punch->length)
       return {-along, -pose.axis};
   } else if (const auto* ball = std::get_if<topology::SphereTip>(&tool.shape)) {
     return ball_gap(pose.point + ball->radius * pose.axis, ball->radius, tool.front, x);

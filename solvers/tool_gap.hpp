@@ -28,6 +28,10 @@ PressingTool pressing(const topology::ToolShape& shape, const topology::ToolPose
 /// flank of a tool: nodes driven past it would slip off one by one. So nothing is pushed sideways more than 55 degrees
 /// from the front: under a flat punch the end face counts, whatever the depth, and a ball runs on as its tangent cone.
 /// This changes nothing for presses shallower than about half the radius. An instrument's shaft counts as it is.
-Gap contact_gap(const PressingTool& tool, const Vector3& x) noexcept;
+/// `hold`: depth below a punch's flank, over that above its end face, up to which the flank counts all the same.
+Gap contact_gap(const PressingTool& tool, const Vector3& x, double hold = 0) noexcept;
+
+/// Of a node that a punch's flank presses: it lies within the punch by rounding.
+inline constexpr double flank_hold = 0.01;
 
 } // namespace spherecut::solvers

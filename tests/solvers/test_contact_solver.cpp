@@ -85,6 +85,27 @@ TEST_CASE("A pressed tool leaves no penetration and no tension, and its force is
       }
 }
 
+TEST_CASE("At the rim of a leaning punch a node comes to rest on end face or flank") {
+  // With these spheres it alternates between the two, from which no round of the linearised contact gets out.
+  const solvers::Problem problem = held_box({-0.03, -0.03, -0.03}, {0.03, 0.03, 0}, 0.0075, 0.2, {5e3, 0.45, 1000}, 3);
+  solvers::DiscretisationOptions options = options_for(Method::galerkin);
+  options.support_radius = 2;
+  const auto body = solvers::discretise(problem, options);
+  const ContactPatch patch = solvers::condense(*body, top_nodes(problem));
+  const ToolShape tool = FlatPunch{0.012, 0.05};
+  const ToolPose pose = topology::pose_at(tool, Vector3(0.002, -0.001, -0.003), Vector3(0.2, -0.1, 1));
+  const ContactState state = press(patch, tool, pose);
+  CHECK(state.converged);
+  CHECK(state.largest_penetration < 1e-8);
+  int on_flank = 0;
+  for (std::size_t c = 0; c < patch.nodes.size(); ++c) {
+    const Vector3 arm = place(patch, state, c) - pose.point;
+    const double beside = (arm - arm.dot(pose.axis) * pose.axis).norm() - 0.012;
+    on_flank += state.active[c] != 0 && std::abs(beside) < 1e-6 ? 1 : 0;
+  }
+  CHECK(on_flank == 1);
+}
+
 TEST_CASE("A shallow sphere on a thick block presses about as Hertz says") {
   // Radius and depth such that the contact spans a few spacings and the block is seven contact radii wide.
   const double radius = 0.06, depth = 0.0012;
