@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace spherecut::solvers {
@@ -52,41 +51,15 @@ VectorX GrowingCut::State::elastic_forces(const VectorX& coefficients) const {
   VectorX forces = VectorX::Zero(coefficients.size());
   for (Eigen::Index k = 0; k < std::ssize(elastic_order); ++k)
     forces.segment<3>(3 * static_cast<Eigen::Index>(elastic_order[k])) = product.segment<3>(3 * k);
-  // All points of a cell at a time: a row of gradients of a node at them lies together.
-  constexpr int most_points = (most_cell_points + shape_kernel::points_together - 1) / shape_kernel::points_together *
-                              shape_kernel::points_together;
-  using Tensors = std::array<std::array<std::array<double, most_points>, 3>, 3>; // component, axis, point
   const auto add = [&](const CellShapes& cell, double sign) {
-    Tensors gradient{}, stress{};
-    for (std::size_t k = 0; k < cell.nodes.size(); ++k) {
-      const double* const at = cell.gradients.data() + 3 * k * static_cast<std::size_t>(cell.stride);
-      for (int c = 0; c < 3; ++c) {
-        const double u = coefficients[3 * static_cast<Eigen::Index>(cell.nodes[k]) + c];
-        for (int axis = 0; axis < 3; ++axis)
-          for (int q = 0; q < cell.stride; ++q)
-            gradient[c][axis][q] += u * at[axis * cell.stride + q];
-      }
-    }
     for (int q = 0; q < cell.points; ++q) {
-      Matrix3 g;
-      for (int c = 0; c < 3; ++c)
-        for (int axis = 0; axis < 3; ++axis)
-          g(c, axis) = gradient[c][axis][q];
-      const Matrix3 s = sign * stress_from_gradient(problem.material, g);
-      for (int c = 0; c < 3; ++c)
-        for (int axis = 0; axis < 3; ++axis)
-          stress[c][axis][q] = s(c, axis);
-    }
-    for (std::size_t k = 0; k < cell.nodes.size(); ++k) {
-      const double* const at = cell.gradients.data() + 3 * k * static_cast<std::size_t>(cell.stride);
-      for (int c = 0; c < 3; ++c) {
-        std::array<double, shape_kernel::points_together> sum{};
-        for (int axis = 0; axis < 3; ++axis)
-          for (int q = 0; q < cell.stride; q += shape_kernel::points_together)
-            for (int lane = 0; lane < shape_kernel::points_together; ++lane)
-              sum[lane] += stress[c][axis][q + lane] * at[axis * cell.stride + q + lane];
-        forces[3 * static_cast<Eigen::Index>(cell.nodes[k]) + c] += std::accumulate(sum.begin(), sum.end(), 0.0);
-      }
+      Matrix3 gradient = Matrix3::Zero();
+      for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+        gradient +=
+            coefficients.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) * cell.gradient(k, q).transpose();
+      const Matrix3 stress = sign * stress_from_gradient(problem.material, gradient);
+      for (std::size_t k = 0; k < cell.nodes.size(); ++k)
+        forces.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) += stress * cell.gradient(k, q);
     }
   };
   for (const Box& box : boxes)

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <fmt/format.h>
-#include <functional>
 #include <limits>
 
 namespace spherecut::app {
@@ -333,7 +332,8 @@ void bond(const std::vector<Vector3>& displacements, const topology::ToolPose& p
 } // namespace
 
 void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
-                   const std::vector<Vector3>* grasped, const std::optional<solvers::GripMemory>& memory) {
+                   const std::vector<Vector3>* grasped, const std::optional<solvers::GripMemory>& memory,
+                   bool lips_touch) {
   const solvers::ContactOptions options{.condition = scenario.contact.condition,
                                         .friction = scenario.contact.friction,
                                         .maximum_iterations = most_iterations,
@@ -343,7 +343,7 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
   remembered.tool.memory = memory;
   const solvers::CutContactState* previous = model.state ? &*model.state : memory ? &remembered : nullptr;
   const bool are_open = scenario.cut.lips == solvers::LipCondition::open;
-  if (!model.lips && (!model.lips_touch || are_open)) { // lips that stay apart by themselves need no contact
+  if (!model.lips && (!lips_touch || are_open)) { // lips that stay apart by themselves need no contact
     solvers::CutContactState state;
     if (in_reach)
       state.tool = grasped != nullptr
@@ -377,7 +377,6 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
                                      previous ? previous->lips.closed : std::vector<char>{});
     model.field = solvers::deform(model.base, *model.lips, state.lips);
   }
-  model.lips_touch = std::any_of(state.lips.closed.begin(), state.lips.closed.end(), std::identity());
   model.state = std::move(state);
 }
 

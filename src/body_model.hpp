@@ -29,7 +29,6 @@ struct BodyModel {
   solvers::ContactPatch patch;                    // no nodes: the tool is far
   int presses = 0;                                // since it was condensed
   std::optional<solvers::LipPatch> lips;          // empty: no pair has had to be held yet
-  bool lips_touch = false;                        // a pair was held, of this body or of the one before it
   std::optional<solvers::CutContactState> state;  // empty: not solved yet
   solvers::Field field;                           // solution
   mutable solvers::FrontRules front_rules{};      // of these nodes and this cut, found as they are asked for
@@ -111,10 +110,10 @@ inline constexpr int few_presses = 20;
 /// Solves for tool and lips in contact; `tool` null: the tool is far, and candidates there are none. Starts from the
 /// model's state where it has one. With `grasped`, one displacement (m) a node of the patch, the tool does not press:
 /// it holds the patch there. A model without state goes on from the `memory` of friction on other nodes, if there is
-/// one.
+/// one. `lips_touch`: lips have to be held as a rule, and are condensed without being tried apart.
 void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
                    const std::vector<Vector3>* grasped = nullptr,
-                   const std::optional<solvers::GripMemory>& memory = std::nullopt);
+                   const std::optional<solvers::GripMemory>& memory = std::nullopt, bool lips_touch = false);
 
 /// Largest unbalanced force over the largest force.
 double residual(const BodyModel& model);

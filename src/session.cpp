@@ -29,6 +29,10 @@ constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
 constexpr double contact_crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a contact is put
 
+bool is_any_closed(const solvers::LipState& lips) {
+  return std::find(lips.closed.begin(), lips.closed.end(), 1) != lips.closed.end();
+}
+
 Organ timed_organ(const OrganSettings& settings, double& seconds) {
   const StageTimer timer(seconds);
   return make_organ(settings);
@@ -287,7 +291,6 @@ void Session::follow(const StepSample& sample, const topology::SurfaceContact& c
   next.incision = model_.incision;
   sprinkle(&model_.sprinkling.nodes, next);
   build(next);
-  next.lips_touch = model_.lips_touch;
   solve(sample, next);
   model_ = std::move(next);
   result.resprinkled = true;
@@ -372,13 +375,15 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
   if (grasps()) {
     const StageTimer timer(profile_.press);
     const std::vector<Vector3> held = grasped_displacements(*pose, model);
-    solve_contact(tool, pose, scenario_, model, &held);
+    solve_contact(tool, pose, scenario_, model, &held, std::nullopt, lips_touch_);
+    lips_touch_ = is_any_closed(model.state->lips);
     return;
   }
   for (int growth = 0; growth <= patch_growths; ++growth) {
     {
       const StageTimer timer(profile_.press);
-      solve_contact(tool, pose, scenario_, model, nullptr, grip_memory_);
+      solve_contact(tool, pose, scenario_, model, nullptr, grip_memory_, lips_touch_);
+      lips_touch_ = is_any_closed(model.state->lips);
     }
     if (model.patch.nodes.empty())
       return;

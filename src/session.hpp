@@ -360,6 +360,7 @@ class Session {
   bool goes_on_ = false;
   bool force_only_ = false;
   bool updating_ = true;
+  bool lips_touch_ = false;                        // pairs were held in the last solution
   std::optional<solvers::GripMemory> grip_memory_; // friction at the start of the step, should its nodes change
   std::optional<solvers::GripMemory> kept_grip_;   // of a body that another has taken over from since the last step
   bool recondensing_on_ = false;

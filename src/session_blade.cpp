@@ -280,7 +280,6 @@ void Session::take_proposal(const StepSample& sample, CutReport& report) {
     profile_.discretise += report.seconds.assembly + report.seconds.visibility;
     profile_.condense += report.seconds.solve;
     const StageTimer timer(report.seconds.solve);
-    aside.model.lips_touch = model_.lips_touch;
     solve(sample, aside.model);
     blade_force_->propose(std::move(aside.model), made.poses);
   } catch (const std::runtime_error& error) {

@@ -169,7 +169,6 @@ void Session::take_following() {
   kept_grip_ = remembered_grip();
   zone_contact_ = centre;
   zone_.spacing.centres = {centre.point};
-  next.lips_touch = model_.lips_touch;
   model_ = std::move(next);
   followed_aside_ = true;
   say_(fmt::format("the fine zone has followed the tool: {} nodes", model_.sprinkling.nodes.size()));
@@ -192,7 +191,6 @@ void Session::take_cut() {
     profile_.condense += report.seconds.solve;
     drop_recondensing();
     kept_grip_ = remembered_grip();
-    made.model.lips_touch = model_.lips_touch;
     model_ = std::move(made.model);
   } catch (const std::runtime_error& error) {
     incisions_->take_back();

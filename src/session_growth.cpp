@@ -157,7 +157,6 @@ void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& re
     }
     build();
   }
-  next.lips_touch = model_.lips_touch;
   report_body(next, solvers::sight_seconds() - seen, report);
   const StageTimer timer(report.seconds.solve);
   condense(near, next, true);

@@ -61,12 +61,9 @@ TEST_CASE("A pressed tool leaves no penetration and no tension, and its force is
             CHECK(force.isZero(0));
             continue;
           }
-          // Frictionless: along the tool's outward normal, pushing; the end face's under a punch, its flank's beside
-          // it.
-          const Vector3 x = place(on.patch, state, c), arm = x - pose.point;
-          const auto* punch = std::get_if<FlatPunch>(&tool);
-          const bool under = punch != nullptr && (arm - arm.dot(pose.axis) * pose.axis).norm() < punch->radius - 1e-6;
-          const Vector3 normal = under ? Vector3(-pose.axis) : topology::tool_normal(tool, pose, x);
+          // Frictionless: along the tool's outward normal, pushing; the end face's under a punch.
+          const Vector3 x = place(on.patch, state, c);
+          const Vector3 normal = tool.index() == 0 ? topology::tool_normal(tool, pose, x) : Vector3(-pose.axis);
           CHECK(force.dot(normal) >= 0);
           CHECK((force - force.dot(normal) * normal).norm() < 1e-4 * state.tool_force.norm());
           if (tool.index() == 0 && force.norm() > 0)
