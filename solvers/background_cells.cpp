@@ -81,7 +81,7 @@ class BoxFiller {
 
   /// Six points, the corners of an octahedron turned out of the axes: exact to degree three as two Gauss points a
   /// direction are, which are eight. Along each axis they lie at four places instead of two, so that what oscillates
-  /// faster is told apart better: with a quarter fewer points the smooth field's error is a tenth smaller.
+  /// faster is told apart better: with a quarter fewer points the smooth field's error is 5 to 10 % smaller.
   void add_octahedron(const Vector3& centre, const Vector3& half) {
     const double weight = 8 * half.prod() / 6;
     for (int axis = 0; axis < 3; ++axis) {
