@@ -25,23 +25,42 @@ DeviceState state_of(const PathPose& pose, std::uint64_t tick) {
   return {tick, pose.time, pose.position, pose.orientation, true};
 }
 
+/// Two poses of a path and how far a time is from the one to the other.
+struct Leg {
+  const PathPose& from;
+  const PathPose& to;
+  double share;
+  [[nodiscard]] Vector3 position() const noexcept { return from.position + share * (to.position - from.position); }
+};
+
+/// `low`: number of the pose from which the leg is looked for, and where it starts.
+Leg leg_at(const std::vector<PathPose>& path, double time, std::size_t& low) noexcept {
+  if (time <= path.front().time || path.size() == 1)
+    return {path.front(), path.front(), 0};
+  if (time >= path.back().time)
+    return {path.back(), path.back(), 0};
+  if (!(path[low].time <= time && time < path[low + 1].time)) {
+    low = 0;
+    std::size_t high = path.size() - 1; // path[low].time <= time < path[high].time
+    while (high - low > 1) {
+      const std::size_t middle = (low + high) / 2;
+      (path[middle].time <= time ? low : high) = middle;
+    }
+  }
+  const PathPose& from = path[low];
+  const PathPose& to = path[low + 1];
+  return {from, to, (time - from.time) / (to.time - from.time)};
+}
+
 } // namespace
 
 PathPose path_pose(const std::vector<PathPose>& path, double time) noexcept {
-  if (time <= path.front().time || path.size() == 1)
-    return {time, path.front().position, path.front().orientation};
-  if (time >= path.back().time)
-    return {time, path.back().position, path.back().orientation};
   std::size_t low = 0;
-  std::size_t high = path.size() - 1; // path[low].time <= time < path[high].time
-  while (high - low > 1) {
-    const std::size_t middle = (low + high) / 2;
-    (path[middle].time <= time ? low : high) = middle;
-  }
-  const PathPose& a = path[low];
-  const PathPose& b = path[high];
-  const double t = (time - a.time) / (b.time - a.time);
-  return {time, a.position + t * (b.position - a.position), a.orientation.slerp(t, b.orientation)};
+  const Leg leg = leg_at(path, time, low);
+  // A turn takes a sine and its inverse, and few poses turn.
+  const bool turns = leg.from.orientation.coeffs() != leg.to.orientation.coeffs();
+  return {time, leg.position(),
+          turns ? leg.from.orientation.slerp(leg.share, leg.to.orientation) : leg.from.orientation};
 }
 
 std::vector<PathPose> driven_path(const std::vector<StepSample>& steps) {
@@ -83,7 +102,7 @@ SimulatedHand::SimulatedHand(std::vector<PathPose> path, const HandSettings& set
 DeviceState SimulatedHand::read(std::uint64_t tick) noexcept {
   const double now = static_cast<double>(tick) / rate_;
   if (!started_) {
-    position_ = path_pose(path_, settings_.rides_path ? now : path_.front().time).position;
+    position_ = leg_at(path_, settings_.rides_path ? now : path_.front().time, leg_).position();
     started_ = true;
   } else {
     const double step = 1 / (rate_ * hand_substeps);
@@ -93,8 +112,8 @@ DeviceState SimulatedHand::read(std::uint64_t tick) noexcept {
       Vector3 target_velocity = Vector3::Zero();
       if (settings_.rides_path) {
         const double t = now - 1 / rate_ + (i + 1) * step;
-        target = path_pose(path_, t).position;
-        target_velocity = (target - path_pose(path_, t - step).position) / step;
+        target = leg_at(path_, t, leg_).position();
+        target_velocity = (target - leg_at(path_, t - step, leg_).position()) / step;
       }
       const Vector3 pull =
           settings_.stiffness * (target - position_) + settings_.damping * (target_velocity - velocity_) + force;

@@ -93,6 +93,7 @@ class SimulatedHand : public Device {
   Vector3 position_ = Vector3::Zero(), velocity_ = Vector3::Zero();
   std::array<Vector3, longest_delay + 1> forces_{}; // newest first
   double work_ = 0;
+  std::size_t leg_ = 0; // of the path, that it was on last
   bool started_ = false;
 };
 

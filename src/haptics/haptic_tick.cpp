@@ -10,6 +10,7 @@ namespace {
 constexpr double softening = 50;     // per second, at most, by which the rendered share of the force falls
 constexpr double hardening = 2;      // the same as it rises
 constexpr double out_of_body = 1e-3; // m, over which a blade's edge comes clear of the surface
+constexpr double one_place = 1e-3;   // m, within which two contacts are one, that the same walk follows
 constexpr double patch_rim = 0.8;    // of the candidates' reach: a contact beyond it takes the patch along
 
 const topology::ToolShape edge_point = topology::SphereTip{1e-9};
@@ -61,7 +62,7 @@ void HapticTick::locate(const DeviceState& device) noexcept {
   const topology::ToolPose pose = tool_pose(tool_, device);
   contact_ = organ_->walk(tool_, pose, contact_);
   // A tool that was put elsewhere leaves the walk behind; the solve has looked at the whole surface.
-  if (fresh_ && same_thing(device, *snapshot_)) {
+  if (fresh_ && same_thing(device, *snapshot_) && (snapshot_->contact.point - contact_.point).norm() > one_place) {
     const topology::SurfaceContact there = organ_->walk(tool_, pose, snapshot_->contact);
     if (there.depth > contact_.depth)
       contact_ = there;

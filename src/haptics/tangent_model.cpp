@@ -24,6 +24,7 @@ constexpr int patience_of_block = 4; // pivots of many candidates at once withou
 constexpr int most_rubs = 3;         // rounds of friction for the pressures of one round
 constexpr double margin = 0.15;      // of the tip radius: candidates farther from the tool are not looked at
 constexpr double lever = 0.05;       // m, about the tool's point, over which a turn of its axis counts as motion
+constexpr double most_ahead = 2;     // times as far as in the last tick may a candidate be expected to go in this one
 constexpr int ld = 3 * most_candidates;
 constexpr int most_bonded = most_candidates - 1; // the factor has room for one that is tried
 
@@ -71,6 +72,8 @@ TangentModel::TangentModel(const topology::ToolShape& tool)
   bond_force_.fill(Vector3::Zero());
   chosen_.fill(0);
   step_.fill(Vector3::Zero());
+  start_.fill(Vector3::Zero());
+  change_.fill(Vector3::Zero());
   wrong_.fill(0);
   near_.fill(0);
   fresh_.fill(0);
@@ -96,6 +99,7 @@ bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
   rest_sum_ = snapshot.rest_sum;
   condensed_number_ = number;
   condensed_ = snapshot.condensed.get();
+  changes_ = changes_ && same_body;
   if (bonded ? same_body : same_places)
     return same_body && !bladed; // what has been found since is nearer to the tool's place now than the solve
   travelled_ = 0;
@@ -270,6 +274,23 @@ void TangentModel::settle_bonds() noexcept {
       bond_[c] += normal_[c].dot(displacement_[c] - bond_[c]) * normal_[c];
 }
 
+// Where the tool goes on as in the last tick the candidates do, too, and the rounds start there: their first step is what
+// the motion changes by, and not the motion.
+void TangentModel::expect(const Vector3& motion) noexcept {
+  const double before = motion_.squaredNorm();
+  const double share = changes_ && before > 0 ? std::clamp(motion.dot(motion_) / before, 0.0, most_ahead) : 0;
+  motion_ = motion;
+  double farthest = 0; // squared
+  for (int c = 0; c < snapshot_->count; ++c) {
+    start_[c] = displacement_[c];
+    if (share == 0)
+      continue;
+    displacement_[c] += share * change_[c];
+    farthest = std::max(farthest, change_[c].squaredNorm());
+  }
+  travelled_ += share * std::sqrt(farthest);
+}
+
 // Candidates near enough to the tool to meet it in this tick. The others were farther when last looked at than tool and
 // surface have moved since.
 void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
@@ -297,6 +318,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     for (int c = 0; c < count; ++c)
       if (active_[c] != 0)
         bond_[c] += solvers::tool_motion(pose_, pose, condensed_->rest[c] + bond_[c]);
+  expect(pose.point - pose_.point);
   look_around(tool);
   if (frictional)
     drag_along();
@@ -401,6 +423,9 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     const int c = near_[k];
     result.sinking = std::max(result.sinking, -(gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c])));
   }
+  for (int c = 0; c < count; ++c)
+    change_[c] = displacement_[c] - start_[c];
+  changes_ = true;
   travelled_ += went;
   pose_ = pose;
   return result;

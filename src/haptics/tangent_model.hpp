@@ -33,6 +33,7 @@ class TangentModel : public ForceModel {
   [[nodiscard]] bool rub() noexcept;
   void settle_bonds() noexcept;
   [[nodiscard]] double stiffness_along(const Vector3& force) noexcept;
+  void expect(const Vector3& motion) noexcept;
   void look_around(const solvers::PressingTool& tool) noexcept;
   [[nodiscard]] bool catch_node(int candidate) noexcept;
   [[nodiscard]] std::span<const Vector3> rest() const;
@@ -53,6 +54,10 @@ class TangentModel : public ForceModel {
   PerCandidate<char> active_;
   PerCandidate<char> wrong_;         // candidates that change sides in a pivot
   PerCandidate<Vector3> step_;       // m, of the last round
+  PerCandidate<Vector3> start_;      // m, displacement_ when the last tick began
+  PerCandidate<Vector3> change_;     // m, what the last tick added to it
+  Vector3 motion_ = Vector3::Zero(); // m, of the tool in the last tick
+  bool changes_ = false;             // those are of this body
   PerCandidate<Vector3> bare_;       // m, displacement without the tool's pressure: under its friction alone
   PerCandidate<Vector3> along_;      // N, friction, along the tool's surface
   PerCandidate<Vector3> slip_;       // m, from where a candidate stuck to the tool
