@@ -29,6 +29,8 @@ class ForceModel {
   virtual bool solved(const ContactSnapshot& snapshot) noexcept = 0;
   /// Force with the tool at `pose` at `time` (s); zero before the first solve.
   virtual ModelForce at(const topology::ToolPose& pose, double time) noexcept = 0;
+  /// Fetches what the next at() will read into the processor's caches; changes nothing.
+  virtual void fetch() const noexcept {}
 };
 
 /// A model for the tool of a scenario. The shape must outlive it.

@@ -69,6 +69,13 @@ void HapticTick::locate(const DeviceState& device) noexcept {
   }
   fresh_ = false;
   located_ = device.tick + 1;
+  located_pose_ = pose;
+}
+
+void HapticTick::fetch() const noexcept {
+  if (with_tool_ && located_ > 0)
+    static_cast<void>(organ_->walk(tool_, located_pose_, contact_));
+  model_->fetch();
 }
 
 // Of the places of the edge that pressed in the last solve. A solve can take long, and the blade be out by then: over a

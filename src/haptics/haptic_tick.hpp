@@ -54,6 +54,9 @@ class HapticTick {
   void start(const DeviceState& device);
   void arrive(const ContactSnapshot& snapshot) noexcept;
   TickResult tick(const DeviceState& device) noexcept;
+  /// Fetches what the next tick will read into the processor's caches, where another thread has had them meanwhile.
+  /// Changes nothing: for the time in which a tick is waited for.
+  void fetch() const noexcept;
 
   [[nodiscard]] const PassivityControl& passivity() const { return passivity_; }
 
@@ -86,6 +89,7 @@ class HapticTick {
   Vector3 fading_ = Vector3::Zero();                                      // N, per tick
   double paid_ = 0;                    // J, of what is stored behind a force that solves find: put in by the hand
   Vector3 position_ = Vector3::Zero(); // m, of the last tick
+  topology::ToolPose located_pose_;    // of the tool, where contact_ was found
   bool connected_ = false;             // in the last tick
   bool finds_ = false;                 // no solve has come from where the tool was placed last,
   std::uint64_t placed_ = 0;           // at this tick

@@ -75,8 +75,12 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
   std::uint64_t lost = 0;
   for (; tick < count && !shared.stop.load(std::memory_order_relaxed); ++tick) {
     const long long due = start + static_cast<long long>(tick) * period;
-    if (due - spin > clock_now(CLOCK_MONOTONIC))
+    if (due - spin > clock_now(CLOCK_MONOTONIC)) {
       sleep_until(due - spin);
+      // While it slept others have had its core: what the tick reads comes back while it waits.
+      if (spins && due - spin / 2 > clock_now(CLOCK_MONOTONIC))
+        core.fetch();
+    }
     long long began = clock_now(CLOCK_MONOTONIC);
     while (began < due)
       began = clock_now(CLOCK_MONOTONIC);

@@ -128,6 +128,32 @@ ModelForce TangentModel::at(const topology::ToolPose& pose, double time) noexcep
   return snapshot_->condition == solvers::ContactCondition::bonded ? follow(pose) : press(pose);
 }
 
+void TangentModel::fetch() const noexcept {
+  if (condensed_ == nullptr || blade_.pressing())
+    return;
+  const auto touch = [](const auto& array, std::size_t begin, std::size_t count) {
+    constexpr std::size_t line = 64;
+    const char* const first = reinterpret_cast<const char*>(array.data() + begin);
+    const char* const last = reinterpret_cast<const char*>(array.data() + begin + count);
+    for (const char* at = first; at < last; at += line)
+      __builtin_prefetch(at);
+  };
+  const auto count = static_cast<std::size_t>(snapshot_->count);
+  for (const auto* array : {&displacement_, &moved_, &normal_, &step_, &start_, &change_})
+    touch(*array, 0, count);
+  for (const auto* array : {&gap_, &pressure_, &clearance_})
+    touch(*array, 0, count);
+  for (const auto* array : {&active_, &wrong_, &fresh_})
+    touch(*array, 0, count);
+  for (const auto* array : {&condensed_->rest, &condensed_->normals, &condensed_->base})
+    touch(*array, 0, count);
+  for (int a = 0; a < chosen_count_; ++a) {
+    const auto c = static_cast<std::size_t>(chosen_[a]);
+    touch(condensed_->compliance, 9 * c * count, 9 * count);
+    touch(response_, c * ld, 3 * count);
+  }
+}
+
 // Pressures of the active candidates that close their gaps: N^T C N p = -q by Cholesky, column by column. False: the
 // block is not positive definite, and the candidate that made it so has been let go.
 bool TangentModel::solve_active() noexcept {

@@ -20,6 +20,7 @@ class TangentModel : public ForceModel {
   explicit TangentModel(const topology::ToolShape& tool);
   bool solved(const ContactSnapshot& snapshot) noexcept override;
   ModelForce at(const topology::ToolPose& pose, double time) noexcept override;
+  void fetch() const noexcept override;
 
  private:
   template <typename T>
