@@ -15,6 +15,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -47,6 +48,25 @@ VectorX displacement_of(const ContactPatch& patch, const std::vector<Vector3>& f
   for (int c = 0; c < size_of(patch); ++c)
     stacked.segment<3>(3 * c) = forces[c];
   return patch.base_displacement + patch.compliance * stacked;
+}
+
+/// The same where few forces are not zero: of those columns alone.
+VectorX displacement_of_few(const ContactPatch& patch, const std::vector<Vector3>& forces) {
+  VectorX displacement = patch.base_displacement;
+  for (int c = 0; c < size_of(patch); ++c)
+    if (!forces[c].isZero(0))
+      displacement += patch.compliance.middleCols<3>(3 * c).lazyProduct(forces[c]);
+  return displacement;
+}
+
+/// N^T C N, column by column.
+void condense_along(const std::vector<Vector3>& normals, const MatrixX& compliance, VectorX& column,
+                    MatrixX& condensed) {
+  for (Eigen::Index d = 0; d < std::ssize(normals); ++d) {
+    column.noalias() = compliance.middleCols<3>(3 * d).lazyProduct(normals[d]);
+    for (Eigen::Index c = 0; c < std::ssize(normals); ++c)
+      condensed(c, d) = normals[c].dot(column.segment<3>(3 * c));
+  }
 }
 
 void summarise(const ContactPatch& patch, ContactState& state) {
@@ -119,30 +139,28 @@ void press_normally(const ContactPatch& patch, const PressingTool& tool, const C
   constexpr int undecided = 16;
   const int count = size_of(patch);
   MatrixX condensed(count, count);
-  VectorX gaps(count);
+  VectorX gaps(count), column(3 * count);
   std::vector<Vector3> normals(count);
   state.converged = false;
   double relaxation = 1;
   VectorX last_step;
   for (int iteration = 0; iteration < options.maximum_iterations; ++iteration) {
     ++state.iterations;
-    const VectorX base = displacement_of(patch, along);
+    const VectorX base = displacement_of_few(patch, along);
     for (int c = 0; c < count; ++c) {
       const Vector3 u = state.displacement.segment<3>(3 * c);
       const Gap gap = contact_gap(tool, patch.rest[c] + u, iteration < undecided ? 0 : flank_hold);
       normals[c] = gap.normal;
       gaps[c] = gap.distance + gap.normal.dot(base.segment<3>(3 * c) - u);
     }
-    for (int c = 0; c < count; ++c)
-      for (int d = 0; d < count; ++d)
-        condensed(c, d) = normals[c].dot(patch.compliance.block<3, 3>(3 * c, 3 * d) * normals[d]);
+    condense_along(normals, patch.compliance, column, condensed);
     const ComplementaritySolution solution =
         solve_complementarity(condensed, gaps, state.active, 0.1 * options.gap_tolerance);
     state.active = solution.active;
     const bool stands = tangential(normals, solution.forces, state);
     for (int c = 0; c < count; ++c)
       state.nodal_forces[c] = solution.forces[c] * normals[c] + along[c];
-    const VectorX displacement = displacement_of(patch, state.nodal_forces);
+    const VectorX displacement = displacement_of_few(patch, state.nodal_forces);
     const VectorX step = displacement - state.displacement;
     if (step.lpNorm<Eigen::Infinity>() < options.gap_tolerance && solution.converged && stands) {
       state.displacement = displacement;
@@ -326,6 +344,8 @@ ContactPatch bare_patch(const Discretisation& body, const std::vector<int>& cand
     patch.normals.push_back(problem.nodes.normals[node]);
     patch.spacings.push_back(problem.nodes.spacings[node]);
   }
+  static std::atomic<std::uint64_t> condensed = 0;
+  patch.number = ++condensed;
   patch.base = body.solve();
   patch.base_displacement = body.contact_displacements(candidates, {patch.base}).col(0);
   return patch;

@@ -24,6 +24,9 @@ struct ContactPatch {
   VectorX base_displacement;    // 3m, m: displacement without tool
   std::vector<Field> responses; // 3m fields for unit forces (with the far field of the coupling included), or fewer
   Field base;                   // field without tool
+  /// Of a patch that was condensed: patches of one number have equal nodes, compliance and base displacement. 0: not
+  /// known.
+  std::uint64_t number = 0;
 };
 
 /// Condenses the discretisation onto the candidates [De 2001, Eq. 5 and after, in compliance form].

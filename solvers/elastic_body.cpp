@@ -121,10 +121,18 @@ ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double fro
 
 VectorX NodalSupports::displacements(const Field& field) const {
   const Eigen::Index count = std::ssize(start) - 1;
-  VectorX result = VectorX::Zero(3 * count);
-  for (Eigen::Index i = 0; i < count; ++i)
-    for (int k = start[i]; k < start[i + 1]; ++k)
-      result.segment<3>(3 * i) += value[k] * field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(nodes[k]));
+  VectorX result(3 * count);
+  const double* const coefficients = field.coefficients.data();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    double x = 0, y = 0, z = 0; // sums in registers: most of a step that presses goes here
+    for (int k = start[i]; k < start[i + 1]; ++k) {
+      const double* const of_node = coefficients + 3 * static_cast<std::ptrdiff_t>(nodes[k]);
+      x += value[k] * of_node[0];
+      y += value[k] * of_node[1];
+      z += value[k] * of_node[2];
+    }
+    result.segment<3>(3 * i) = Vector3(x, y, z);
+  }
   return result;
 }
 

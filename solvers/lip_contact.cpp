@@ -181,8 +181,10 @@ ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const s
   held.compliance = patch.compliance;
   held.base_displacement = patch.base_displacement;
   const std::vector<int> a = closed_entries(closed, lips.modes);
-  if (a.empty())
+  if (a.empty()) {
+    held.number = patch.number;
     return held;
+  }
   const Eigen::PartialPivLU<MatrixX> lu(gathered(lips.compliance, a, a));
   const MatrixX reach = gathered(lips.tool_of_lips, all_of_size(lips.tool_of_lips.rows()), a);
   held.compliance -= reach * lu.solve(gathered(lips.lips_of_tool, a, all_of_size(lips.lips_of_tool.cols())));

@@ -368,6 +368,7 @@ void Session::condense(const std::vector<int>& candidates, BodyModel& model, boo
 }
 
 void Session::solve(const StepSample& sample, BodyModel& model) {
+  displaced_body_ = nullptr;
   if (tool_in_reach() && model.patch.nodes.empty())
     condense(candidates(model), model);
   const ToolSettings* tool = scenario_.tool ? &*scenario_.tool : nullptr;
@@ -407,6 +408,18 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
   warn("patch", "the tool reaches surface nodes beyond its candidate patch; give a larger contact.candidate_radius");
 }
 
+// Displacements at the nodes, 3 a node, m; those asked for last are kept.
+const VectorX& Session::displacements_of(const BodyModel& model) const {
+  const VectorX& coefficients = model.field.coefficients;
+  if (displaced_body_ != model.body.get() || displaced_coefficients_.size() != coefficients.size() ||
+      displaced_coefficients_ != coefficients) {
+    displaced_ = model.body->nodal_displacements(model.field);
+    displaced_coefficients_ = coefficients;
+    displaced_body_ = model.body.get();
+  }
+  return displaced_;
+}
+
 // Surface nodes that the tool has gone into although they were not candidates.
 std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const {
   const solvers::NodeCloud& nodes = model.sprinkling.nodes;
@@ -417,7 +430,7 @@ std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pos
   for (const solvers::Prescribed& entry : model.body->problem().prescribed)
     known[entry.node] = 1;
   // A share of the surface moves about as its node does: the mean over it is looked at near the tool alone.
-  const VectorX displacements = model.body->nodal_displacements(model.field);
+  const VectorX& displacements = displacements_of(model);
   const auto near = [&](int i) {
     return topology::tool_distance(scenario_.tool->shape, pose, nodes.positions[i] + displacements.segment<3>(3 * i)) <
            zone_.spacing.fine;
@@ -456,7 +469,7 @@ void Session::evaluate(StepResult& result) {
   result.iterations = tool.iterations;
   result.converged = tool.converged;
   result.largest_penetration = tool.largest_penetration;
-  node_displacements_ = model_.body->nodal_displacements(model_.field);
+  node_displacements_ = displacements_of(model_);
   if (!force_only_)
     result.residual = residual(model_);
   if (blade_force_ != nullptr) {

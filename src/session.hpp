@@ -196,6 +196,7 @@ class Session {
   void assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near);
   void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
   void solve(const StepSample& sample, BodyModel& model);
+  [[nodiscard]] const VectorX& displacements_of(const BodyModel& model) const;
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
   bool move_blade(const StepSample& sample, CutReport& report);
   bool cut(const StepSample& sample, CutReport& report);
@@ -350,7 +351,9 @@ class Session {
   bool blade_lifted_ = false;                     // its next pose places it
   bool hand_led_ = false;                         // the blade goes where it likes, not along the scenario's path
   std::vector<solvers::PointState> node_states_;
-  VectorX node_displacements_; // m, 3 a node, in the last step
+  VectorX node_displacements_;                                      // m, 3 a node, in the last step
+  mutable VectorX displaced_, displaced_coefficients_;              // at the nodes, of a field since solve() began
+  mutable const solvers::Discretisation* displaced_body_ = nullptr; // of that field; null: none
   std::optional<Grasp> grasp_;
   std::optional<bool> grip_; // a hand's; empty: by the times of the scenario
   bool lost_grip_ = false;   // the piece in the grasper has come off

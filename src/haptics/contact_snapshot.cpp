@@ -34,8 +34,12 @@ namespace {
 std::shared_ptr<const CondensedContact> condensed_contact(const solvers::ContactPatch& patch,
                                                           const std::vector<int>& chosen,
                                                           const std::shared_ptr<const CondensedContact>& last) {
+  const bool whole = patch.number != 0 && chosen.size() == patch.nodes.size();
+  if (whole && last != nullptr && last->patch == patch.number)
+    return last;
   const std::size_t rows = 3 * chosen.size();
   CondensedContact made;
+  made.patch = whole ? patch.number : 0;
   for (const int c : chosen) {
     made.rest.push_back(patch.rest[c]);
     made.normals.push_back(patch.normals[c]);

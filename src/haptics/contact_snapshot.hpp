@@ -26,6 +26,7 @@ struct CondensedContact {
   std::vector<Vector3> base;      // m, displacement without tool
   std::vector<double> compliance; // m/N, column-major, 3 rows a candidate
   double asymmetry = 0;           // |C - C^T| / |C + C^T| before it was made symmetric
+  std::uint64_t patch = 0;        // number of the patch of which these are all candidates; 0: not known
 };
 
 /// The condensed contact and the state of the solve. Every array is allocated once, for most_candidates; only the first
