@@ -300,8 +300,8 @@ void TangentModel::settle_bonds() noexcept {
       bond_[c] += normal_[c].dot(displacement_[c] - bond_[c]) * normal_[c];
 }
 
-// Where the tool goes on as in the last tick the candidates do, too, and the rounds start there: their first step is what
-// the motion changes by, and not the motion.
+// Where the tool goes on as in the last tick the candidates do, too, and the rounds start there: their first step is
+// what the motion changes by, and not the motion.
 void TangentModel::expect(const Vector3& motion) noexcept {
   const double before = motion_.squaredNorm();
   const double share = changes_ && before > 0 ? std::clamp(motion.dot(motion_) / before, 0.0, most_ahead) : 0;
