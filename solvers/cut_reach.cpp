@@ -61,7 +61,7 @@ NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed
   NodeCloud present;
   for (int i = 0; i < nodes.size(); ++i)
     if (removed[i] == 0)
-      present.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+      present.add(nodes, i);
   return present;
 }
 

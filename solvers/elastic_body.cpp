@@ -21,10 +21,12 @@ Problem checked(Problem problem) {
 void check_problem(const Problem& problem) {
   problem.material.check();
   const NodeCloud& nodes = problem.nodes;
-  if (nodes.spacings.size() != nodes.positions.size() || nodes.kinds.size() != nodes.positions.size() ||
-      nodes.normals.size() != nodes.positions.size())
-    throw InputError(fmt::format("{} node positions, but {} spacings, {} kinds and {} normals", nodes.positions.size(),
-                                 nodes.spacings.size(), nodes.kinds.size(), nodes.normals.size()));
+  const std::size_t count = nodes.positions.size();
+  if (nodes.spacings.size() != count || nodes.reaches.size() != count || nodes.kinds.size() != count ||
+      nodes.normals.size() != count)
+    throw InputError(fmt::format("{} node positions, but {} spacings, {} reaches, {} kinds and {} normals", count,
+                                 nodes.spacings.size(), nodes.reaches.size(), nodes.kinds.size(),
+                                 nodes.normals.size()));
   if (nodes.size() < 4)
     throw InputError(fmt::format("{} nodes: a linear basis in three dimensions needs at least 4", nodes.size()));
   if (!problem.loads.initial_strain.allFinite())
@@ -34,6 +36,9 @@ void check_problem(const Problem& problem) {
       throw InputError(fmt::format("node {}: its position is not finite", i));
     if (!(nodes.spacings[i] > 0) || !std::isfinite(nodes.spacings[i]))
       throw InputError(fmt::format("node {}: spacing {} m must be positive", i, nodes.spacings[i]));
+    if (!(nodes.reaches[i] > 0 && nodes.reaches[i] <= nodes.spacings[i]))
+      throw InputError(fmt::format("node {}: a reach of {} m; allowed: above 0, at most its spacing of {} m", i,
+                                   nodes.reaches[i], nodes.spacings[i]));
   }
   std::vector<std::array<bool, 3>> held(nodes.positions.size(), {false, false, false});
   bool any_held = false;
@@ -103,10 +108,11 @@ Sight sight_about_cut(const Problem& problem, SightRule rule, double front_radiu
   return sight;
 }
 
-ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor)
+ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor,
+                         std::vector<double> NodeCloud::*lengths)
     : problem_(checked(std::move(problem))), spheres_([&] {
         const Stopwatch watch;
-        Spheres spheres(problem_.nodes.positions, problem_.nodes.spacings, rho, Basis::linear, worst_moment_condition,
+        Spheres spheres(problem_.nodes.positions, problem_.nodes.*lengths, rho, Basis::linear, worst_moment_condition,
                         sight_about_cut(problem_, rule, front_radius_factor));
         report_.supports_seconds = watch.seconds();
         return spheres;

@@ -81,7 +81,9 @@ class ElasticBody : public Discretisation {
 
  protected:
   /// Spheres at the front of a cut are larger by `front_radius_factor`.
-  ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor = 1);
+  /// Radii rho times `lengths` of the nodes.
+  ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor = 1,
+              std::vector<double> NodeCloud::*lengths = &NodeCloud::spacings);
   Problem problem_;
   AssemblyReport report_;
   Spheres spheres_;

@@ -27,6 +27,9 @@ std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const Discret
 /// Support radius over spacing that the options ask for, or the default for this material.
 double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options);
 
+/// What the radii are that many times of: the reaches of the nodes, near incompressibility their spacings.
+std::vector<double> NodeCloud::*galerkin_lengths(const Material& material);
+
 /// Penalty of a held mean displacement of a node, N/m per component.
 double constraint_stiffness(const Problem& problem, int node);
 

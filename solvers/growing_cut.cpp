@@ -18,15 +18,17 @@ namespace spherecut::solvers {
 
 double window_share(const Problem& problem, const DiscretisationOptions& method, const topology::SurfaceMesh& way) {
   const std::vector<double>& spacings = problem.nodes.spacings;
-  const double rho = method.method == Method::collocation ? front_radius_factor * collocation_support_radius(method)
-                                                          : galerkin_support_radius(problem, method);
+  const bool collocates = method.method == Method::collocation;
+  const double rho =
+      collocates ? front_radius_factor * collocation_support_radius(method) : galerkin_support_radius(problem, method);
+  const std::vector<double>& lengths = collocates ? spacings : problem.nodes.*galerkin_lengths(problem.material);
   const double finest = *std::min_element(spacings.begin(), spacings.end());
   const Nearness to_way(sample_points(way, 0, finest));
   // Cells that a change within a sphere of it can reach, and the nodes whose spheres reach those.
   const double reach = (1 + node_margin) * rho * finest + method.cell_size * finest;
   int inside = 0;
   for (std::size_t i = 0; i < spacings.size(); ++i)
-    inside += to_way(problem.nodes.positions[i]) < reach + rho * spacings[i] ? 1 : 0;
+    inside += to_way(problem.nodes.positions[i]) < reach + rho * lengths[i] ? 1 : 0;
   return static_cast<double>(inside) / static_cast<double>(spacings.size());
 }
 
@@ -251,7 +253,7 @@ GrowingCut::State::increment(const NodeChange& change,
     next.nodes.kinds[node] = NodeKind::interior; // it has no share of the surface any more
   }
   for (int k = 0; k < change.added.size(); ++k)
-    next.nodes.add(change.added.positions[k], change.added.spacings[k], change.added.kinds[k], change.added.normals[k]);
+    next.nodes.add(change.added, k);
   gone.resize(next.nodes.size(), 0);
   const topology::Incision* const before = problem.incision.get();
   next.incision = incision;
@@ -277,8 +279,8 @@ GrowingCut::State::increment(const NodeChange& change,
   const Stopwatch sphere_watch;
   const std::vector<double>& old_radii = spheres->radii();
   increment.spheres =
-      std::make_unique<Spheres>(next.nodes.positions, next.nodes.spacings, rho, Basis::linear, worst_moment_condition,
-                                sight_about_cut(next, options.method.sight), gone);
+      std::make_unique<Spheres>(next.nodes.positions, next.nodes.*galerkin_lengths(next.material), rho, Basis::linear,
+                                worst_moment_condition, sight_about_cut(next, options.method.sight), gone);
   std::vector<double> radii = increment.spheres->radii();
   std::vector<int> changed_nodes = change.removed;
   for (int i = 0; i < next.nodes.size(); ++i)

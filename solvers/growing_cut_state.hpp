@@ -86,8 +86,9 @@ struct GrowingCut::State {
 
   [[nodiscard]] BackgroundOptions background() const { return {options.method.cell_size, options.method.quadrature}; }
   [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
-    return std::make_unique<Spheres>(problem.nodes.positions, problem.nodes.spacings, rho, Basis::linear,
-                                     worst_moment_condition, sight_about_cut(problem, options.method.sight), removed);
+    return std::make_unique<Spheres>(problem.nodes.positions, problem.nodes.*galerkin_lengths(problem.material), rho,
+                                     Basis::linear, worst_moment_condition,
+                                     sight_about_cut(problem, options.method.sight), removed);
   }
   [[nodiscard]] double enrichment_reach() const {
     return options.method.sight == SightRule::enriched ? sight_about_cut(problem, options.method.sight).reach / rho

@@ -358,6 +358,8 @@ Sprinkling Filler::finish() {
     throw InputError(
         fmt::format("sprinkle: of at least 4 nodes only {} would fit into the body at spacings of {} to {} m", size(),
                     spacing_.fine, spacing_.coarse));
+  for (int i = 0; i < size(); ++i)
+    nodes_.reaches[i] = spacing_.reach(nodes_.positions[i], nodes_.spacings[i]);
   Sprinkling result;
   result.report = inspect_filling(domain_, options_, nodes_, volume_samples_);
   require_filled(result.report, options_.minimum_density);

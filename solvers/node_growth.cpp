@@ -125,7 +125,7 @@ SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const Sprink
   std::vector<bool> fixed;
   for (int j = 0; j < previous.size(); ++j)
     if (const Vector3& x = previous.positions[j]; (retired.empty() || !retired[j]) && context.contains(x)) {
-      around.add(x, previous.spacings[j], previous.kinds[j], previous.normals[j]);
+      around.add(previous, j);
       ids.push_back(j);
       // Lips outside the region too: their pairs are not chosen anew, and the search for pairs has to know them.
       const bool is_seed = std::any_of(options.seeds.begin(), options.seeds.end(),
@@ -145,7 +145,8 @@ SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const Sprink
     if (i < std::ssize(filler.kept_from()) && filler.kept_from()[i] >= 0)
       kept[filler.kept_from()[i]] = true;
     else
-      increment.added.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+      increment.added.reaches[increment.added.add(nodes, i)] =
+          options.spacing.reach(nodes.positions[i], nodes.spacings[i]);
   for (std::size_t k = 0; k < ids.size(); ++k)
     if (!kept[k] && region.contains(around.positions[k]))
       increment.removed.push_back(ids[k]);

@@ -14,9 +14,16 @@ namespace spherecut::solvers {
 int NodeCloud::add(const Vector3& position, double spacing, NodeKind kind, const Vector3& normal) {
   positions.push_back(position);
   spacings.push_back(spacing);
+  reaches.push_back(spacing);
   kinds.push_back(kind);
   normals.push_back(normal);
   return size() - 1;
+}
+
+int NodeCloud::add(const NodeCloud& other, int i) {
+  const int added = add(other.positions[i], other.spacings[i], other.kinds[i], other.normals[i]);
+  reaches[added] = other.reaches[i];
+  return added;
 }
 
 double SpacingField::operator()(const Vector3& x) const {
@@ -29,6 +36,39 @@ double SpacingField::operator()(const Vector3& x) const {
   if (!segments.empty())
     distance = std::min(distance, distance_to_segments(x, segments));
   return std::clamp(fine + slope * (distance - plateau * fine), fine, coarse);
+}
+
+double SpacingField::reach(const Vector3& x, double h) const {
+  constexpr double full = 2; // spacings: sphere for which nodes are counted
+  constexpr int shells = 4;
+  if (centres.empty() && segments.empty())
+    return h;
+  // Six faces and eight corners of a cube: mean over a sphere to third degree.
+  static const std::array<Vector3, 14> directions = [] {
+    std::array<Vector3, 14> result;
+    int k = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      for (const double sign : {-1.0, 1.0})
+        result[k++] = sign * Vector3::Unit(axis);
+    for (int corner = 0; corner < 8; ++corner)
+      result[k++] = Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1) / std::sqrt(3.0);
+    return result;
+  }();
+  // In units of the nodes that a constant spacing puts into the sphere.
+  double nodes = 0, inner = 0;
+  for (int shell = 0; shell < shells; ++shell) {
+    const double middle = full * (shell + 0.5) / shells, outer = std::pow((shell + 1.0) / shells, 3);
+    double density = 0;
+    for (const Vector3& direction : directions) {
+      const double ratio = h / (*this)(x + middle * h * direction);
+      density += ratio * ratio * ratio / directions.size();
+    }
+    if (nodes + density * (outer - inner) > 1)
+      return h * std::cbrt(inner + (1 - nodes) / density);
+    nodes += density * (outer - inner);
+    inner = outer;
+  }
+  return h;
 }
 
 std::vector<std::array<Vector3, 2>> front_segments(const topology::Incision& incision, double length) {

@@ -23,11 +23,15 @@ constexpr double lip_offset = 1e-4;
 /// Structure of arrays; all vectors have the same length N.
 struct NodeCloud {
   std::vector<Vector3> positions; // m, rest frame
-  std::vector<double> spacings;   // local node spacing h, m; support radius = rho * h
+  std::vector<double> spacings;   // local node spacing h, m
+  std::vector<double> reaches;    // m, at most h; support radius = rho * reach where the method says so, else rho * h
   std::vector<NodeKind> kinds;
   std::vector<Vector3> normals; // unit outward normal of surface and edge nodes and, out of its face, of a lip node
   [[nodiscard]] int size() const { return static_cast<int>(positions.size()); }
+  /// Adds a node whose reach is its spacing.
   int add(const Vector3& position, double spacing, NodeKind kind, const Vector3& normal = Vector3::Zero());
+  /// Adds node `i` of another cloud as it is there.
+  int add(const NodeCloud& other, int i);
 };
 
 /// Index of each lip node's partner across the sheet, -1 where there is none and for nodes of other kinds.
@@ -44,6 +48,11 @@ struct SpacingField {
   std::vector<Vector3> centres{}; // of balls, a tool's contact; with no segments either: `coarse` everywhere
   std::vector<std::array<Vector3, 2>> segments{}; // m, ends of straight pieces: the front of a cut, the way ahead of it
   [[nodiscard]] double operator()(const Vector3& x) const;
+  /// m: radius, over rho, of the sphere of a node placed at x with spacing h. It is h where the spacing is constant. A
+  /// sphere of two spacings reaches far into a zone that is finer, where it meets many times the nodes that it would
+  /// meet otherwise, and couples them all: it is shrunk until the field asks for no more nodes in it than a constant
+  /// spacing would.
+  [[nodiscard]] double reach(const Vector3& x, double h) const;
   /// m, nothing asks for less
   [[nodiscard]] double finest() const { return centres.empty() && segments.empty() ? coarse : fine; }
 };

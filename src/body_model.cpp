@@ -256,12 +256,12 @@ solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const 
       ++removed;
       continue;
     }
-    after.nodes.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+    after.nodes.add(nodes, i);
     after.kept_from.push_back(i);
   }
   const solvers::NodeCloud& added = change.added;
   for (int i = 0; i < added.size(); ++i) {
-    after.nodes.add(added.positions[i], added.spacings[i], added.kinds[i], added.normals[i]);
+    after.nodes.add(added, i);
     after.kept_from.push_back(-1);
   }
   const auto count = [&](solvers::NodeKind kind) {

@@ -20,6 +20,8 @@ namespace spherecut::topology {
 namespace {
 
 constexpr double cell_reach = 6;    // half size of the initial box of a cell, in h
+constexpr double first_reach = 2.0; // from a node, within which others are looked for first, in h
+constexpr double beside = 1.5;      // a surface this near to a node cuts its cell before the neighbours do, in h
 constexpr double cap_height = 0.75; // how far outside the curved surface a cell is cut off, in h
 constexpr double lip_reach = 0.01;  // a node this near to a sheet lies on one of its faces, in h
 constexpr double lip_lift = 0.1;    // by which it is lifted to look for its neighbours, in h
@@ -59,6 +61,9 @@ struct CellBuilder {
   void add_lip(int i, int j, const std::vector<Vector3>& polygon, const Vector3& outward, CellComplex& cells,
                std::vector<Vector3>& closure) const;
   bool cut(int i);
+  bool cut_by_neighbours(int i);
+  /// By the planes that are `from` to `to` spacings away (from 0: outside too). False when nothing is left.
+  bool cut_by_planes(const Vector3& x, double h, double from, double to);
   [[nodiscard]] bool hidden(int i, int j) const {
     if (incision == nullptr)
       return false;
@@ -67,53 +72,68 @@ struct CellBuilder {
   }
 };
 
-bool CellBuilder::cut(int i) {
-  const Vector3& x = nodes[i];
-  const double h = spacings[i];
-  cell.init(-cell_reach, cell_reach, -cell_reach, cell_reach, -cell_reach, cell_reach);
+bool CellBuilder::cut_by_planes(const Vector3& x, double h, double from, double to) {
   for (std::size_t p = 0; p < domain.planes().size(); ++p) {
     const Plane& plane = domain.planes()[p];
     const double distance = -plane.signed_distance(x) / h;
-    if (distance < cell_reach * 1.8 && !cell.nplane(plane.normal.x(), plane.normal.y(), plane.normal.z(), 2 * distance,
-                                                    first_plane_id - static_cast<int>(p)))
+    if ((from > 0 && distance < from) || distance >= to)
+      continue;
+    if (!cell.nplane(plane.normal.x(), plane.normal.y(), plane.normal.z(), 2 * distance,
+                     first_plane_id - static_cast<int>(p)))
       return false;
   }
+  return true;
+}
+
+bool CellBuilder::cut(int i) {
+  // Planes that are not beside it mostly lie beyond its neighbours: last, where the cell still reaches them.
+  return cut_by_neighbours(i) &&
+         cut_by_planes(nodes[i], spacings[i], beside, 0.5 * std::sqrt(cell.max_radius_squared()) + 1e-9);
+}
+
+bool CellBuilder::cut_by_neighbours(int i) {
+  const Vector3& x = nodes[i];
+  const double h = spacings[i];
+  cell.init(-cell_reach, cell_reach, -cell_reach, cell_reach, -cell_reach, cell_reach);
+  if (!cut_by_planes(x, h, 0, beside))
+    return false;
   if (curved) {
     const double distance = -domain.curved_distance(x) / h;
-    if (distance < 1.5) {
+    if (distance < beside) {
       const Vector3 n = domain.curved_gradient(x);
       cell.nplane(n.x(), n.y(), n.z(), 2 * (distance + cap_height), cap_id);
     }
   }
-  double covered = 0, reach = 2.2;
+  // A node farther away than twice the cell's farthest corner cuts nothing; voro++ holds corners at twice their place.
+  double covered = 0, reach = first_reach; // h
   while (true) {
     near.clear();
     tree.within(x, reach * h, near);
     std::sort(near.begin(), near.end());
     int since_check = 0;
-    double needed = 2 * std::sqrt(0.25 * cell.max_radius_squared());
+    double needed = cell.max_radius_squared();
     for (const PointTree::Found& other : near) {
-      const double distance = std::sqrt(other.squared_distance) / h;
-      if (other.index == i || distance < covered)
+      const double squared = other.squared_distance / (h * h);
+      if (other.index == i || squared < covered * covered)
         continue;
-      if (distance < 1e-7)
+      if (squared < 1e-14)
         throw InputError(
             fmt::format("nodes {} and {} coincide at ({:.6g}, {:.6g}, {:.6g}) m", i, other.index, x.x(), x.y(), x.z()));
-      if (distance > needed)
+      if (squared > needed)
         return true;
       const Vector3 d = (nodes[other.index] - x) / h;
-      if (!cell.nplane(d.x(), d.y(), d.z(), distance * distance, other.index))
+      if (!cell.nplane(d.x(), d.y(), d.z(), squared, other.index))
         return false;
       if (++since_check == 4) {
         since_check = 0;
-        needed = 2 * std::sqrt(0.25 * cell.max_radius_squared());
+        needed = cell.max_radius_squared();
       }
     }
-    needed = 2 * std::sqrt(0.25 * cell.max_radius_squared());
-    if (needed <= reach || near.size() == nodes.size())
+    const double farthest = std::sqrt(cell.max_radius_squared());
+    if (farthest <= reach || near.size() == nodes.size())
       return true;
     covered = reach;
-    reach = std::min(needed * 1.01, reach * 1.6);
+    reach = std::min(farthest * 1.01, reach * 1.6);
   }
 }
 
@@ -218,6 +238,10 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
   CellPolygon polygon;
   for (const int neighbour : neighbours) {
     const int size = face_vertices[position++];
+    if (!near_surface && neighbour >= 0 && (neighbour < i || wanted[neighbour] == 0)) {
+      position += size; // had from there
+      continue;
+    }
     polygon.vertices.clear();
     polygon.phi.clear();
     Vector3 middle = Vector3::Zero();

@@ -148,10 +148,10 @@ class Meshless final : public BackEnd {
         ++r;
         continue;
       }
-      kept.add(nodes_.positions[i], nodes_.spacings[i], nodes_.kinds[i], nodes_.normals[i]);
+      kept.add(nodes_, i);
     }
     for (int j = 0; j < change.added.size(); ++j)
-      kept.add(change.added.positions[j], change.added.spacings[j], change.added.kinds[j], change.added.normals[j]);
+      kept.add(change.added, j);
     nodes_ = std::move(kept);
   }
 

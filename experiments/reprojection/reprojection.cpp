@@ -127,7 +127,7 @@ Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, const topo
     for (int node : change.removed)
       retired[node] = true;
     for (int j = 0; j < change.added.size(); ++j)
-      nodes.add(change.added.positions[j], change.added.spacings[j], change.added.kinds[j], change.added.normals[j]);
+      nodes.add(change.added, j);
     retired.resize(nodes.size(), false);
     wound.grow(sweep.sheets());
     if (body)
@@ -139,7 +139,7 @@ Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, const topo
   }
   for (int i = 0; i < nodes.size(); ++i)
     if (!retired[i]) {
-      grown.nodes.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+      grown.nodes.add(nodes, i);
       grown.kept += i < first_count ? 1 : 0;
     }
   grown.incision = sweep.incision();

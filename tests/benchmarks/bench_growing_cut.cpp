@@ -115,8 +115,7 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
       for (int node : increment.removed)
         scene.retired[node] = true;
       for (int j = 0; j < increment.added.size(); ++j)
-        scene.nodes.add(increment.added.positions[j], increment.added.spacings[j], increment.added.kinds[j],
-                        increment.added.normals[j]);
+        scene.nodes.add(increment.added, j);
       scene.retired.resize(scene.nodes.size(), false);
       const NodeChange change{increment.removed, increment.added};
       if (!fan) // the path is scripted: the next increment is known before the blade is there
@@ -185,9 +184,9 @@ void growth_of_collocation(benchmark::State& state, SightRule sight) {
         if (r < std::ssize(change.removed) && change.removed[static_cast<std::size_t>(r)] == i)
           ++r;
         else
-          next.add(scene.nodes.positions[i], scene.nodes.spacings[i], scene.nodes.kinds[i], scene.nodes.normals[i]);
+          next.add(scene.nodes, i);
       for (int j = 0; j < change.added.size(); ++j)
-        next.add(change.added.positions[j], change.added.spacings[j], change.added.kinds[j], change.added.normals[j]);
+        next.add(change.added, j);
       scene.nodes = std::move(next);
       scene.retired.assign(scene.nodes.size(), false);
       start = Clock::now();

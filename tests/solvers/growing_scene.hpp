@@ -83,9 +83,9 @@ struct GrowingScene {
       if (gone < change.removed.size() && change.removed[gone] == i)
         ++gone;
       else
-        next.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+        next.add(nodes, i);
     for (int k = 0; k < change.added.size(); ++k)
-      next.add(change.added.positions[k], change.added.spacings[k], change.added.kinds[k], change.added.normals[k]);
+      next.add(change.added, k);
     nodes = std::move(next);
     return change;
   }

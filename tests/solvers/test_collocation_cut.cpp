@@ -48,7 +48,7 @@ void clear_the_sheet(Problem& problem) {
   for (int i = 0; i < nodes.size(); ++i) {
     const auto face = problem.incision->closest(nodes.positions[i], 0.9 * nodes.spacings[i]);
     if (nodes.kinds[i] == NodeKind::lip || !face || face->on_border)
-      kept.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+      kept.add(nodes, i);
   }
   problem.nodes = kept;
 }

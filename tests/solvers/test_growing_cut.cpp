@@ -29,7 +29,7 @@ struct GrowingBlock {
     domain = block.domain;
     for (int i = 0; i < block.nodes.size(); ++i)
       if (block.nodes.kinds[i] != NodeKind::lip)
-        nodes.add(block.nodes.positions[i], block.nodes.spacings[i], block.nodes.kinds[i], block.nodes.normals[i]);
+        nodes.add(block.nodes, i);
     removed.assign(nodes.size(), 0);
     append_row(-0.9);
     append_row(front);
@@ -97,7 +97,7 @@ struct GrowingBlock {
         change.added.add(x + side * lip_offset * spacing * frame.normal, spacing, NodeKind::lip, -side * frame.normal);
     }
     for (int k = 0; k < change.added.size(); ++k)
-      nodes.add(change.added.positions[k], change.added.spacings[k], change.added.kinds[k], change.added.normals[k]);
+      nodes.add(change.added, k);
     removed.resize(nodes.size(), 0);
     return change;
   }
@@ -189,8 +189,8 @@ TEST_CASE("Nodes finer than the cells they come into are not followed on those c
     fine.add(middle + spacing / 3 * Vector3(k % 3 - 1.0, k / 3 % 3 - 1.0, k / 9 - 1.0), spacing / 3, NodeKind::interior,
              Vector3::Zero());
   for (int k = 0; k < fine.size(); ++k) {
-    change.added.add(fine.positions[k], fine.spacings[k], fine.kinds[k], fine.normals[k]);
-    block.nodes.add(fine.positions[k], fine.spacings[k], fine.kinds[k], fine.normals[k]);
+    change.added.add(fine, k);
+    block.nodes.add(fine, k);
   }
   block.removed.resize(static_cast<std::size_t>(block.nodes.size()), 0);
   const GrowthReport report = cut.grow(change, block.incision());
@@ -206,8 +206,7 @@ TEST_CASE("Nodes finer than the cells they come into are not followed on those c
   for (int i = 0; i < block.nodes.size(); ++i)
     if (block.removed[i] == 0) {
       place[i] = present.nodes.size();
-      present.nodes.add(block.nodes.positions[i], block.nodes.spacings[i], block.nodes.kinds[i],
-                        block.nodes.normals[i]);
+      present.nodes.add(block.nodes, i);
     }
   for (Prescribed& entry : present.prescribed)
     entry.node = place[entry.node];

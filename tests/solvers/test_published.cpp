@@ -38,10 +38,7 @@ NodeCloud box_cloud(int n, std::uint64_t seed) {
           faces += low || high ? 1 : 0;
         }
         const NodeKind kind = faces == 0 ? NodeKind::interior : (faces == 1 ? NodeKind::surface : NodeKind::edge);
-        cloud.positions.push_back(x);
-        cloud.spacings.push_back(h);
-        cloud.kinds.push_back(kind);
-        cloud.normals.push_back(faces > 0 ? Vector3(normal.normalized()) : normal);
+        cloud.add(x, h, kind, faces > 0 ? Vector3(normal.normalized()) : normal);
       }
   return cloud;
 }

@@ -44,6 +44,7 @@ void require_same_bits(const NodeCloud& a, const NodeCloud& b) {
   for (int i = 0; i < a.size(); ++i) {
     REQUIRE(a.positions[i] == b.positions[i]);
     REQUIRE(a.spacings[i] == b.spacings[i]);
+    REQUIRE(a.reaches[i] == b.reaches[i]);
     REQUIRE(a.kinds[i] == b.kinds[i]);
     REQUIRE(a.normals[i] == b.normals[i]);
   }
@@ -57,7 +58,7 @@ void check_cloud(const topology::Domain& domain, const SprinkleOptions& options,
   for (int i = 0; i < nodes.size(); ++i) {
     const double distance = domain.signed_distance(nodes.positions[i]);
     const double h = options.spacing(nodes.positions[i]);
-    wrong += nodes.spacings[i] != h;
+    wrong += nodes.spacings[i] != h || nodes.reaches[i] != options.spacing.reach(nodes.positions[i], h);
     if (nodes.kinds[i] == NodeKind::interior)
       wrong += !(distance <= -options.wall_clearance * h) || nodes.normals[i] != Vector3::Zero();
     else
@@ -104,6 +105,45 @@ TEST_CASE("The spacing field is flat about its centres and grows with its slope"
   CHECK(field({1, 0, -0.045}) == Approx(0.015));
   CHECK(field({0.5, 0, 0}) == 0.03);
   CHECK(SpacingField{0.01, 0.03}({0, 0, 0}) == 0.03);
+}
+
+TEST_CASE("A sphere that reaches into a finer zone holds the nodes that one of constant spacing would") {
+  // Nodes that the field asks for within two of the length about x, over those of a constant spacing.
+  const auto population = [](const SpacingField& field, const Vector3& x, double h, double length) {
+    constexpr int cells = 40;
+    double sum = 0;
+    for (int i = 0; i < cells; ++i)
+      for (int j = 0; j < cells; ++j)
+        for (int k = 0; k < cells; ++k) {
+          const Vector3 y = (Vector3(i, j, k).array() + 0.5).matrix() * (2.0 / cells) - Vector3::Ones();
+          if (y.norm() < 1)
+            sum += std::pow(h / field(x + 2 * length * y), 3) * std::pow(2.0 / cells * length / h, 3);
+        }
+    return sum / (4 * std::numbers::pi / 3);
+  };
+  const SpacingField point{0.004, 0.05, 0.35, 0.01, 1.5, {{0, 0, 0}}};
+  SpacingField line = point;
+  line.centres.clear();
+  line.segments = {{Vector3(-0.1, 0, 0), Vector3(0.1, 0, 0)}};
+  int shrunk = 0;
+  for (const SpacingField& field : {point, line})
+    for (const double distance : {0.0, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.4}) {
+      const Vector3 x = distance * Vector3(0.1, 0.6, 0.8).normalized();
+      const double h = field(x), reach = field.reach(x, h);
+      INFO("distance " << distance << ", reach over spacing " << reach / h);
+      CHECK(reach > 0.4 * h);
+      CHECK(reach <= h);
+      const double filled = population(field, x, h, reach);
+      CHECK(filled < 1.12);
+      if (reach < h) {
+        ++shrunk;
+        CHECK(filled > 0.88);
+      }
+    }
+  CHECK(shrunk > 8);
+  CHECK(point.reach({0.4, 0, 0}, 0.05) == 0.05); // far from the zone
+  CHECK(point.reach({0, 0, 0}, 0.004) == 0.004); // in it
+  CHECK(SpacingField{0.01, 0.03}.reach({0, 0, 0}, 0.03) == 0.03);
 }
 
 TEST_CASE("A box is filled evenly, with all its corners and edges") {
@@ -317,7 +357,7 @@ TEST_CASE("An emptied zone is reported and refused") {
   int coarse = 0;
   for (int i = 0; i < full.size(); ++i)
     if (full.spacings[i] < 0.015 || coarse++ % 2 != 0)
-      hollow.add(full.positions[i], full.spacings[i], full.kinds[i], full.normals[i]);
+      hollow.add(full, i);
   CHECK_NOTHROW(require_filled(inspect_filling(*hemisphere, options, full), 0.8));
   const SprinkleReport report = inspect_filling(*hemisphere, options, hollow);
   CHECK(report.zones.front().density > 0.9);

@@ -45,14 +45,14 @@ struct GrowingCloud {
     }
     const NodeCloud& added = increment.added;
     for (int i = 0; i < added.size(); ++i)
-      nodes.add(added.positions[i], added.spacings[i], added.kinds[i], added.normals[i]);
+      nodes.add(added, i);
     retired.resize(nodes.size(), false);
   }
   [[nodiscard]] NodeCloud alive() const {
     NodeCloud result;
     for (int i = 0; i < nodes.size(); ++i)
       if (!retired[i])
-        result.add(nodes.positions[i], nodes.spacings[i], nodes.kinds[i], nodes.normals[i]);
+        result.add(nodes, i);
     return result;
   }
 };
@@ -64,6 +64,7 @@ void check_grown(const topology::Domain& domain, const SprinkleOptions& options,
   for (int i = 0; i < nodes.size(); ++i) {
     const Vector3& x = nodes.positions[i];
     const double h = nodes.spacings[i];
+    wrong += nodes.reaches[i] != options.spacing.reach(x, h);
     if (nodes.kinds[i] == NodeKind::lip)
       wrong += partners[i] < 0 || partners[partners[i]] != i || !incision.blocks(x, nodes.positions[partners[i]]);
     else

@@ -146,12 +146,13 @@ TEST_CASE("Increments of a tear that are refused once each leave the fine zone's
       CHECK(update.update_reason == expected.update_reason);
       left += expected.update_reason == "the front has left the fine zone" ? 1 : 0;
     }
-    // How many pieces the fine zone's way is told in is a matter of rounding; where it runs is not.
+    // How many pieces the fine zone's way is told in is a matter of rounding; where it runs is not. The one body was
+    // built where the other followed the tear, as in the fronts of other tears.
     const auto &way = session.zone().spacing.segments, &expected_way = undisturbed.zone().spacing.segments;
     REQUIRE_FALSE(way.empty());
     REQUIRE_FALSE(expected_way.empty());
     CHECK(std::max(farthest_end(way, expected_way), farthest_end(expected_way, way)) <
-          0.02 * session.zone().spacing.fine);
+          0.05 * session.zone().spacing.fine);
   }
   CHECK(left >= 1);
 }

@@ -19,11 +19,9 @@ inline TipPattern tip_pattern(double spacing) {
     for (int k = 0; k < count; ++k) {
       const double angle = turn + 2 * 3.14159265358979323846 * k / count;
       const bool surface = depth == 0;
-      pattern.nodes.positions.emplace_back(spacing *
-                                           Vector3(radius * std::cos(angle), radius * std::sin(angle), -depth));
-      pattern.nodes.spacings.push_back(spacing);
-      pattern.nodes.kinds.push_back(surface ? solvers::NodeKind::surface : solvers::NodeKind::interior);
-      pattern.nodes.normals.push_back(surface ? Vector3(Vector3::UnitZ()) : Vector3(Vector3::Zero()));
+      pattern.nodes.add(spacing * Vector3(radius * std::cos(angle), radius * std::sin(angle), -depth), spacing,
+                        surface ? solvers::NodeKind::surface : solvers::NodeKind::interior,
+                        surface ? Vector3(Vector3::UnitZ()) : Vector3(Vector3::Zero()));
       pattern.held.push_back(held ? 1 : 0);
     }
   };
