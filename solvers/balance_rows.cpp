@@ -47,12 +47,13 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
   ShapeFunctions shape;
   rows.assign(count, {});
   std::vector<int> place(count, -1);
-  BalanceRow row;
+  std::size_t expected = 0; // nodes of a row
   for (int i = 0; i < count; ++i) {
     if (wanted[i] == 0)
       continue;
-    row.nodes.clear();
-    row.blocks.clear();
+    BalanceRow& row = rows[i];
+    row.nodes.reserve(expected);
+    row.blocks.reserve(expected);
     const auto block = [&](int j) -> Block& {
       if (place[j] < 0) {
         place[j] = static_cast<int>(row.nodes.size());
@@ -138,7 +139,7 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
     }
     for (const int node : row.nodes)
       place[node] = -1;
-    rows[i] = row;
+    expected = row.nodes.size() + row.nodes.size() / 4;
   }
 }
 

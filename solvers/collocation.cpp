@@ -166,28 +166,21 @@ CellBalance Collocation::cell_balance() const {
 
 SparseMatrix Collocation::constrained_system() const {
   const int count = problem_.nodes.size(), size = stride_ * count;
-  // By rows as they come, then by columns: twice sorted by counting leaves the entries of a column in order.
-  Eigen::SparseMatrix<double, Eigen::RowMajor> rows(size, size);
-  Eigen::VectorXi sizes(size);
+  SparseMatrix system(size, size);
+  // Rows come in ascending order, and so do the entries of every column.
+  std::vector<int> next(static_cast<std::size_t>(size) + 1, 0);
   for (int i = 0; i < count; ++i)
-    for (int c = 0; c < stride_; ++c)
-      sizes[stride_ * i + c] = dropped_[i] != 0              ? 1
-                               : c < 3 && constrained_[i][c] ? supports_.start[i + 1] - supports_.start[i]
-                                                             : stride_ * static_cast<int>(rows_[i].nodes.size());
-  rows.resizeNonZeros(sizes.sum());
-  int* const starts = rows.outerIndexPtr();
-  starts[0] = 0;
-  std::partial_sum(sizes.begin(), sizes.end(), starts + 1);
-  for (int i = 0; i < count; ++i) {
-    std::array<int, 4> next{};
-    for (int c = 0; c < stride_; ++c)
-      next[c] = starts[stride_ * i + c];
+    visit_rows(i, [&](int /*row*/, int column, double /*value*/) { ++next[column + 1]; });
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::copy(next.begin(), next.end(), system.outerIndexPtr());
+  system.resizeNonZeros(next.back());
+  for (int i = 0; i < count; ++i)
     visit_rows(i, [&](int c, int column, double value) {
-      rows.innerIndexPtr()[next[c]] = column;
-      rows.valuePtr()[next[c]++] = value;
+      const int at = next[column]++;
+      system.innerIndexPtr()[at] = stride_ * i + c;
+      system.valuePtr()[at] = value;
     });
-  }
-  return SparseMatrix(rows);
+  return system;
 }
 
 std::vector<Field> Collocation::responses_to(const MatrixX& right) const {

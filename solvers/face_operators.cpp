@@ -28,7 +28,16 @@ class FaceMeans {
             const NodalSupports& supports)
       : cells_(cells), problem_(problem), incision_(problem.incision.get()), spheres_(spheres), supports_(supports),
         enriched_(spheres.cut() != nullptr && spheres.cut()->sight().rule == SightRule::enriched),
-        place_(problem.nodes.size(), -1) {}
+        place_(problem.nodes.size(), -1) {
+    const std::size_t faces = cells.faces.size();
+    const std::size_t entries =
+        faces * (supports.nodes.size() / std::max<std::size_t>(1, supports.start.size() - 1) + 4);
+    result_.start.reserve(faces + 1);
+    result_.at_front.reserve(faces);
+    result_.nodes.reserve(entries);
+    result_.value.reserve(entries);
+    result_.gradient.reserve(entries);
+  }
 
   void add_face(int f) {
     const topology::CellFace& face = cells_.faces[f];
@@ -43,6 +52,8 @@ class FaceMeans {
         area += area_of(triangle(k));
       for (int k = begin; k < end; ++k)
         add_triangle(face, triangle(k), area / area.squaredNorm(), 0);
+    } else if (!is_hidden(face, face.centroid)) {
+      add_support(face, face.centroid);
     } else {
       add_point(face, face.centroid, 1);
     }
@@ -82,12 +93,25 @@ class FaceMeans {
       }
       return;
     }
+    evaluate_at(face, x);
+    for (int k = 0; k < shape_.size(); ++k)
+      add(shape_.nodes[k], share * shape_.value[k], share * shape_.gradient(k));
+  }
+
+  void evaluate_at(const topology::CellFace& face, const Vector3& x) {
     if (!evaluate(spheres_, x, shape_))
       throw NumericalError(
           fmt::format("the face between nodes {} and {} has {} supporting nodes: the nodes leave a hole there",
                       face.first, face.second, shape_.size()));
+  }
+
+  /// A face of one point: its support as it is.
+  void add_support(const topology::CellFace& face, const Vector3& x) {
+    evaluate_at(face, x);
+    result_.nodes.insert(result_.nodes.end(), shape_.nodes.begin(), shape_.nodes.end());
+    result_.value.insert(result_.value.end(), shape_.value.begin(), shape_.value.end());
     for (int k = 0; k < shape_.size(); ++k)
-      add(shape_.nodes[k], share * shape_.value[k], share * shape_.gradient(k));
+      result_.gradient.push_back(shape_.gradient(k));
   }
 
   [[nodiscard]] bool is_hidden(const topology::CellFace& face, const Vector3& x) const {

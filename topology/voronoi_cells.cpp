@@ -60,8 +60,11 @@ struct CellBuilder {
   /// ahead of the front is an ordinary face.
   void add_lip(int i, int j, const std::vector<Vector3>& polygon, const Vector3& outward, CellComplex& cells,
                std::vector<Vector3>& closure) const;
+  /// False when nothing is left.
   bool cut(int i);
   bool cut_by_neighbours(int i);
+  /// Whether a corner lies beyond the plane half way to d, with |d| squared: half of the nodes looked at cut nothing.
+  [[nodiscard]] bool reaches(const Vector3& d, double squared) const;
   /// By the planes that are `from` to `to` spacings away (from 0: outside too). False when nothing is left.
   bool cut_by_planes(const Vector3& x, double h, double from, double to);
   [[nodiscard]] bool hidden(int i, int j) const {
@@ -71,6 +74,14 @@ struct CellBuilder {
     return incision->near(0.5 * (a + b), 0.5001 * (b - a).norm()) && incision->blocks(a, b);
   }
 };
+
+bool CellBuilder::reaches(const Vector3& d, double squared) const {
+  for (const double *corner = cell.pts, *end = cell.pts + 3 * static_cast<std::ptrdiff_t>(cell.p); corner != end;
+       corner += 3)
+    if (corner[0] * d.x() + corner[1] * d.y() + corner[2] * d.z() > squared)
+      return true;
+  return false;
+}
 
 bool CellBuilder::cut_by_planes(const Vector3& x, double h, double from, double to) {
   for (std::size_t p = 0; p < domain.planes().size(); ++p) {
@@ -122,6 +133,8 @@ bool CellBuilder::cut_by_neighbours(int i) {
       if (squared > needed)
         return true;
       const Vector3 d = (nodes[other.index] - x) / h;
+      if (!reaches(d, squared))
+        continue;
       if (!cell.nplane(d.x(), d.y(), d.z(), squared, other.index))
         return false;
       if (++since_check == 4) {
