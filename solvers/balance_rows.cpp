@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+#include <numeric>
+#include <span>
 
 namespace spherecut::solvers {
 
@@ -31,10 +33,17 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
     double sign; // of the stored area
     int face;
   };
-  std::vector<std::vector<Side>> sides(count);
+  std::vector<int> first_side(static_cast<std::size_t>(count) + 1, 0);
+  for (const topology::CellFace& face : cells.faces) {
+    ++first_side[face.first + 1];
+    ++first_side[face.second + 1];
+  }
+  std::partial_sum(first_side.begin(), first_side.end(), first_side.begin());
+  std::vector<Side> all_sides(2 * cells.faces.size());
+  std::vector<int> next_side(first_side.begin(), first_side.end() - 1);
   for (int f = 0; f < std::ssize(cells.faces); ++f) {
-    sides[cells.faces[f].first].push_back({cells.faces[f].second, 1, f});
-    sides[cells.faces[f].second].push_back({cells.faces[f].first, -1, f});
+    all_sides[next_side[cells.faces[f].first]++] = {cells.faces[f].second, 1, f};
+    all_sides[next_side[cells.faces[f].second]++] = {cells.faces[f].first, -1, f};
   }
   std::vector<std::vector<int>> lips(count);
   for (int l = 0; mixed && l < std::ssize(cells.lips); ++l)
@@ -62,25 +71,12 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
       }
       return row.blocks[place[j]];
     };
-    // sigma(g X) A as a matrix on X: lambda A g^T + mu (g.A) I + mu g A^T. By columns, x and y in one register:
-    // half of the time went into waiting for a matrix stored piece by piece.
-    const auto add_flux = [&](Block& target, const Vector3& area, const Vector3& g, double factor, double diagonal) {
-      const double to_area = factor * lambda, to_g = factor * mu;
-      const Eigen::Vector2d area_xy = area.head<2>(), g_xy = g.head<2>();
-      for (int c = 0; c < 3; ++c) {
-        const double along_area = to_area * g[c], along_g = to_g * area[c];
-        target.col(c).head<2>() += area_xy * along_area + g_xy * along_g;
-        target(2, c) += area.z() * along_area + g.z() * along_g;
-      }
-      const double on_diagonal = to_g * g.dot(area) + diagonal;
-      for (int c = 0; c < 3; ++c)
-        target(c, c) += on_diagonal;
-    };
-    if (sides[i].empty())
+    const std::span<const Side> sides(all_sides.data() + first_side[i], all_sides.data() + first_side[i + 1]);
+    if (sides.empty())
       throw InputError(fmt::format("node {} at ({:.6g}, {:.6g}, {:.6g}) m has no cell: it lies outside the body", i,
                                    x[i].x(), x[i].y(), x[i].z()));
     block(i);
-    for (const Side& side : sides[i]) {
+    for (const Side& side : sides) {
       const topology::CellFace& face = cells.faces[side.face];
       const Vector3 area = side.sign * face.area;
       const Vector3 d = x[side.other] - x[i];
@@ -96,10 +92,20 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
           for (int k = supports.start[node]; k < supports.start[node + 1]; ++k)
             block(supports.nodes[k]).topLeftCorner<3, 3>().diagonal().array() +=
                 (node == i ? -w : w) * supports.value[k];
+      // Minus sigma(g X) A as a matrix on X, -(lambda A g^T + mu (g.A) I + mu g A^T), and the damping's w (g.d) I. By
+      // columns, x and y in one register: half of the time went into waiting for a matrix stored piece by piece.
+      const Vector3 lambda_area = -lambda * area, mu_area = -mu * area;
+      const Vector3 on_diagonal = at_front ? mu_area : Vector3(mu_area + w * d);
+      const Eigen::Vector2d lambda_area_xy = lambda_area.head<2>();
       for (int k = operators.start[side.face]; k < operators.start[side.face + 1]; ++k) {
         Block& target = block(operators.nodes[k]);
-        const Vector3& gradient = operators.gradient[k];
-        add_flux(target, area, gradient, -1, at_front ? 0.0 : w * gradient.dot(d));
+        const Vector3& g = operators.gradient[k];
+        const Eigen::Vector2d g_xy = g.head<2>();
+        for (int c = 0; c < 3; ++c) {
+          target.col(c).head<2>() += lambda_area_xy * g[c] + g_xy * mu_area[c];
+          target(2, c) += lambda_area.z() * g[c] + g.z() * mu_area[c];
+        }
+        target.diagonal().head<3>().array() += g.dot(on_diagonal);
         if (mixed)
           target.block<1, 3>(3, 0) += operators.value[k] * area.transpose();
       }

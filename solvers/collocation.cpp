@@ -86,12 +86,13 @@ Collocation::NodeGraph Collocation::coupled_nodes() const {
   const int count = problem_.nodes.size();
   const auto couplings = [&](const auto& couple) {
     for (int i = 0; i < count; ++i) {
-      const auto& held = constrained_[i]; // its rows are those of its support
+      const auto& held = constrained_[i]; // those of its rows are the ones of its support
       if (mixed_ || !(held[0] && held[1] && held[2]))
         for (const int j : rows_[i].nodes)
           couple(i, j);
-      for (int k = supports_.start[i]; k < supports_.start[i + 1]; ++k)
-        couple(i, supports_.nodes[k]);
+      if (held[0] || held[1] || held[2])
+        for (int k = supports_.start[i]; k < supports_.start[i + 1]; ++k)
+          couple(i, supports_.nodes[k]);
     }
   };
   // Both ways, as often as they come; then each once.
@@ -167,19 +168,43 @@ CellBalance Collocation::cell_balance() const {
 SparseMatrix Collocation::constrained_system() const {
   const int count = problem_.nodes.size(), size = stride_ * count;
   SparseMatrix system(size, size);
-  // Rows come in ascending order, and so do the entries of every column.
+  // Rows come in ascending order, and so do the entries of every column; blocks column by column, as they are stored.
+  const auto has_constraints = [&](int i) { return constrained_[i][0] || constrained_[i][1] || constrained_[i][2]; };
   std::vector<int> next(static_cast<std::size_t>(size) + 1, 0);
-  for (int i = 0; i < count; ++i)
-    visit_rows(i, [&](int /*row*/, int column, double /*value*/) { ++next[column + 1]; });
+  for (int i = 0; i < count; ++i) {
+    if (has_constraints(i))
+      visit_rows(i, [&](int /*row*/, int column, double /*value*/) { ++next[column + 1]; });
+    else
+      for (const int node : rows_[i].nodes)
+        for (int e = 0; e < stride_; ++e)
+          next[stride_ * node + e + 1] += stride_;
+  }
   std::partial_sum(next.begin(), next.end(), next.begin());
   std::copy(next.begin(), next.end(), system.outerIndexPtr());
   system.resizeNonZeros(next.back());
-  for (int i = 0; i < count; ++i)
-    visit_rows(i, [&](int c, int column, double value) {
-      const int at = next[column]++;
-      system.innerIndexPtr()[at] = stride_ * i + c;
-      system.valuePtr()[at] = value;
-    });
+  int* const rows = system.innerIndexPtr();
+  double* const values = system.valuePtr();
+  for (int i = 0; i < count; ++i) {
+    if (has_constraints(i)) {
+      visit_rows(i, [&](int c, int column, double value) {
+        const int at = next[column]++;
+        rows[at] = stride_ * i + c;
+        values[at] = value;
+      });
+      continue;
+    }
+    const BalanceRow& row = rows_[i];
+    const std::array<double, 4> scales{1, 1, 1, continuity_scale(i)};
+    for (std::size_t k = 0; k < row.nodes.size(); ++k)
+      for (int e = 0; e < stride_; ++e) {
+        const double scale = e == 3 ? pressure_scale(row.nodes[k]) : 1;
+        int& at = next[stride_ * row.nodes[k] + e];
+        for (int c = 0; c < stride_; ++c, ++at) {
+          rows[at] = stride_ * i + c;
+          values[at] = scales[c] * scale * row.blocks[k](c, e);
+        }
+      }
+  }
   return system;
 }
 

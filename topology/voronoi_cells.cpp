@@ -468,13 +468,20 @@ std::vector<Vector3> sites_of(const std::vector<Vector3>& nodes, const std::vect
   return incision == nullptr ? nodes : mirrored_lips(nodes, spacings, *incision);
 }
 
+void reserve(CellComplex& cells, std::size_t nodes) {
+  constexpr std::size_t faces = 8, corners = 6; // a node; a face
+  cells.faces.reserve(faces * nodes);
+  cells.face_start.reserve(faces * nodes + 1);
+  cells.face_corners.reserve(corners * faces * nodes);
+}
+
 } // namespace
 
 CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain,
                           const Incision* incision) {
   CellComplex cells;
   cells.sites = sites_of(nodes, spacings, incision);
-  cells.faces.reserve(8 * nodes.size());
+  reserve(cells, nodes.size());
   std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
   build_cells(nodes, spacings, domain, incision, std::vector<char>(nodes.size(), 1), cells, closure);
   return cells;
@@ -507,7 +514,7 @@ CellUpdate update_cells(const CellComplex& before, const std::vector<int>& was, 
           std::sqrt(tree.nearest(cells.sites[i]).squared_distance) < half_way * 2 * before.reaches[was[i]])
         update.made[i] = 1;
   }
-  cells.faces.reserve(8 * nodes.size());
+  reserve(cells, nodes.size());
   std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
   take_over(before, now, update.made, cells, closure);
   build_cells(nodes, spacings, domain, incision, update.made, cells, closure);
