@@ -91,7 +91,7 @@ Changes changes_between(const topology::Incision* before, const SpacingAt& spaci
     const std::vector<Vector3> points = sample_points(now.sheets()[s], known, spacing);
     changes.faces.insert(changes.faces.end(), points.begin(), points.end());
   }
-  // The reach of the enrichment goes with the spacings of the nodes nearest to a segment's ends, so they count too.
+  // The reach of the enrichment goes with the lengths of the nodes nearest to a segment's ends, so they count too.
   using Ends = std::array<double, 8>;
   const auto ends = [](const topology::FrontSegment& f, const SpacingAt& spacing_at) {
     return Ends{f.from.x(), f.from.y(), f.from.z(), f.to.x(), f.to.y(), f.to.z(), spacing_at(f.from), spacing_at(f.to)};

@@ -22,16 +22,19 @@ NodeCloud present_nodes(const NodeCloud& nodes, const std::vector<char>& removed
 /// not exist or does not come to `grown` nodes.
 std::vector<int> places_after(const SprinkleIncrement& change, int count, int grown);
 
-/// Spacing of the present node nearest to a place.
+/// Spacing of the present node nearest to a place, or what else the spheres of the method are measured in.
 class SpacingAt {
  public:
-  SpacingAt(const NodeCloud& nodes, const std::vector<char>& removed) : SpacingAt(present_nodes(nodes, removed)) {}
+  SpacingAt(const NodeCloud& nodes, const std::vector<char>& removed,
+            std::vector<double> NodeCloud::*lengths = &NodeCloud::spacings)
+      : SpacingAt(present_nodes(nodes, removed), lengths) {}
   [[nodiscard]] double operator()(const Vector3& x) const {
     return spacings_[static_cast<std::size_t>(tree_.nearest(x).index)];
   }
 
  private:
-  explicit SpacingAt(const NodeCloud& present) : spacings_(present.spacings), tree_(present.positions) {}
+  SpacingAt(const NodeCloud& present, std::vector<double> NodeCloud::*lengths)
+      : spacings_(present.*lengths), tree_(present.positions) {}
   std::vector<double> spacings_;
   topology::PointTree tree_;
 };

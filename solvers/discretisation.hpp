@@ -64,7 +64,7 @@ UnheldPieces unheld_pieces_from_string(std::string_view name);
 
 struct DiscretisationOptions {
   Method method = Method::galerkin;
-  double support_radius = 0;                  // rho, support radius / h; 0: the method's default for this Poisson ratio
+  double support_radius = 0;                  // rho, radius / h (galerkin: / reach, below nu = 0.45); 0: the default
   int quadrature = 2;                         // rule of a background cell, exact to degree 2 quadrature - 1 (galerkin)
   double cell_size = 0.75;                    // edge of a background cell in units of h (galerkin)
   int tip_node = -1;                          // the tool-tip node of `published`

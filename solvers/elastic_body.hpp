@@ -80,8 +80,8 @@ class ElasticBody : public Discretisation {
                                               const std::vector<Field>& fields) const override;
 
  protected:
-  /// Spheres at the front of a cut are larger by `front_radius_factor`.
-  /// Radii rho times `lengths` of the nodes.
+  /// Radii are rho times the `lengths` of the nodes, at the front of a cut times `front_radius_factor` too; the reach
+  /// of an enrichment is measured in `lengths` as well.
   ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor = 1,
               std::vector<double> NodeCloud::*lengths = &NodeCloud::spacings);
   Problem problem_;

@@ -33,7 +33,7 @@ constexpr int added_with_in_small = 3, added_with = 2;   // nodes that one which
 constexpr int most_nodes = 8192, fewest_neighbours = 50; // of a graph that rows of bits suit
 constexpr int first_samples = 4;                         // of a node's neighbours, before anything is eliminated
 constexpr int smoothing_passes = 8;
-constexpr double fill_per_edge = 8; // that is accepted to eliminate a node one edge nearer to the beginning
+constexpr double fill_per_edge = 8; // per neighbour, that is accepted for a node one edge nearer to the beginning
 
 struct Bits {
   Word* word;

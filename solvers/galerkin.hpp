@@ -24,7 +24,7 @@ struct OrderedStiffness {
 /// A body of method galerkin that is assembled and not factored: only its stiffness and its report can be asked for.
 std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const DiscretisationOptions& options);
 
-/// Support radius over spacing that the options ask for, or the default for this material.
+/// Support radius over galerkin_lengths that the options ask for, or the default for this material.
 double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options);
 
 /// What the radii are that many times of: the reaches of the nodes, near incompressibility their spacings.

@@ -291,7 +291,8 @@ GrowingCut::State::increment(const NodeChange& change,
   const double finest = *std::min_element(next.nodes.spacings.begin(), next.nodes.spacings.end());
   const double slack = 0.25 * finest;
   const Changes& changes = increment.changes =
-      changes_between(before, SpacingAt(problem.nodes, removed), *incision, SpacingAt(next.nodes, gone), 2 * slack);
+      changes_between(before, SpacingAt(problem.nodes, removed, galerkin_lengths(problem.material)), *incision,
+                      SpacingAt(next.nodes, gone, galerkin_lengths(next.material)), 2 * slack);
   for (std::size_t i = 0; i < old_radii.size(); ++i)
     radii[i] = std::max(radii[i], old_radii[i]);
   BoundingBox touched{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
@@ -395,7 +396,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   // The same for means over the surface: those whose points see the change have new weights, and where the faces or
   // surface nodes come near the shares themselves are new.
   const auto is_near = [&](const DisplacementMean& mean) {
-    return increment.concerns(mean.centroid, 0.5 * s.radius_at(mean.centroid), s.enrichment_reach());
+    return increment.concerns(mean.centroid, s.share_extent(mean.centroid), s.enrichment_reach());
   };
   std::vector<Vector3> surface_changes = changes.faces;
   for (int node : change.removed)
@@ -557,7 +558,7 @@ double GrowingCut::prepare(const NodeChange& change, const std::shared_ptr<const
       for (int node : cell.nodes)
         keep(node);
   for (const DisplacementMean& mean : s.held)
-    if (next.concerns(mean.centroid, 0.5 * s.radius_at(mean.centroid), s.enrichment_reach()))
+    if (next.concerns(mean.centroid, s.share_extent(mean.centroid), s.enrichment_reach()))
       for (int node : mean.nodes)
         keep(node);
   s.window->prepare(kept);

@@ -94,12 +94,12 @@ struct GrowingCut::State {
     return options.method.sight == SightRule::enriched ? sight_about_cut(problem, options.method.sight).reach / rho
                                                        : 0; // in sphere radii
   }
-  /// Largest sphere about a point, m.
-  [[nodiscard]] double radius_at(const Vector3& x) const {
-    double radius = 0;
+  /// How far from the centroid of a node's share of the surface there may be points of it, m.
+  [[nodiscard]] double share_extent(const Vector3& x) const {
+    double spacing = 0;
     for (int node : spheres->candidates(x))
-      radius = std::max(radius, spheres->radii()[node]);
-    return radius;
+      spacing = std::max(spacing, problem.nodes.spacings[node]);
+    return 0.5 * rho * spacing;
   }
   [[nodiscard]] bool has_cell_loads() const {
     return problem.loads.body_force != nullptr || !problem.loads.initial_strain.isZero(0);

@@ -23,11 +23,12 @@ class CutSight;
 /// a face stand a little off it (lip_offset).
 class Spheres {
  public:
-  /// Radii rho * h. Where the support of a node (the nodes whose spheres hold it) has fewer than basis + 2 members or a
-  /// moment matrix worse conditioned than `worst_condition`, the spheres around it grow by 1.25 until it is sound.
-  /// Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than basis + 2
-  /// nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, or an incision is given with the
-  /// quadratic basis. Nodes marked in `absent` (may be empty) have no sphere, radius 0, and support nothing.
+  /// Radii rho * spacing. Where the support of a node (the nodes whose spheres hold it) has fewer than basis + 2
+  /// members or a moment matrix worse conditioned than `worst_condition`, the spheres around it grow by 1.25 until it
+  /// is sound. Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than
+  /// basis + 2 nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, or an incision is
+  /// given with the quadratic basis. Nodes marked in `absent` (may be empty) have no sphere, radius 0, and support
+  /// nothing.
   Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis = Basis::linear,
           double worst_condition = 1e9, const Sight& sight = {}, const std::vector<char>& absent = {});
 

@@ -138,9 +138,11 @@ constexpr std::array keys = {
                 "converge and its force is not a true one: for comparison).",
                 {},
                 "galerkin, collocation, published"},
-    ScenarioKey{"method.support_radius", number, "", "",
-                "Radius of a sphere of influence in units of the local spacing; left out: the method's own.",
-                from(1.2, 4)},
+    ScenarioKey{
+        "method.support_radius", number, "", "",
+        "Radius of a sphere of influence in units of the local spacing (galerkin below a Poisson ratio of 0.45: less "
+        "where the sphere would reach into finer nodes); left out: the method's own.",
+        from(1.2, 4)},
     ScenarioKey{"method.quadrature", integer, "", "2",
                 "Rule of a background cell (galerkin): 1, its centre; 2, six points, exact to degree three; 3, 27 "
                 "Gauss points.",
