@@ -21,16 +21,16 @@
 
 namespace spherecut::solvers {
 
-namespace {
-
-int size_of(const ContactPatch& patch) {
-  return static_cast<int>(patch.nodes.size());
-}
-
 void require_forces(const ContactPatch& patch, const ContactState& state) {
   if (state.nodal_forces.size() != patch.nodes.size())
     throw InputError(fmt::format("a contact's forces on {} candidates for a patch of {}: they are another patch's",
                                  state.nodal_forces.size(), patch.nodes.size()));
+}
+
+namespace {
+
+int size_of(const ContactPatch& patch) {
+  return static_cast<int>(patch.nodes.size());
 }
 
 void require_own(const ContactPatch& patch, const ContactState& state) {

@@ -99,6 +99,9 @@ std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState
 /// is a finite one for every node.
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements);
 
+/// Throws InputError when the state's forces are not the patch's.
+void require_forces(const ContactPatch& patch, const ContactState& state);
+
 /// Field of the body for given nodal forces on the patch, by its fields, or by a solution where it lacks them. Throws
 /// InputError when the state is not the patch's.
 Field deform(const Discretisation& body, const ContactPatch& patch, const ContactState& state);

@@ -69,6 +69,15 @@ std::vector<Field> Discretisation::case_responses(const std::vector<int>& nodes,
   return responses;
 }
 
+CaseResponses Discretisation::condense_cases(const std::vector<int>& nodes, const MatrixX& forces,
+                                             const std::vector<int>& at) const {
+  CaseResponses responses;
+  responses.fields = case_responses(nodes, forces);
+  responses.among = forces.transpose() * contact_displacements(nodes, responses.fields);
+  responses.at = contact_displacements(at, responses.fields);
+  return responses;
+}
+
 Field Discretisation::force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const {
   require_loads(nodes, forces);
   MatrixX together(3 * std::ssize(nodes), 1);

@@ -121,6 +121,13 @@ struct ForcePattern {
   std::vector<Vector3> forces;
 };
 
+/// What cases of forces on nodes do to the body.
+struct CaseResponses {
+  MatrixX among;             // N m, work that every case (rows) does on the displacements under every case (columns)
+  MatrixX at;                // m, displacements of other nodes (3 each, rows) under every case
+  std::vector<Field> fields; // under every case; none where the method knows the rest without them
+};
+
 struct ShapeFunctions; // solvers/shape_functions.hpp
 
 /// Every function of it throws InputError for a node that the body does not have and for a field or forces of another
@@ -141,6 +148,10 @@ class Discretisation {
 
   /// Response to every case of forces (N) on nodes: a column of `forces` is a case, with three rows a node.
   [[nodiscard]] virtual std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const;
+
+  /// What the same cases do to each other and to nodes `at`, with the fields only where they come with it.
+  [[nodiscard]] virtual CaseResponses condense_cases(const std::vector<int>& nodes, const MatrixX& forces,
+                                                     const std::vector<int>& at) const;
 
   /// Response to all these forces (N) on nodes together.
   [[nodiscard]] Field force_response(const std::vector<int>& nodes, const std::vector<Vector3>& forces) const;

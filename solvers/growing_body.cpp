@@ -171,7 +171,7 @@ std::vector<Field> GrowingBody::force_responses(const std::vector<int>& candidat
   return responses_to(unit_forces(candidates));
 }
 
-std::vector<Field> GrowingBody::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
+MatrixX GrowingBody::case_forces(const std::vector<int>& nodes, const MatrixX& forces) const {
   require_cases(nodes, forces);
   MatrixX right = MatrixX::Zero(3 * std::ssize(compact_), forces.cols());
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c) {
@@ -179,7 +179,20 @@ std::vector<Field> GrowingBody::case_responses(const std::vector<int>& nodes, co
     for (Eigen::Index k = 0; k < forces.cols(); ++k)
       add_force(mean, forces.col(k).segment<3>(3 * c), right.col(k));
   }
-  return responses_to(right);
+  return right;
+}
+
+std::vector<Field> GrowingBody::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
+  return responses_to(case_forces(nodes, forces));
+}
+
+CaseResponses GrowingBody::condense_cases(const std::vector<int>& nodes, const MatrixX& forces,
+                                          const std::vector<int>& at) const {
+  require_nodes(at);
+  std::vector<int> ids;
+  for (const int node : at)
+    ids.push_back(id_[node]);
+  return cut_->condense_cases(case_forces(nodes, forces), ids);
 }
 
 MatrixX GrowingBody::contact_compliance(const std::vector<int>& candidates) const {

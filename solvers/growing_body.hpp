@@ -50,6 +50,9 @@ class GrowingBody final : public Discretisation, public Growable {
   [[nodiscard]] double load_work(const Field& field) const override;
   [[nodiscard]] std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
   [[nodiscard]] std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const override;
+  /// Without fields.
+  [[nodiscard]] CaseResponses condense_cases(const std::vector<int>& nodes, const MatrixX& forces,
+                                             const std::vector<int>& at) const override;
   /// That of the candidates in GrowthOptions::contact is there after every increment; others cost a solution each.
   [[nodiscard]] MatrixX contact_compliance(const std::vector<int>& candidates) const override;
   [[nodiscard]] std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;
@@ -81,6 +84,7 @@ class GrowingBody final : public Discretisation, public Growable {
   [[nodiscard]] Vector3 constraint_force(std::size_t k, const VectorX& coefficients, const VectorX& prescribed) const;
   [[nodiscard]] VectorX holding_forces(const VectorX& coefficients, const VectorX& prescribed) const;
   [[nodiscard]] std::vector<Field> responses_to(const MatrixX& forces) const;
+  [[nodiscard]] MatrixX case_forces(const std::vector<int>& nodes, const MatrixX& forces) const;
   [[nodiscard]] MatrixX unit_forces(const std::vector<int>& nodes) const;
 
   Problem problem_;

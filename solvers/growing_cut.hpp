@@ -97,6 +97,9 @@ class GrowingCut {
   [[nodiscard]] const VectorX& external_loads() const;                     // N, prescribed displacements left out
   [[nodiscard]] MatrixX respond(const MatrixX& forces) const;              // coefficients, one column per column
   [[nodiscard]] VectorX elastic_forces(const VectorX& coefficients) const; // N, held means left out
+  /// What the columns of `forces` do to each other and to nodes `at`, without the fields
+  /// (Discretisation::condense_cases).
+  [[nodiscard]] CaseResponses condense_cases(const MatrixX& forces, const std::vector<int>& at) const;
 
   /// Compliance and coefficients from a system that is assembled and factored from scratch (dense) on the same boxes
   /// and nodes: what the updated ones must equal.

@@ -19,19 +19,38 @@ VectorX GrowingCut::State::window_right(const VectorX& right) const {
   return by_slot;
 }
 
-/// Coefficients under forces (3N rows) anywhere. What acts on the window alone need not pass the far part first.
-MatrixX GrowingCut::State::respond(const MatrixX& forces) const {
-  const Eigen::Index size = window->far() + window->slots() - 3 * static_cast<Eigen::Index>(options.room);
-  MatrixX ordered = MatrixX::Zero(size, forces.cols());
-  for (Eigen::Index k = 0; k < std::ssize(far_order); ++k)
-    ordered.middleRows<3>(3 * k) = forces.middleRows<3>(3 * static_cast<Eigen::Index>(far_order[k]));
-  const bool far = !ordered.isZero(0);
-  MatrixX right = far ? window->reduce(ordered) : MatrixX::Zero(window->slots(), forces.cols());
+GrowingCut::State::OnWindow GrowingCut::State::on_window(const MatrixX& forces) const {
+  OnWindow on{MatrixX::Zero(window->slots(), forces.cols()), {}, {}};
   for (Eigen::Index s = 0; s < std::ssize(window_node); ++s)
     if (const Eigen::Index node = window_node[s]; node >= 0)
-      right.middleRows<3>(3 * s) += forces.middleRows<3>(3 * node);
-  const MatrixX in_window = window->solve(right);
-  const MatrixX recovered = far ? window->recover(in_window, ordered) : window->recover(in_window);
+      on.by_slot.middleRows<3>(3 * s) = forces.middleRows<3>(3 * node);
+  for (Eigen::Index c = 0; c < forces.cols(); ++c)
+    if (std::any_of(far_order.begin(), far_order.end(),
+                    [&](const Eigen::Index node) { return !forces.col(c).segment<3>(3 * node).isZero(0); }))
+      on.far.push_back(c);
+  const Eigen::Index size = window->far() + window->slots() - 3 * static_cast<Eigen::Index>(options.room);
+  on.ordered = MatrixX::Zero(size, std::ssize(on.far));
+  for (Eigen::Index c = 0; c < on.ordered.cols(); ++c)
+    for (Eigen::Index k = 0; k < std::ssize(far_order); ++k)
+      on.ordered.col(c).segment<3>(3 * k) =
+          forces.col(on.far[c]).segment<3>(3 * static_cast<Eigen::Index>(far_order[k]));
+  return on;
+}
+
+/// Coefficients under forces (3N rows) anywhere. What acts on the window alone need not pass the far part first.
+MatrixX GrowingCut::State::respond(const MatrixX& forces) const {
+  OnWindow on = on_window(forces);
+  MatrixX halfway;
+  if (!on.far.empty()) {
+    const MatrixX reduced = window->reduce(on.ordered, &halfway);
+    for (Eigen::Index c = 0; c < reduced.cols(); ++c)
+      on.by_slot.col(on.far[c]) += reduced.col(c);
+  }
+  const MatrixX in_window = window->solve(on.by_slot);
+  MatrixX far = MatrixX::Zero(window->far(), forces.cols());
+  for (Eigen::Index c = 0; c < halfway.cols(); ++c)
+    far.col(on.far[c]) = halfway.col(c);
+  const MatrixX recovered = window->recover_from_half(in_window, far);
   MatrixX coefficients = MatrixX::Zero(forces.rows(), forces.cols());
   for (Eigen::Index k = 0; k < std::ssize(far_order); ++k)
     coefficients.middleRows<3>(3 * static_cast<Eigen::Index>(far_order[k])) = recovered.middleRows<3>(3 * k);
@@ -39,6 +58,59 @@ MatrixX GrowingCut::State::respond(const MatrixX& forces) const {
     if (const Eigen::Index node = window_node[s]; node >= 0)
       coefficients.middleRows<3>(3 * node) = in_window.middleRows<3>(3 * s);
   return coefficients;
+}
+
+/// With the factor's halves Y = L^-1 F of the cases F and those of the nodes' functionals: products of halves, and no
+/// solution goes back through the far part. Halves of the contact's candidates are there since the last condensation.
+CaseResponses GrowingCut::State::condense_cases(const MatrixX& forces, const std::vector<int>& at) const {
+  const bool has_halves = window->condensed_count() == 3 * std::ssize(contact);
+  std::vector<Eigen::Index> place; // in options.contact; -1: not there
+  Eigen::Index others = 0;
+  for (const int node : at) {
+    const auto known = std::find(options.contact.begin(), options.contact.end(), node);
+    place.push_back(has_halves && known != options.contact.end() ? known - options.contact.begin() : -1);
+    others += place.back() < 0 ? 1 : 0;
+  }
+  const Eigen::Index cases = forces.cols();
+  MatrixX all = MatrixX::Zero(forces.rows(), cases + 3 * others);
+  all.leftCols(cases) = forces;
+  Eigen::Index next = cases;
+  for (std::size_t k = 0; k < at.size(); ++k)
+    if (place[k] < 0) {
+      const DisplacementMean& functional = mean(at[k]);
+      for (std::size_t j = 0; j < functional.nodes.size(); ++j)
+        for (int axis = 0; axis < 3; ++axis)
+          all(3 * static_cast<Eigen::Index>(functional.nodes[j]) + axis, next + axis) += functional.weights[j];
+      next += 3;
+    }
+  OnWindow on = on_window(all);
+  MatrixX far; // halves of the columns that act there
+  if (!on.far.empty()) {
+    const MatrixX reduced = window->reduce(on.ordered, &far);
+    for (Eigen::Index c = 0; c < reduced.cols(); ++c)
+      on.by_slot.col(on.far[c]) += reduced.col(c);
+  }
+  const SchurWindow::Half halves = window->half(on.by_slot);
+  const SchurWindow::Half of_cases{halves.ahead.leftCols(cases), halves.rest.leftCols(cases)};
+  MatrixX products = SchurWindow::product(halves, of_cases); // all x cases
+  const MatrixX far_products = far.transpose() * far;
+  for (Eigen::Index c = 0; c < std::ssize(on.far); ++c)
+    for (Eigen::Index r = 0; r < std::ssize(on.far) && on.far[c] < cases; ++r)
+      products(on.far[r], on.far[c]) += far_products(r, c);
+  CaseResponses responses;
+  responses.among = products.topRows(cases);
+  responses.at.resize(3 * std::ssize(at), cases);
+  const MatrixX seen = has_halves ? window->seen_by_condensed(of_cases) : MatrixX();
+  next = cases;
+  for (Eigen::Index k = 0; k < std::ssize(at); ++k) {
+    if (const Eigen::Index known = place[static_cast<std::size_t>(k)]; known >= 0) {
+      responses.at.middleRows<3>(3 * k) = seen.middleRows<3>(3 * known);
+    } else {
+      responses.at.middleRows<3>(3 * k) = products.middleRows<3>(next);
+      next += 3;
+    }
+  }
+  return responses;
 }
 
 /// The stiffness as the cells make it, not as the window has it: that at condensation, and what the exchanged boxes are
@@ -148,6 +220,9 @@ const VectorX& GrowingCut::external_loads() const {
 }
 MatrixX GrowingCut::respond(const MatrixX& forces) const {
   return state_->respond(forces);
+}
+CaseResponses GrowingCut::condense_cases(const MatrixX& forces, const std::vector<int>& at) const {
+  return state_->condense_cases(forces, at);
 }
 VectorX GrowingCut::elastic_forces(const VectorX& coefficients) const {
   return state_->elastic_forces(coefficients);

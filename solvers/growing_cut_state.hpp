@@ -215,7 +215,15 @@ struct GrowingCut::State {
   void condense_all();
   void condense_contact();
   [[nodiscard]] VectorX window_right(const VectorX& right) const;
+  /// Forces (3N rows) by the window's slots; what acts on far nodes is left to those who ask for its columns.
+  struct OnWindow {
+    MatrixX by_slot;
+    std::vector<Eigen::Index> far; // columns that act on far nodes
+    MatrixX ordered;               // these, in elimination order
+  };
+  [[nodiscard]] OnWindow on_window(const MatrixX& forces) const;
   [[nodiscard]] MatrixX respond(const MatrixX& forces) const;
+  [[nodiscard]] CaseResponses condense_cases(const MatrixX& forces, const std::vector<int>& at) const;
   [[nodiscard]] VectorX elastic_forces(const VectorX& coefficients) const;
 };
 

@@ -56,6 +56,48 @@ MatrixX openings(const Discretisation& body, const std::vector<LipPair>& pairs, 
   return openings(pairs, modes, body.contact_displacements(nodes_of(pairs), fields));
 }
 
+/// A column for every entry of the patch, three rows for every one of nodes_of().
+MatrixX unit_pair_forces(const std::vector<LipPair>& pairs, int modes) {
+  MatrixX forces = MatrixX::Zero(6 * std::ssize(pairs), modes * std::ssize(pairs));
+  for (Eigen::Index p = 0; p < std::ssize(pairs); ++p) {
+    const std::array<Vector3, 3> axes = mode_axes(pairs[p].normal);
+    for (int m = 0; m < modes; ++m) {
+      forces.col(modes * p + m).segment<3>(3 * p) = axes[m];
+      forces.col(modes * p + m).segment<3>(3 * (std::ssize(pairs) + p)) = -axes[m];
+    }
+  }
+  return forces;
+}
+
+/// Nodes that carry forces, one after the other, and these.
+struct NodalForces {
+  std::vector<int> nodes;
+  std::vector<Vector3> forces; // N
+
+  void add(int node, const Vector3& force) {
+    if (force.isZero(0))
+      return;
+    nodes.push_back(node);
+    forces.push_back(force);
+  }
+  void add(const LipPatch& lips, const LipState& state) {
+    const std::vector<Vector3> of_pairs = pair_forces(lips, state);
+    for (std::size_t p = 0; p < lips.pairs.size(); ++p) {
+      add(lips.pairs[p].plus, of_pairs[p]);
+      add(lips.pairs[p].minus, -of_pairs[p]);
+    }
+  }
+  [[nodiscard]] Field on(const Discretisation& body, Field field) const {
+    if (!nodes.empty())
+      field.add(1, body.force_response(nodes, forces));
+    return field;
+  }
+};
+
+bool has_fields(const LipPatch& lips) {
+  return std::ssize(lips.responses) == lips.compliance.cols();
+}
+
 std::vector<int> closed_entries(const std::vector<char>& closed, int modes) {
   std::vector<int> entries;
   for (int p = 0; p < std::ssize(closed); ++p)
@@ -227,21 +269,19 @@ LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& p
   lips.pairs = pairs;
   lips.modes = condition == LipCondition::sticking ? 3 : 1;
   const std::vector<int> nodes = nodes_of(pairs);
-  if (!pairs.empty()) {
-    MatrixX forces = MatrixX::Zero(3 * std::ssize(nodes), lips.modes * std::ssize(pairs));
-    for (Eigen::Index p = 0; p < std::ssize(pairs); ++p) {
-      const std::array<Vector3, 3> axes = mode_axes(pairs[p].normal);
-      for (int m = 0; m < lips.modes; ++m) {
-        forces.col(lips.modes * p + m).segment<3>(3 * p) = axes[m];
-        forces.col(lips.modes * p + m).segment<3>(3 * (std::ssize(pairs) + p)) = -axes[m];
-      }
-    }
-    lips.responses = body.case_responses(nodes, forces);
-  }
-  lips.compliance = openings(body, pairs, lips.modes, lips.responses);
   lips.base_opening = openings(body, pairs, lips.modes, {tool != nullptr ? tool->base : body.solve()}).col(0);
+  if (pairs.empty()) {
+    lips.compliance.resize(0, 0);
+    lips.tool_of_lips.resize(tool != nullptr ? 3 * std::ssize(tool->nodes) : 0, 0);
+    lips.lips_of_tool = lips.tool_of_lips.transpose();
+    return lips;
+  }
+  CaseResponses responses = body.condense_cases(nodes, unit_pair_forces(pairs, lips.modes),
+                                                tool != nullptr ? tool->nodes : std::vector<int>{});
+  lips.responses = std::move(responses.fields);
+  lips.compliance = std::move(responses.among);
   if (tool != nullptr) {
-    lips.tool_of_lips = body.contact_displacements(tool->nodes, lips.responses);
+    lips.tool_of_lips = std::move(responses.at);
     // A symmetric body opens its lips under a force on a node as it moves the node under that force between the lips.
     const bool has_fields = std::ssize(tool->responses) == 3 * std::ssize(tool->nodes);
     lips.lips_of_tool = has_fields ? openings(body, pairs, lips.modes, tool->responses)
@@ -301,7 +341,15 @@ CutContactState prescribe(const ContactPatch& patch, const LipPatch& lips, const
   return settle(patch, lips, tolerance, {}, [&](const ContactPatch& held) { return prescribe(held, displacements); });
 }
 
+void extend_responses(const Discretisation& body, LipPatch& lips) {
+  if (!has_fields(lips))
+    lips.responses = body.case_responses(nodes_of(lips.pairs), unit_pair_forces(lips.pairs, lips.modes));
+}
+
 Field deform(const Field& base, const LipPatch& lips, const LipState& state) {
+  if (!has_fields(lips))
+    throw InputError(fmt::format("lips with {} entries and {} fields of unit pair forces; allowed: one each",
+                                 lips.compliance.cols(), lips.responses.size()));
   Field field = base;
   for (Eigen::Index k = 0; k < state.forces.size(); ++k)
     if (state.forces[k] != 0)
@@ -309,9 +357,25 @@ Field deform(const Field& base, const LipPatch& lips, const LipState& state) {
   return field;
 }
 
+Field deform(const Discretisation& body, const Field& base, const LipPatch& lips, const LipState& state) {
+  if (has_fields(lips))
+    return deform(base, lips, state);
+  NodalForces acting;
+  acting.add(lips, state);
+  return acting.on(body, base);
+}
+
 Field deform(const Discretisation& body, const ContactPatch& patch, const LipPatch& lips,
              const CutContactState& state) {
-  return deform(deform(body, patch, state.tool), lips, state.lips);
+  const bool patch_has_fields = std::ssize(patch.responses) == 3 * std::ssize(patch.nodes);
+  if (patch_has_fields || has_fields(lips))
+    return deform(body, deform(body, patch, state.tool), lips, state.lips);
+  require_forces(patch, state.tool);
+  NodalForces acting; // of both, in one solution
+  for (std::size_t c = 0; c < patch.nodes.size(); ++c)
+    acting.add(patch.nodes[c], state.tool.nodal_forces[c]);
+  acting.add(lips, state.lips);
+  return acting.on(body, patch.base);
 }
 
 Field deform(const ContactPatch& patch, const LipPatch& lips, const CutContactState& state) {

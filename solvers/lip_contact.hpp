@@ -30,7 +30,7 @@ std::vector<LipPair> lip_pairs(const NodeCloud& nodes);
 struct LipPatch {
   std::vector<LipPair> pairs;
   int modes = 1;
-  std::vector<Field> responses; // to unit pair forces
+  std::vector<Field> responses; // to unit pair forces; none where the body condenses without fields
   VectorX base_opening;         // m, without tool and pair forces
   MatrixX compliance;           // m/N, opening per pair force
   MatrixX tool_of_lips;         // m/N, displacement of the tool's candidates per pair force, 3m x entries
@@ -79,8 +79,13 @@ ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const s
 CutContactState prescribe(const ContactPatch& patch, const LipPatch& lips, const std::vector<Vector3>& displacements,
                           double tolerance = 1e-9);
 
-/// Field of the body for the given state; without tool `patch` is null and `base` the body's own solution.
+/// Makes the fields of unit pair forces, which are cheaper to superpose than a solution each time.
+void extend_responses(const Discretisation& body, LipPatch& lips);
+
+/// Field of the body for the given state; without a tool `base` is the body's own solution. Where patch or lips have no
+/// fields it takes a solution; without the body that is an InputError.
 Field deform(const Discretisation& body, const ContactPatch& patch, const LipPatch& lips, const CutContactState& state);
+Field deform(const Discretisation& body, const Field& base, const LipPatch& lips, const LipState& state);
 Field deform(const ContactPatch& patch, const LipPatch& lips, const CutContactState& state);
 Field deform(const Field& base, const LipPatch& lips, const LipState& state);
 

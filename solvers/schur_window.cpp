@@ -164,6 +164,7 @@ bool SchurWindow::factor() {
   if (!usable)
     ahead_.clear();
   std::fill(changed_.begin(), changed_.end(), 0);
+  condensed_rest_.resize(0, 0);
   order_.clear();
   for (int slot = 0; slot < slots(); ++slot)
     if (active_[slot] != 0 && (!usable || kept_place_[slot] >= 0))
@@ -182,8 +183,11 @@ bool SchurWindow::factor() {
   return usable;
 }
 
-MatrixX SchurWindow::reduce(const MatrixX& right) const {
-  MatrixX seen = cholesky_->forward(right).bottomRows(changing_ + contact_);
+MatrixX SchurWindow::reduce(const MatrixX& right, MatrixX* far) const {
+  const MatrixX halfway = cholesky_->forward(right);
+  if (far != nullptr)
+    *far = halfway.topRows(far_);
+  MatrixX seen = halfway.bottomRows(changing_ + contact_);
   triangular_product(false, trailing_, seen);
   MatrixX by_slot = MatrixX::Zero(slots(), right.cols());
   by_slot.topRows(changing_) = seen.topRows(changing_);
@@ -191,7 +195,9 @@ MatrixX SchurWindow::reduce(const MatrixX& right) const {
   return by_slot;
 }
 
-void SchurWindow::forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) const {
+SchurWindow::Half SchurWindow::half(const MatrixX& right) const {
+  Half result;
+  auto& [ahead, rest] = result;
   ahead.resize(std::ssize(ahead_), right.cols());
   rest.resize(std::ssize(order_), right.cols());
   for (Eigen::Index i = 0; i < ahead.rows(); ++i)
@@ -206,11 +212,26 @@ void SchurWindow::forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) c
       rest.row(i) -= taken.row(kept_place_[order_[i]]);
   }
   triangular_solve(false, factor_.data(), static_cast<int>(order_.size()), rest);
+  return result;
+}
+
+MatrixX SchurWindow::product(const Half& one, const Half& other) {
+  MatrixX result = MatrixX::Zero(one.rest.cols(), other.rest.cols());
+  add_product(1, one.ahead, true, other.ahead, result);
+  add_product(1, one.rest, true, other.rest, result);
+  return result;
+}
+
+MatrixX SchurWindow::seen_by_condensed(const Half& right) const {
+  MatrixX result = MatrixX::Zero(condensed_rest_.cols(), right.rest.cols());
+  if (!ahead_.empty())
+    add_product(1, seen_ahead_.halfway, true, right.ahead, result);
+  add_product(1, condensed_rest_, true, right.rest.bottomRows(condensed_rest_.rows()), result);
+  return result;
 }
 
 MatrixX SchurWindow::solve(const MatrixX& right) const {
-  MatrixX ahead, rest;
-  forward(right, ahead, rest);
+  auto [ahead, rest] = half(right);
   triangular_solve(true, factor_.data(), static_cast<int>(order_.size()), rest);
   MatrixX by_slot = MatrixX::Zero(slots(), right.cols());
   for (Eigen::Index i = 0; i < rest.rows(); ++i)
@@ -244,8 +265,7 @@ void SchurWindow::see_ahead(const MatrixX& functionals) {
 
 SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const VectorX& right) {
   // With Y = L^-1 F: F^T S^-1 F = Y^T Y and F^T S^-1 b = Y^T (L^-1 b). Above its first entry F leaves Y zero.
-  MatrixX load_ahead, load;
-  forward(right, load_ahead, load);
+  const auto [load_ahead, load] = half(right);
   MatrixX seen(std::ssize(order_), functionals.cols());
   for (Eigen::Index i = 0; i < seen.rows(); ++i)
     seen.row(i) = functionals.row(order_[i]);
@@ -260,7 +280,8 @@ SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const V
   Eigen::Index first = 0;
   while (first < seen.rows() && seen.row(first).isZero(0))
     ++first;
-  MatrixX rest = seen.bottomRows(seen.rows() - first);
+  MatrixX& rest = condensed_rest_;
+  rest = seen.bottomRows(seen.rows() - first);
   const int n = static_cast<int>(order_.size());
   if (rest.rows() > 0)
     triangular_solve(false, factor_.data() + first * n + first, n, rest);
@@ -273,8 +294,10 @@ MatrixX SchurWindow::recover(const MatrixX& window, const MatrixX& right) const 
   return recover_from(cholesky_->forward(right), window);
 }
 
-MatrixX SchurWindow::recover(const MatrixX& window) const {
-  return recover_from(MatrixX::Zero(far_ + changing_ + contact_, window.cols()), window);
+MatrixX SchurWindow::recover_from_half(const MatrixX& window, const MatrixX& far) const {
+  MatrixX halfway(far_ + changing_ + contact_, window.cols());
+  halfway.topRows(far_) = far;
+  return recover_from(std::move(halfway), window);
 }
 
 MatrixX SchurWindow::recover_from(MatrixX halfway, const MatrixX& window) const {

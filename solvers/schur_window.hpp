@@ -67,7 +67,8 @@ class SchurWindow {
   [[nodiscard]] int done_ahead() const { return static_cast<int>(ahead_.size()); }
 
   /// Right-hand sides by slots that the window sees when `right` acts on K (elimination order); new slots get zero.
-  [[nodiscard]] MatrixX reduce(const MatrixX& right) const;
+  /// `far` (may be null): the half of their solution that the far unknowns take part in, for products with others.
+  [[nodiscard]] MatrixX reduce(const MatrixX& right, MatrixX* far = nullptr) const;
   /// S^-1 right, by slots; inactive slots are zero. Needs factor().
   [[nodiscard]] MatrixX solve(const MatrixX& right) const;
 
@@ -80,16 +81,25 @@ class SchurWindow {
   };
   [[nodiscard]] Condensed condense(const MatrixX& functionals, const VectorX& right);
 
+  /// Half of S^-1 right, by slots as right: F^T S^-1 G is the product of their halves.
+  struct Half {
+    MatrixX ahead, rest; // of the part done ahead and of what was left to factor()
+  };
+  [[nodiscard]] Half half(const MatrixX& right) const;
+  [[nodiscard]] static MatrixX product(const Half& one, const Half& other);
+  /// F^T S^-1 right from the half of right, for the functionals F of the last condense(): those of
+  /// condensed_count(), none where there was a factor() since.
+  [[nodiscard]] MatrixX seen_by_condensed(const Half& right) const;
+  [[nodiscard]] Eigen::Index condensed_count() const { return condensed_rest_.cols(); }
+
   /// Solution in elimination order of K from that of the window (slots) and the right-hand sides given to reduce().
   [[nodiscard]] MatrixX recover(const MatrixX& window, const MatrixX& right) const;
-  /// The same where nothing acts on the far unknowns.
-  [[nodiscard]] MatrixX recover(const MatrixX& window) const;
+  /// The same from the half that reduce() gave of the far unknowns.
+  [[nodiscard]] MatrixX recover_from_half(const MatrixX& window, const MatrixX& far) const;
 
  private:
   void gather(const std::vector<int>& slots, std::vector<double>& square) const;
   void see_ahead(const MatrixX& functionals);
-  /// L^-1 right, the part done ahead and the rest.
-  void forward(const MatrixX& right, MatrixX& ahead, MatrixX& rest) const;
   [[nodiscard]] MatrixX recover_from(MatrixX halfway, const MatrixX& window) const;
 
   int far_, changing_, room_, contact_;
@@ -110,6 +120,7 @@ class SchurWindow {
     MatrixX halfway, taken; // L^-1 of them, and what that takes from the kept slots
     MatrixX compliance;     // count x count
   } seen_ahead_;
+  MatrixX condensed_rest_;     // half of the functionals of the last condense(), last rows: those above are zero
   std::vector<int> order_;     // slots at the last factor(), but those done ahead
   std::vector<double> factor_; // their dense Cholesky factor, column-major, order_.size() squared
 };

@@ -375,7 +375,7 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
   } else {
     state.lips = solvers::close_lips(*model.lips, model.lips->base_opening, lip_tolerance,
                                      previous ? previous->lips.closed : std::vector<char>{});
-    model.field = solvers::deform(model.base, *model.lips, state.lips);
+    model.field = solvers::deform(*model.body, model.base, *model.lips, state.lips);
   }
   model.state = std::move(state);
 }

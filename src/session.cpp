@@ -390,9 +390,14 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
       return;
     // A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
     const bool is_for_good = blade_rests_ || (put_off_ == 0 && !cuts_aside()); // else the next body is on its way
-    if (force_only_ && is_for_good && std::ssize(model.patch.responses) < 3 * std::ssize(model.patch.nodes) &&
-        ++model.presses > few_presses)
-      solvers::extend_responses(*model.body, candidates_a_press, model.patch);
+    if (force_only_ && is_for_good) {
+      if (std::ssize(model.patch.responses) == 3 * std::ssize(model.patch.nodes)) {
+        if (model.lips)
+          solvers::extend_responses(*model.body, *model.lips);
+      } else if (++model.presses > few_presses) {
+        solvers::extend_responses(*model.body, candidates_a_press, model.patch);
+      }
+    }
     const std::vector<int> missed = penetrated_outside_patch(*pose, model);
     if (missed.empty())
       return;
