@@ -16,6 +16,14 @@
 
 namespace spherecut::solvers {
 
+namespace {
+
+/// Of the nodes: a window predicted to hold more than that holds all of them. The rest costs little to carry along,
+/// and such a window is never left.
+constexpr double whole_window = 0.85;
+
+} // namespace
+
 double window_share(const Problem& problem, const DiscretisationOptions& method, const topology::SurfaceMesh& way) {
   const std::vector<double>& spacings = problem.nodes.spacings;
   const bool collocates = method.method == Method::collocation;
@@ -106,6 +114,7 @@ void GrowingCut::State::condense_all() {
   present.nodes = present_nodes(problem.nodes, removed);
   for (Prescribed& entry : present.prescribed)
     entry.node = compact[entry.node];
+  const bool is_whole = window_share(present, options.method, options.way) > whole_window;
   const std::unique_ptr<Discretisation> body = assemble_galerkin(std::move(present), options.method);
   const OrderedStiffness stiffness = stiffness_of(*body);
   if (stiffness.dropped)
@@ -132,7 +141,7 @@ void GrowingCut::State::condense_all() {
   const auto in_reach = reach_of(options.way, true);
   for (const BackgroundBox& leaf : stiffness.cells.boxes) {
     Box box{leaf, {}, {}};
-    if (in_reach(leaf.centre, leaf.half.norm()))
+    if (is_whole || in_reach(leaf.centre, leaf.half.norm()))
       for (int c = leaf.first_cell; c < leaf.last_cell; ++c) {
         box.cells.push_back(stiffness.shapes[static_cast<std::size_t>(c)]);
         for (int& node : box.cells.back().nodes)
