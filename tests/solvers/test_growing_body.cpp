@@ -4,6 +4,7 @@
 #include "topology/errors.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 
 using namespace spherecut;
 using namespace spherecut::solvers;
@@ -21,7 +22,9 @@ Vector3 sum_of(const std::vector<Vector3>& forces) {
 } // namespace
 
 TEST_CASE("A body that has followed its cut is in balance and equals the body built anew") {
-  Scene scene;
+  // A window that would hold most of a body holds all of it.
+  const bool whole = GENERATE(true, false);
+  Scene scene(-Scene::depth, whole ? 0.02 : 0.06);
   GrowthOptions options = scene.options();
   std::vector<Vector3> candidates; // on the top, ahead of the cut and far from it
   for (int i = 0; i < scene.nodes.size() && candidates.size() < 6; ++i)
@@ -39,6 +42,7 @@ TEST_CASE("A body that has followed its cut is in balance and equals the body bu
     REQUIRE(std::string(growth.uncovered).empty());
     CHECK_FALSE(growth.update.condensed_anew);
     REQUIRE(body.problem().nodes.positions == scene.nodes.positions);
+    CHECK((body.system().window_unknowns() == body.report().unknowns) == whole);
     const Field field = body.solve();
     CHECK(body.residual(field, {}, {}) < 1e-10);
     CHECK(body.report().unknowns == 3 * scene.nodes.size());
@@ -104,6 +108,41 @@ TEST_CASE("A body that has followed its cut is in balance and equals the body bu
       REQUIRE(bare.responses.size() == full.responses.size());
       CHECK((deform(bare, pulled).coefficients - with.coefficients).norm() < 1e-9 * with.coefficients.norm());
     }
+
+    // Cases of forces on lips and far from the window, what they do to each other and to nodes: without fields as with.
+    std::vector<int> forced{scene.first(NodeKind::surface), scene.first(NodeKind::edge)};
+    for (const LipPair& pair : pairs)
+      forced.insert(forced.end(), {pair.plus, pair.minus});
+    MatrixX forces(3 * std::ssize(forced), 4);
+    for (Eigen::Index k = 0; k < forces.size(); ++k)
+      forces.data()[k] = std::sin(1.7 * static_cast<double>(k));
+    forces.leftCols<2>().topRows<6>().setZero(); // these act on lips alone
+    const CaseResponses cases = body.condense_cases(forced, forces, patch_nodes);
+    const CaseResponses by_fields = body.Discretisation::condense_cases(forced, forces, patch_nodes);
+    CHECK(cases.fields.empty());
+    REQUIRE(by_fields.fields.size() == 4);
+    CHECK((cases.among - by_fields.among).norm() < 1e-9 * by_fields.among.norm());
+    CHECK((cases.at - by_fields.at).norm() < 1e-9 * by_fields.at.norm());
+    CHECK_THROWS_AS(body.condense_cases(forced, forces, {scene.nodes.size()}), InputError);
+
+    // Tool and lips together, in one solution and superposed.
+    const ContactPatch full = condense(body, patch_nodes);
+    ContactPatch bare = condense_without_fields(body, patch_nodes);
+    LipPatch lips_met = condense_lips(body, pairs, LipCondition::sticking, &bare);
+    CHECK(lips_met.responses.empty());
+    CutContactState state;
+    for (std::size_t c = 0; c < patch_nodes.size(); ++c)
+      state.tool.nodal_forces.emplace_back(0.02, 0.01 * static_cast<double>(c % 3), -0.03);
+    state.lips.forces = VectorX::LinSpaced(lips_met.compliance.cols(), -0.01, 0.02);
+    const Field together = deform(body, bare, lips_met, state);
+    CHECK_THROWS_AS(deform(full, lips_met, state), InputError);
+    extend_responses(body, lips_met);
+    REQUIRE(std::ssize(lips_met.responses) == lips_met.compliance.cols());
+    const Field superposed = deform(full, lips_met, state);
+    CHECK((together.coefficients - superposed.coefficients).norm() < 1e-9 * superposed.coefficients.norm());
+    bare.nodes.pop_back();
+    lips_met.responses.clear();
+    CHECK_THROWS_AS(deform(body, bare, lips_met, state), InputError); // another patch's
     std::vector<Vector3> moved(scene.problem().prescribed.size(), Vector3(1, 2, 3));
     const Field rigid = body.prescribed_response(moved);
     CHECK((body.at(inside, rigid).displacement - Vector3(1, 2, 3)).norm() < 1e-8);
