@@ -501,7 +501,7 @@ ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& di
 }
 
 Field deform(const Discretisation& body, const ContactPatch& patch, const ContactState& state) {
-  if (std::ssize(patch.responses) == 3 * std::ssize(patch.nodes))
+  if (has_fields(patch))
     return deform(patch, state);
   require_forces(patch, state);
   Field field = patch.base;
@@ -518,7 +518,7 @@ Field deform(const Discretisation& body, const ContactPatch& patch, const Contac
 }
 
 Field deform(const ContactPatch& patch, const ContactState& state) {
-  if (std::ssize(patch.responses) != 3 * std::ssize(patch.nodes))
+  if (!has_fields(patch))
     throw InputError(fmt::format("a patch of {} candidates with {} fields of unit forces; allowed: three each",
                                  patch.nodes.size(), patch.responses.size()));
   require_forces(patch, state);

@@ -29,6 +29,11 @@ struct ContactPatch {
   std::uint64_t number = 0;
 };
 
+/// Whether the patch has the fields of all its unit forces.
+inline bool has_fields(const ContactPatch& patch) {
+  return patch.responses.size() == 3 * patch.nodes.size();
+}
+
 /// Condenses the discretisation onto the candidates [De 2001, Eq. 5 and after, in compliance form].
 ContactPatch condense(const Discretisation& body, const std::vector<int>& candidates,
                       const std::optional<HalfSpaceCoupling>& coupling = std::nullopt);

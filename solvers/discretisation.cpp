@@ -73,7 +73,12 @@ CaseResponses Discretisation::condense_cases(const std::vector<int>& nodes, cons
                                              const std::vector<int>& at) const {
   CaseResponses responses;
   responses.fields = case_responses(nodes, forces);
-  responses.among = forces.transpose() * contact_displacements(nodes, responses.fields);
+  const MatrixX displacements = contact_displacements(nodes, responses.fields);
+  responses.among = MatrixX::Zero(forces.cols(), forces.cols());
+  for (Eigen::Index c = 0; c < forces.cols(); ++c) // a case acts on few of the nodes
+    for (Eigen::Index k = 0; k < forces.rows(); ++k)
+      if (forces(k, c) != 0)
+        responses.among.row(c) += forces(k, c) * displacements.row(k);
   responses.at = contact_displacements(at, responses.fields);
   return responses;
 }

@@ -190,6 +190,7 @@ CaseResponses GrowingBody::condense_cases(const std::vector<int>& nodes, const M
                                           const std::vector<int>& at) const {
   require_nodes(at);
   std::vector<int> ids;
+  ids.reserve(at.size());
   for (const int node : at)
     ids.push_back(id_[node]);
   return cut_->condense_cases(case_forces(nodes, forces), ids);

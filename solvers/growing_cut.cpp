@@ -18,8 +18,8 @@ namespace spherecut::solvers {
 
 namespace {
 
-/// Of the nodes: a window predicted to hold more than that holds all of them. The rest costs little to carry along,
-/// and such a window is never left.
+/// Of the nodes: a window predicted to hold more than that holds all of them, where one is asked for all the same. The
+/// rest costs little to carry along, and no cut leaves its way then.
 constexpr double whole_window = 0.85;
 
 } // namespace

@@ -27,29 +27,28 @@ GrowingCut::State::OnWindow GrowingCut::State::on_window(const MatrixX& forces) 
   for (Eigen::Index c = 0; c < forces.cols(); ++c)
     if (std::any_of(far_order.begin(), far_order.end(),
                     [&](const Eigen::Index node) { return !forces.col(c).segment<3>(3 * node).isZero(0); }))
-      on.far.push_back(c);
+      on.far_columns.push_back(c);
+  if (on.far_columns.empty())
+    return on;
   const Eigen::Index size = window->far() + window->slots() - 3 * static_cast<Eigen::Index>(options.room);
-  on.ordered = MatrixX::Zero(size, std::ssize(on.far));
-  for (Eigen::Index c = 0; c < on.ordered.cols(); ++c)
+  MatrixX ordered = MatrixX::Zero(size, std::ssize(on.far_columns));
+  for (Eigen::Index c = 0; c < ordered.cols(); ++c)
     for (Eigen::Index k = 0; k < std::ssize(far_order); ++k)
-      on.ordered.col(c).segment<3>(3 * k) =
-          forces.col(on.far[c]).segment<3>(3 * static_cast<Eigen::Index>(far_order[k]));
+      ordered.col(c).segment<3>(3 * k) =
+          forces.col(on.far_columns[c]).segment<3>(3 * static_cast<Eigen::Index>(far_order[k]));
+  const MatrixX reduced = window->reduce(ordered, &on.far_half);
+  for (Eigen::Index c = 0; c < reduced.cols(); ++c)
+    on.by_slot.col(on.far_columns[c]) += reduced.col(c);
   return on;
 }
 
 /// Coefficients under forces (3N rows) anywhere. What acts on the window alone need not pass the far part first.
 MatrixX GrowingCut::State::respond(const MatrixX& forces) const {
-  OnWindow on = on_window(forces);
-  MatrixX halfway;
-  if (!on.far.empty()) {
-    const MatrixX reduced = window->reduce(on.ordered, &halfway);
-    for (Eigen::Index c = 0; c < reduced.cols(); ++c)
-      on.by_slot.col(on.far[c]) += reduced.col(c);
-  }
+  const OnWindow on = on_window(forces);
   const MatrixX in_window = window->solve(on.by_slot);
   MatrixX far = MatrixX::Zero(window->far(), forces.cols());
-  for (Eigen::Index c = 0; c < halfway.cols(); ++c)
-    far.col(on.far[c]) = halfway.col(c);
+  for (Eigen::Index c = 0; c < on.far_half.cols(); ++c)
+    far.col(on.far_columns[c]) = on.far_half.col(c);
   const MatrixX recovered = window->recover_from_half(in_window, far);
   MatrixX coefficients = MatrixX::Zero(forces.rows(), forces.cols());
   for (Eigen::Index k = 0; k < std::ssize(far_order); ++k)
@@ -83,20 +82,14 @@ CaseResponses GrowingCut::State::condense_cases(const MatrixX& forces, const std
           all(3 * static_cast<Eigen::Index>(functional.nodes[j]) + axis, next + axis) += functional.weights[j];
       next += 3;
     }
-  OnWindow on = on_window(all);
-  MatrixX far; // halves of the columns that act there
-  if (!on.far.empty()) {
-    const MatrixX reduced = window->reduce(on.ordered, &far);
-    for (Eigen::Index c = 0; c < reduced.cols(); ++c)
-      on.by_slot.col(on.far[c]) += reduced.col(c);
-  }
+  const OnWindow on = on_window(all);
   const SchurWindow::Half halves = window->half(on.by_slot);
   const SchurWindow::Half of_cases{halves.ahead.leftCols(cases), halves.rest.leftCols(cases)};
   MatrixX products = SchurWindow::product(halves, of_cases); // all x cases
-  const MatrixX far_products = far.transpose() * far;
-  for (Eigen::Index c = 0; c < std::ssize(on.far); ++c)
-    for (Eigen::Index r = 0; r < std::ssize(on.far) && on.far[c] < cases; ++r)
-      products(on.far[r], on.far[c]) += far_products(r, c);
+  const MatrixX far_products = on.far_half.transpose() * on.far_half;
+  for (Eigen::Index c = 0; c < far_products.cols() && on.far_columns[c] < cases; ++c)
+    for (Eigen::Index r = 0; r < far_products.rows(); ++r)
+      products(on.far_columns[r], on.far_columns[c]) += far_products(r, c);
   CaseResponses responses;
   responses.among = products.topRows(cases);
   responses.at.resize(3 * std::ssize(at), cases);

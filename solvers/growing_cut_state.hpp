@@ -215,11 +215,11 @@ struct GrowingCut::State {
   void condense_all();
   void condense_contact();
   [[nodiscard]] VectorX window_right(const VectorX& right) const;
-  /// Forces (3N rows) by the window's slots; what acts on far nodes is left to those who ask for its columns.
+  /// Forces (3N rows) as the window sees them.
   struct OnWindow {
     MatrixX by_slot;
-    std::vector<Eigen::Index> far; // columns that act on far nodes
-    MatrixX ordered;               // these, in elimination order
+    std::vector<Eigen::Index> far_columns; // those that act on far nodes
+    MatrixX far_half;                      // of these, as SchurWindow::reduce() gives it
   };
   [[nodiscard]] OnWindow on_window(const MatrixX& forces) const;
   [[nodiscard]] MatrixX respond(const MatrixX& forces) const;

@@ -69,6 +69,12 @@ MatrixX unit_pair_forces(const std::vector<LipPair>& pairs, int modes) {
   return forces;
 }
 
+void require_forces(const LipPatch& lips, const LipState& state) {
+  if (state.forces.size() != 0 && state.forces.size() != lips.compliance.cols())
+    throw InputError(fmt::format("{} pair forces on lips with {} entries: they are another patch's",
+                                 state.forces.size(), lips.compliance.cols()));
+}
+
 /// Nodes that carry forces, one after the other, and these.
 struct NodalForces {
   std::vector<int> nodes;
@@ -81,6 +87,9 @@ struct NodalForces {
     forces.push_back(force);
   }
   void add(const LipPatch& lips, const LipState& state) {
+    require_forces(lips, state);
+    if (state.forces.size() == 0) // all open
+      return;
     const std::vector<Vector3> of_pairs = pair_forces(lips, state);
     for (std::size_t p = 0; p < lips.pairs.size(); ++p) {
       add(lips.pairs[p].plus, of_pairs[p]);
@@ -93,10 +102,6 @@ struct NodalForces {
     return field;
   }
 };
-
-bool has_fields(const LipPatch& lips) {
-  return std::ssize(lips.responses) == lips.compliance.cols();
-}
 
 std::vector<int> closed_entries(const std::vector<char>& closed, int modes) {
   std::vector<int> entries;
@@ -283,8 +288,7 @@ LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& p
   if (tool != nullptr) {
     lips.tool_of_lips = std::move(responses.at);
     // A symmetric body opens its lips under a force on a node as it moves the node under that force between the lips.
-    const bool has_fields = std::ssize(tool->responses) == 3 * std::ssize(tool->nodes);
-    lips.lips_of_tool = has_fields ? openings(body, pairs, lips.modes, tool->responses)
+    lips.lips_of_tool = has_fields(*tool) ? openings(body, pairs, lips.modes, tool->responses)
                         : body.method() == Method::galerkin
                             ? MatrixX(lips.tool_of_lips.transpose())
                             : openings(pairs, lips.modes, body.compliance_between(nodes, tool->nodes));
@@ -341,15 +345,20 @@ CutContactState prescribe(const ContactPatch& patch, const LipPatch& lips, const
   return settle(patch, lips, tolerance, {}, [&](const ContactPatch& held) { return prescribe(held, displacements); });
 }
 
-void extend_responses(const Discretisation& body, LipPatch& lips) {
-  if (!has_fields(lips))
-    lips.responses = body.case_responses(nodes_of(lips.pairs), unit_pair_forces(lips.pairs, lips.modes));
+void extend_responses(const Discretisation& body, int pairs, LipPatch& lips) {
+  const auto first = lips.pairs.begin() + std::ssize(lips.responses) / lips.modes;
+  const std::vector<LipPair> next(first, first + std::min<std::ptrdiff_t>(pairs, lips.pairs.end() - first));
+  if (next.empty())
+    return;
+  for (Field& field : body.case_responses(nodes_of(next), unit_pair_forces(next, lips.modes)))
+    lips.responses.push_back(std::move(field));
 }
 
 Field deform(const Field& base, const LipPatch& lips, const LipState& state) {
   if (!has_fields(lips))
     throw InputError(fmt::format("lips with {} entries and {} fields of unit pair forces; allowed: one each",
                                  lips.compliance.cols(), lips.responses.size()));
+  require_forces(lips, state);
   Field field = base;
   for (Eigen::Index k = 0; k < state.forces.size(); ++k)
     if (state.forces[k] != 0)
@@ -367,8 +376,7 @@ Field deform(const Discretisation& body, const Field& base, const LipPatch& lips
 
 Field deform(const Discretisation& body, const ContactPatch& patch, const LipPatch& lips,
              const CutContactState& state) {
-  const bool patch_has_fields = std::ssize(patch.responses) == 3 * std::ssize(patch.nodes);
-  if (patch_has_fields || has_fields(lips))
+  if (has_fields(patch) || has_fields(lips))
     return deform(body, deform(body, patch, state.tool), lips, state.lips);
   require_forces(patch, state.tool);
   NodalForces acting; // of both, in one solution

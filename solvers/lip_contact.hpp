@@ -37,6 +37,11 @@ struct LipPatch {
   MatrixX lips_of_tool;         // m/N, opening per force on the tool's candidates, entries x 3m
 };
 
+/// Whether the lips have the fields of all their unit pair forces.
+inline bool has_fields(const LipPatch& lips) {
+  return std::ssize(lips.responses) == lips.compliance.cols();
+}
+
 /// Condenses onto the pairs. `tool` may be null: no tool. Throws InputError for LipCondition::open, NumericalError when
 /// the compliance is not finite.
 LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& pairs, LipCondition condition,
@@ -79,11 +84,11 @@ ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const s
 CutContactState prescribe(const ContactPatch& patch, const LipPatch& lips, const std::vector<Vector3>& displacements,
                           double tolerance = 1e-9);
 
-/// Makes the fields of unit pair forces, which are cheaper to superpose than a solution each time.
-void extend_responses(const Discretisation& body, LipPatch& lips);
+/// Makes the fields of the next `pairs` pairs that have none: cheaper to superpose than a solution each time.
+void extend_responses(const Discretisation& body, int pairs, LipPatch& lips);
 
 /// Field of the body for the given state; without a tool `base` is the body's own solution. Where patch or lips have no
-/// fields it takes a solution; without the body that is an InputError.
+/// fields it takes a solution; without the body that is an InputError, as forces of another patch are.
 Field deform(const Discretisation& body, const ContactPatch& patch, const LipPatch& lips, const CutContactState& state);
 Field deform(const Discretisation& body, const Field& base, const LipPatch& lips, const LipState& state);
 Field deform(const ContactPatch& patch, const LipPatch& lips, const CutContactState& state);

@@ -121,6 +121,7 @@ void SchurWindow::gather(const std::vector<int>& slots, std::vector<double>& squ
 void SchurWindow::prepare(const std::vector<char>& kept) {
   ahead_.clear();
   seen_ahead_ = {};
+  condensed_rest_.resize(0, 0);
   kept_.clear();
   kept_place_.assign(slots(), -1);
   active_ahead_ = active_;

@@ -27,6 +27,7 @@ constexpr double stiffest_galerkin = 0.49;  // Poisson's ratio
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr int candidates_a_press = 4;       // whose fields are made beside a press
+constexpr int pairs_a_press = 4;            // of lips, likewise
 constexpr double contact_crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a contact is put
 
 bool is_any_closed(const solvers::LipState& lips) {
@@ -378,6 +379,7 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
     const std::vector<Vector3> held = grasped_displacements(*pose, model);
     solve_contact(tool, pose, scenario_, model, &held, std::nullopt, lips_touch_);
     lips_touch_ = is_any_closed(model.state->lips);
+    extend_fields(model);
     return;
   }
   for (int growth = 0; growth <= patch_growths; ++growth) {
@@ -386,21 +388,12 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
       solve_contact(tool, pose, scenario_, model, nullptr, grip_memory_, lips_touch_);
       lips_touch_ = is_any_closed(model.state->lips);
     }
-    if (model.patch.nodes.empty())
+    const std::vector<int> missed =
+        model.patch.nodes.empty() ? std::vector<int>{} : penetrated_outside_patch(*pose, model);
+    if (missed.empty()) {
+      extend_fields(model);
       return;
-    // A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
-    const bool is_for_good = blade_rests_ || (put_off_ == 0 && !cuts_aside()); // else the next body is on its way
-    if (force_only_ && is_for_good) {
-      if (std::ssize(model.patch.responses) == 3 * std::ssize(model.patch.nodes)) {
-        if (model.lips)
-          solvers::extend_responses(*model.body, *model.lips);
-      } else if (++model.presses > few_presses) {
-        solvers::extend_responses(*model.body, candidates_a_press, model.patch);
-      }
     }
-    const std::vector<int> missed = penetrated_outside_patch(*pose, model);
-    if (missed.empty())
-      return;
     std::vector<int> grown = model.patch.nodes;
     grown.insert(grown.end(), missed.begin(), missed.end());
     std::sort(grown.begin(), grown.end());
@@ -411,6 +404,19 @@ void Session::solve(const StepSample& sample, BodyModel& model) {
     model.state = std::move(bonded);
   }
   warn("patch", "the tool reaches surface nodes beyond its candidate patch; give a larger contact.candidate_radius");
+}
+
+// A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
+void Session::extend_fields(BodyModel& model) {
+  const bool is_for_good = blade_rests_ || (put_off_ == 0 && !cuts_aside()); // else the next body is on its way
+  const bool bare_patch = !solvers::has_fields(model.patch);
+  const bool bare_lips = lips_touch_ && model.lips && !solvers::has_fields(*model.lips);
+  if (!force_only_ || !is_for_good || (!bare_patch && !bare_lips) || ++model.presses <= few_presses)
+    return;
+  if (bare_patch)
+    solvers::extend_responses(*model.body, candidates_a_press, model.patch);
+  else
+    solvers::extend_responses(*model.body, pairs_a_press, *model.lips);
 }
 
 // Displacements at the nodes, 3 a node, m; those asked for last are kept.

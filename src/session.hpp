@@ -195,6 +195,7 @@ class Session {
   void build(BodyModel& model);
   void assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near);
   void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
+  void extend_fields(BodyModel& model);
   void solve(const StepSample& sample, BodyModel& model);
   [[nodiscard]] const VectorX& displacements_of(const BodyModel& model) const;
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;

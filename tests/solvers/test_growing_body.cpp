@@ -136,7 +136,15 @@ TEST_CASE("A body that has followed its cut is in balance and equals the body bu
     state.lips.forces = VectorX::LinSpaced(lips_met.compliance.cols(), -0.01, 0.02);
     const Field together = deform(body, bare, lips_met, state);
     CHECK_THROWS_AS(deform(full, lips_met, state), InputError);
-    extend_responses(body, lips_met);
+    CutContactState open = state; // no forces: as without lips
+    open.lips.forces.resize(0);
+    CHECK((deform(body, bare, lips_met, open).coefficients - deform(body, bare, state.tool).coefficients).norm() == 0);
+    open.lips.forces = VectorX::Zero(1);
+    CHECK_THROWS_AS(deform(body, bare, lips_met, open), InputError);
+    extend_responses(body, 1, lips_met);
+    CHECK(std::ssize(lips_met.responses) == lips_met.modes);
+    CHECK_FALSE(has_fields(lips_met));
+    extend_responses(body, 1000, lips_met);
     REQUIRE(std::ssize(lips_met.responses) == lips_met.compliance.cols());
     const Field superposed = deform(full, lips_met, state);
     CHECK((together.coefficients - superposed.coefficients).norm() < 1e-9 * superposed.coefficients.norm());

@@ -133,8 +133,14 @@ TEST_CASE("A cut that grows in its window gives the system built from scratch", 
   for (int increment = 0; increment < 3; ++increment) {
     GrowingBlock elsewhere = block;
     const NodeChange change = block.grow(0.12);
-    if (increment == 1) // what the next increment leaves alone, eliminated ahead
+    if (increment == 1) { // what the next increment leaves alone, eliminated ahead
+      const MatrixX forces = MatrixX::Constant(3 * std::ssize(cut.removed()), 1, 1e-3);
+      const CaseResponses known = cut.condense_cases(forces, cut.candidates());
       cut.prepare(change, block.incision());
+      const CaseResponses anew = cut.condense_cases(forces, cut.candidates());
+      CHECK((known.among - anew.among).norm() < 1e-9 * known.among.norm());
+      CHECK((known.at - anew.at).norm() < 1e-9 * known.at.norm());
+    }
     if (increment == 2) // a shorter one than comes
       cut.prepare(elsewhere.grow(0.01), elsewhere.incision());
     const GrowthReport report = cut.grow(change, block.incision());
