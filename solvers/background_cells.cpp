@@ -15,6 +15,10 @@ namespace {
 /// Halving a cell that is a little too large would cost eight times the points: where the spacing is graded, cells
 /// range from slack / 2 to slack times the size asked for.
 constexpr double slack = 1.6;
+/// Parts of cells this near to a front, in half diagonals, have their points placed for what is singular there.
+constexpr double front_reach = 2;
+/// Samples of a part count as this far from the front at least, in half edges of the part.
+constexpr double nearest = 0.02;
 /// A node within a cell may want smaller ones by this much before the cell is divided for it.
 constexpr double finer_node_slack = 1.3;
 
@@ -31,26 +35,6 @@ class BoxFiller {
   BoxFiller(const topology::Domain& domain, const BackgroundOptions& options, const topology::Incision* incision,
             BackgroundCells& cells)
       : domain_(domain), options_(options), incision_(incision), cells_(cells) {}
-
-  /// Edge of a cell at x in units of the spacing there. The gradients grow without bound towards the front.
-  double size_wanted(const Vector3& x, double spacing) const {
-    double size = options_.cell_size;
-    if (incision_ != nullptr && options_.front_size < 1)
-      if (const auto front = incision_->front_frame(x, options_.front_reach * spacing))
-        size *= std::max(options_.front_size, front->distance / (options_.front_reach * spacing));
-    return size;
-  }
-
-  /// Halves a box until it is small enough for the front, then fills its parts.
-  void divide(const Vector3& centre, const Vector3& half, double spacing) {
-    const double distance = domain_.signed_distance(centre);
-    if (distance > half.norm())
-      return;
-    if (2 * half.maxCoeff() <= slack * size_wanted(centre, spacing) * spacing)
-      return fill(centre, half, spacing, distance);
-    for (int octant = 0; octant < octants; ++octant)
-      divide(octant_centre(centre, half, octant), half / 2, spacing);
-  }
 
   /// `spacing`: of the nodes about the box; `distance`: signed distance of its centre to the surface.
   void fill(const Vector3& centre, const Vector3& half, double spacing, double distance) {
@@ -173,15 +157,23 @@ class BoxFiller {
       }
   }
 
-  void add_split_octant(const Vector3& centre, const Vector3& half, bool inside) {
+  void add_split_octant(const Vector3& centre, const Vector3& half, bool inside, bool whole = true) {
+    const auto front = incision_->front_frame(centre, front_reach * half.norm());
+    if (whole && front && front->distance < half.norm()) {
+      for (int octant = 0; octant < octants; ++octant)
+        add_split_octant(octant_centre(centre, half, octant), half / 2, inside, false);
+      return;
+    }
     const auto sheet = incision_->closest(centre, half.norm());
     if (inside) {
       const auto parts = sheet ? split_box(centre, half, sheet->point, sheet->normal)
                                : std::array<BoxPart, 2>{BoxPart{8 * half.prod(), centre}, BoxPart{}};
       if (clear_parts(centre, half, sheet, parts)) {
-        for (const BoxPart& part : parts)
-          if (part.volume > 0)
-            add_to_group(part.centroid, part.volume);
+        const std::array<double, 2> nearness =
+            front ? inverse_distances(centre, half, sheet, *front) : std::array<double, 2>{};
+        for (std::size_t k = 0; k < 2; ++k)
+          if (parts[k].volume > 0)
+            add_to_group(front ? drawn_to(*front, parts[k].centroid, nearness[k]) : parts[k].centroid, parts[k].volume);
         return;
       }
     }
@@ -191,6 +183,7 @@ class BoxFiller {
       Vector3 eye;
       double volume;
       Vector3 moment;
+      double nearness; // m2, sum of volumes over their distances from the front
     };
     std::vector<Part> visible;
     const int detail = inside ? 4 : 2;
@@ -199,9 +192,11 @@ class BoxFiller {
       auto part =
           std::find_if(visible.begin(), visible.end(), [&](const Part& p) { return !incision_->blocks(p.eye, x); });
       if (part == visible.end())
-        part = visible.insert(visible.end(), {x, 0, Vector3::Zero()});
+        part = visible.insert(visible.end(), {x, 0, Vector3::Zero(), 0});
       part->volume += volume;
       part->moment += volume * x;
+      if (front)
+        part->nearness += volume / std::max(off_front(*front, x).norm(), nearest * half.minCoeff());
     };
     for (int a = 0; a < detail; ++a)
       for (int b = 0; b < detail; ++b)
@@ -221,10 +216,49 @@ class BoxFiller {
             add_sample(incision_->blocks(part.centroid, moved) ? part.centroid : moved, fraction * part.volume);
           }
         }
-    for (const Part& part : visible)
-      if (part.volume > 1e-4 * 8 * half.prod())
-        add_to_group(incision_->blocks(part.eye, part.moment / part.volume) ? part.eye : part.moment / part.volume,
-                     part.volume);
+    for (const Part& part : visible) {
+      if (part.volume <= 1e-4 * 8 * half.prod())
+        continue;
+      const Vector3 middle = part.moment / part.volume;
+      const Vector3 place = front ? drawn_to(*front, middle, part.nearness / part.volume) : middle;
+      add_to_group(incision_->blocks(part.eye, place) ? part.eye : place, part.volume);
+    }
+  }
+
+  /// The way from the front, taken as straight along its frame, to x.
+  static Vector3 off_front(const topology::FrontFrame& front, const Vector3& x) {
+    const Vector3 d = x - front.point;
+    return d - d.dot(front.tangent) * front.tangent;
+  }
+
+  /// Means of 1 / r over the two parts of a box that the plane of `sheet` makes, the + side first.
+  static std::array<double, 2> inverse_distances(const Vector3& centre, const Vector3& half,
+                                                 const std::optional<topology::SheetPoint>& sheet,
+                                                 const topology::FrontFrame& front) {
+    constexpr int detail = 6;
+    std::array<double, 2> sum{}, count{};
+    for (int a = 0; a < detail; ++a)
+      for (int b = 0; b < detail; ++b)
+        for (int c = 0; c < detail; ++c) {
+          const Vector3 x =
+              centre + half.cwiseProduct(Vector3(2 * a + 1 - detail, 2 * b + 1 - detail, 2 * c + 1 - detail)) / detail;
+          const std::size_t side = !sheet || sheet->normal.dot(x - sheet->point) >= 0 ? 0 : 1;
+          sum[side] += 1 / std::max(off_front(front, x).norm(), nearest * half.minCoeff());
+          ++count[side];
+        }
+    for (std::size_t side = 0; side < 2; ++side)
+      sum[side] = count[side] > 0 ? sum[side] / count[side] : 0;
+    return sum;
+  }
+
+  /// x moved on its ray from the front to where 1 / r is `nearness`, 1/m, unless the cut is in the way.
+  [[nodiscard]] Vector3 drawn_to(const topology::FrontFrame& front, const Vector3& x, double nearness) const {
+    const Vector3 arm = off_front(front, x);
+    const double r = arm.norm();
+    if (!options_.enriched || !(r > 0) || !(nearness > 0))
+      return x;
+    const Vector3 drawn = x + (1 / (nearness * r) - 1) * arm;
+    return incision_->blocks(x, drawn) ? x : drawn;
   }
 
   /// Whether each part's centroid sees the part's corners of the octant: then the plane is the whole cut there.
@@ -293,7 +327,7 @@ class Octree {
       return;
     const double longest = 2 * half.maxCoeff(), spacing = spacing_near(centre);
     // A coarse node may be nearest to the centre while fine ones sit in a corner: large cells always divide.
-    if (longest > slack * filler_.size_wanted(centre, spacing) * spacing || holds_finer_node(centre, half)) {
+    if (longest > slack * options_.cell_size * spacing || holds_finer_node(centre, half)) {
       std::array<int, 3> parts{};
       for (int c = 0; c < 3; ++c)
         parts[c] = half[c] > 0.3 * longest ? 2 : 1;
@@ -349,7 +383,7 @@ void refill_box(const topology::Domain& domain, const BackgroundBox& box, const 
   out.start.assign(1, 0);
   out.points.clear();
   out.boxes.clear();
-  BoxFiller(domain, options, incision, out).divide(box.centre, box.half, box.spacing);
+  BoxFiller(domain, options, incision, out).fill(box.centre, box.half, box.spacing, domain.signed_distance(box.centre));
 }
 
 } // namespace spherecut::solvers

@@ -64,11 +64,14 @@ UnheldPieces unheld_pieces_from_string(std::string_view name);
 
 struct DiscretisationOptions {
   Method method = Method::galerkin;
-  double support_radius = 0;                  // rho, radius / h (galerkin: / reach, below nu = 0.45); 0: the default
-  int quadrature = 2;                         // rule of a background cell, exact to degree 2 quadrature - 1 (galerkin)
-  double cell_size = 0.75;                    // edge of a background cell in units of h (galerkin)
-  int tip_node = -1;                          // the tool-tip node of `published`
-  SightRule sight = SightRule::enriched;      // only where there is an incision
+  double support_radius = 0;             // rho, radius / h (galerkin: / reach, below nu = 0.45); 0: the default
+  int quadrature = 2;                    // rule of a background cell, exact to degree 2 quadrature - 1 (galerkin)
+  double cell_size = 0.75;               // edge of a background cell in units of h (galerkin)
+  int tip_node = -1;                     // the tool-tip node of `published`
+  SightRule sight = SightRule::enriched; // only where there is an incision
+  /// The body will be cut: `galerkin` takes the spheres of cut bodies from the start, so that the first cut changes
+  /// nothing away from it.
+  bool cut_ahead = false;
   UnheldPieces unheld = UnheldPieces::refuse; // galerkin, collocation
   bool estimate_condition = true;             // a dozen more solves; leave out where every rebuild counts
 };

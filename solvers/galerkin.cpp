@@ -35,10 +35,7 @@ class Galerkin final : public ElasticBody {
       : ElasticBody(std::move(problem), galerkin_support_radius(problem, options), options.sight, 1,
                     galerkin_lengths(problem.material)) {
     const Stopwatch assembly;
-    BackgroundOptions background;
-    background.quadrature = options.quadrature;
-    background.cell_size = options.cell_size;
-    cells_ = background_cells(*problem_.domain, problem_.nodes, background, problem_.incision.get());
+    cells_ = background_cells(*problem_.domain, problem_.nodes, background_of(options), problem_.incision.get());
     hold_surface();
     assemble(options.unheld, !is_factored || !initial_stress(problem_).isZero(0));
     assemble_loads();
@@ -466,7 +463,13 @@ bool is_nearly_incompressible(const Material& material) {
 double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options) {
   if (options.support_radius > 0)
     return options.support_radius;
-  return is_nearly_incompressible(problem.material) ? 2.2 : 2.0;
+  if (is_nearly_incompressible(problem.material))
+    return 2.2;
+  return problem.incision != nullptr || options.cut_ahead ? 1.8 : 2.0;
+}
+
+BackgroundOptions background_of(const DiscretisationOptions& options) {
+  return {options.cell_size, options.quadrature, options.sight == SightRule::enriched};
 }
 
 std::vector<double> NodeCloud::*galerkin_lengths(const Material& material) {

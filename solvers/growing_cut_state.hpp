@@ -84,7 +84,7 @@ struct GrowingCut::State {
   [[nodiscard]] Increment increment(const NodeChange& change,
                                     const std::shared_ptr<const topology::Incision>& incision) const;
 
-  [[nodiscard]] BackgroundOptions background() const { return {options.method.cell_size, options.method.quadrature}; }
+  [[nodiscard]] BackgroundOptions background() const { return background_of(options.method); }
   [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
     return std::make_unique<Spheres>(problem.nodes.positions, problem.nodes.*galerkin_lengths(problem.material), rho,
                                      Basis::linear, worst_moment_condition,
