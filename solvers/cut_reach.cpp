@@ -91,6 +91,12 @@ Changes changes_between(const topology::Incision* before, const SpacingAt& spaci
     const std::vector<Vector3> points = sample_points(now.sheets()[s], known, spacing);
     changes.faces.insert(changes.faces.end(), points.begin(), points.end());
   }
+  // Triangles share their corners.
+  const auto before_in_order = [](const Vector3& a, const Vector3& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  };
+  std::sort(changes.faces.begin(), changes.faces.end(), before_in_order);
+  changes.faces.erase(std::unique(changes.faces.begin(), changes.faces.end()), changes.faces.end());
   // The reach of the enrichment goes with the lengths of the nodes nearest to a segment's ends, so they count too.
   using Ends = std::array<double, 8>;
   const auto ends = [](const topology::FrontSegment& f, const SpacingAt& spacing_at) {
@@ -129,7 +135,8 @@ void add_front(const topology::Incision* incision, double spacing, std::vector<V
 Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front,
              const std::vector<Vector3>& all_front, double enriched, const std::vector<Vector3>& nodes,
              const std::vector<double>& radii, double slack)
-    : to_faces_(faces), to_front_(front), to_all_(all_front), enriched_(enriched), slack_(slack) {
+    : faces_(faces), front_(front), to_faces_(faces), to_front_(front), to_all_(all_front), enriched_(enriched),
+      slack_(slack) {
   std::vector<Vector3> present;
   for (std::size_t j = 0; j < nodes.size(); ++j) {
     if (!(radii[j] > 0))
@@ -146,6 +153,8 @@ Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& fron
       by_branch_.push_back({nodes[j], radii[j], 0});
   }
   present_.emplace(present);
+  for (std::vector<Eye>* eyes : {&by_faces_, &by_front_}) // those nearest to the change first: they tell most often
+    std::stable_sort(eyes->begin(), eyes->end(), [](const Eye& a, const Eye& b) { return a.spare > b.spare; });
 }
 
 bool Reach::sees(const Vector3& x, double half) const {
@@ -159,6 +168,40 @@ bool Reach::sees(const Vector3& x, double half) const {
   return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front) ||
          (!by_branch_.empty() && to_all_(x) - half - slack_ < enriched_ * radius_beside(to_all_, x) &&
           std::any_of(by_branch_.begin(), by_branch_.end(), holds));
+}
+
+bool Reach::passes(const std::vector<Vector3>& places, const std::vector<Eye>& eyes, const Vector3& centre,
+                   const Vector3& half) const {
+  std::vector<double> to_places; // from the box; found when some eye is near
+  return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) {
+    if (distance_to_box(eye.position, centre, half) >= eye.radius)
+      return false;
+    if (to_places.empty())
+      for (const Vector3& place : places)
+        to_places.push_back(distance_to_box(place, centre, half));
+    const double longest = looking_around * eye.radius + 2 * slack_;
+    for (std::size_t k = 0; k < places.size(); ++k)
+      if (const double left = longest - to_places[k];
+          left > 0 && (places[k] - eye.position).squaredNorm() < left * left)
+        return true;
+    return false;
+  });
+}
+
+bool Reach::sees(const Vector3& centre, const Vector3& half) const {
+  const auto holds = [&](const Eye& eye) { return distance_to_box(eye.position, centre, half) < eye.radius; };
+  const double size = half.norm();
+  return sees(centre, size) &&
+         (to_faces_(centre) - slack_ < half.minCoeff() || passes(faces_, by_faces_, centre, half) ||
+          passes(front_, by_front_, centre, half) ||
+          (!by_branch_.empty() && to_all_(centre) - size - slack_ < enriched_ * radius_beside(to_all_, centre) &&
+           std::any_of(by_branch_.begin(), by_branch_.end(), holds)));
+}
+
+bool Reach::near_front(const Vector3& centre, const Vector3& half, double radii) const {
+  return near_front(centre, half.norm(), radii) && std::any_of(front_.begin(), front_.end(), [&](const Vector3& place) {
+           return distance_to_box(place, centre, half) - slack_ < radii * radius_beside(to_front_, centre);
+         });
 }
 
 ReachAlong::ReachAlong(const topology::SurfaceMesh& way, const topology::Incision* before, const NodeCloud& nodes,

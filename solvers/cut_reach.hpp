@@ -70,6 +70,11 @@ class Nearness {
   std::optional<topology::PointTree> tree_;
 };
 
+/// How far x is from the box centre +- half, m.
+inline double distance_to_box(const Vector3& x, const Vector3& centre, const Vector3& half) {
+  return ((x - centre).cwiseAbs() - half).cwiseMax(0).norm();
+}
+
 /// Which places a change of the cut can reach: a point x sees a node y of sphere radius R another way only where some
 /// changed place p of faces or front lies on the way, |x - p| + |p - y| < R. Coarse nodes far from the change have
 /// large spheres that it does not concern.
@@ -90,17 +95,24 @@ class Reach {
     return to_faces_(x) - half - slack_ < radii * radius_beside(to_faces_, x);
   }
 
+  /// Both of a box centre +- half, m, more closely: by the ways over every changed place.
+  [[nodiscard]] bool sees(const Vector3& centre, const Vector3& half) const;
+  [[nodiscard]] bool near_front(const Vector3& centre, const Vector3& half, double radii) const;
+
  private:
   struct Eye {
     Vector3 position;
     double radius, spare;
   };
+  [[nodiscard]] bool passes(const std::vector<Vector3>& places, const std::vector<Eye>& eyes, const Vector3& centre,
+                            const Vector3& half) const;
   /// Radius of the sphere about the node nearest to the change's place nearest to x.
   [[nodiscard]] double radius_beside(const Nearness& change, const Vector3& x) const {
     const std::optional<Vector3> place = change.place(x);
     return place ? present_radii_[static_cast<std::size_t>(present_->nearest(*place).index)] : 0;
   }
 
+  std::vector<Vector3> faces_, front_;
   Nearness to_faces_, to_front_, to_all_;
   double enriched_;
   std::optional<topology::PointTree> present_;

@@ -245,7 +245,9 @@ void CutSight::look(std::span<const QuadraturePoint> points, std::span<const int
         view.points[q].eye = topology::eye_at(incision, x, smallest_radius);
         lifted |= bit;
       }
-      if (incision.hides_blocked(view.points[q].eye, eye)) {
+      // As a rule one of the same walls stands between the lifted eyes, too.
+      const topology::Eye& own = view.points[q].eye;
+      if (incision.blocks(own.lifted, eye.lifted, view.walls) || incision.hides_blocked(own, eye)) {
         view.hidden[k] |= bit;
         view.altered |= bit;
       }

@@ -298,7 +298,7 @@ GrowingCut::State::increment(const NodeChange& change,
   increment.spheres_seconds = sphere_watch.seconds();
 
   const double finest = *std::min_element(next.nodes.spacings.begin(), next.nodes.spacings.end());
-  const double slack = 0.25 * finest;
+  const double slack = 0.1 * finest;
   const Changes& changes = increment.changes =
       changes_between(before, SpacingAt(problem.nodes, removed, galerkin_lengths(problem.material)), *incision,
                       SpacingAt(next.nodes, gone, galerkin_lengths(next.material)), 2 * slack);
@@ -327,7 +327,7 @@ GrowingCut::State::increment(const NodeChange& change,
     const BackgroundBox& leaf = boxes[b].box;
     if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
         ((touched.upper - leaf.centre).array() < -leaf.half.array()).any() ||
-        !increment.concerns(leaf.centre, leaf.half.norm(), enrichment_reach()))
+        !increment.concerns(leaf, enrichment_reach()))
       continue;
     if (boxes[b].cells.empty())
       return uncovered("the cut left the predicted way");

@@ -77,6 +77,14 @@ struct GrowingCut::State {
              std::any_of(balls.begin(), balls.end(),
                          [&](const auto& ball) { return (ball.first - x).norm() < ball.second + half; });
     }
+    /// The same of a box, more closely.
+    [[nodiscard]] bool concerns(const BackgroundBox& box, double enriched) const {
+      return reach->near_front(box.centre, box.half, std::max(1.0, enriched)) ||
+             std::any_of(
+                 balls.begin(), balls.end(),
+                 [&](const auto& ball) { return distance_to_box(ball.first, box.centre, box.half) < ball.second; }) ||
+             reach->sees(box.centre, box.half);
+    }
   };
 
   State(Problem p, GrowthOptions o);
