@@ -407,16 +407,27 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   const auto is_near = [&](const DisplacementMean& mean) {
     return increment.concerns(mean.centroid, s.share_extent(mean.centroid), s.enrichment_reach());
   };
-  std::vector<Vector3> surface_changes = changes.faces;
+  std::vector<Vector3> skin_changes, lip_changes = changes.faces;
+  const auto add_surface_change = [&](NodeKind kind, const Vector3& x) {
+    if (kind != NodeKind::interior)
+      (kind == NodeKind::lip ? lip_changes : skin_changes).push_back(x);
+  };
   for (int node : change.removed)
-    if (s.problem.nodes.kinds[node] != NodeKind::interior)
-      surface_changes.push_back(s.problem.nodes.positions[node]);
+    add_surface_change(s.problem.nodes.kinds[node], s.problem.nodes.positions[node]);
   for (int k = 0; k < change.added.size(); ++k)
-    if (change.added.kinds[k] != NodeKind::interior)
-      surface_changes.push_back(change.added.positions[k]);
-  const Nearness to_surface_changes(surface_changes);
+    add_surface_change(change.added.kinds[k], change.added.positions[k]);
+  const Nearness to_skin_changes(skin_changes), to_lip_changes(lip_changes), to_faces(changes.faces);
   const auto is_reshaped = [&](const DisplacementMean& mean, int node) {
-    return to_surface_changes(mean.centroid) < share_size * s.problem.nodes.spacings[node];
+    const double spacing = s.problem.nodes.spacings[node];
+    if (s.problem.nodes.kinds[node] == NodeKind::lip)
+      return to_lip_changes(mean.centroid) < share_size * spacing;
+    if (to_skin_changes(mean.centroid) < share_size * spacing)
+      return true;
+    // New faces take points away from a node, or give it those of a neighbour, where they come into its share.
+    double extent = spacing;
+    for (const QuadraturePoint& point : mean.share)
+      extent = std::max(extent, (point.position - s.problem.nodes.positions[node]).norm());
+    return to_faces(s.problem.nodes.positions[node]) < share_crossing * extent;
   };
   std::vector<DisplacementMean> held = s.held;
   std::unique_ptr<Shares> shares;
@@ -448,12 +459,13 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   // Exchange.
   const Eigen::Index grown = 3 * static_cast<Eigen::Index>(next.nodes.size());
   s.cell_loads.conservativeResizeLike(VectorX::Zero(grown));
+  std::vector<int> come_slots, gone_slots;
   for (int k = 0; k < change.added.size(); ++k) {
     const int block = s.next_room + k;
-    for (int c = 0; c < 3; ++c)
-      s.window->activate(3 * block + c);
+    come_slots.insert(come_slots.end(), {3 * block, 3 * block + 1, 3 * block + 2});
     s.window_node[block] = s.problem.nodes.size() + k;
   }
+  s.window->activate(come_slots);
   s.next_room += change.added.size();
   s.slot = std::move(new_slot);
   std::vector<const CellShapes*> gone, come;
@@ -495,10 +507,11 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.held = std::move(held);
   for (int node : change.removed) {
     for (int c = 0; c < 3; ++c)
-      s.window->deactivate(3 * s.slot[node] + c);
+      gone_slots.push_back(3 * s.slot[node] + c);
     s.window_node[s.slot[node]] = -1;
     s.cell_loads.segment<3>(3 * static_cast<Eigen::Index>(node)).setZero();
   }
+  s.window->deactivate(gone_slots);
   Problem previous = std::move(s.problem);
   std::vector<char> previously_removed = std::move(s.removed);
   s.problem = std::move(next);

@@ -22,6 +22,9 @@ namespace spherecut::solvers {
 inline constexpr double shares_reach = 4;
 /// A share itself changes when faces or surface nodes come this near to it, in spacings.
 inline constexpr double share_size = 2;
+/// And a share of the skin where faces come this near to its node, in units of how far it reaches from it: nearer they
+/// part points from this node or from one beside it.
+inline constexpr double share_crossing = 1.6;
 
 struct GrowingCut::State {
   struct Box {

@@ -85,19 +85,28 @@ double SchurWindow::condition_estimate() const {
   return solvers::condition_estimate(*cholesky_, norm_, far_ + changing_ + contact_);
 }
 
-void SchurWindow::activate(int slot) {
-  deactivate(slot);
-  active_[slot] = 1;
-  // What is done ahead knows the slots that were free then, not one that has changed hands since.
-  if (!ahead_.empty() && (kept_place_[slot] < 0 || active_ahead_[slot] != 0))
-    ahead_.clear();
+void SchurWindow::activate(const std::vector<int>& slots) {
+  deactivate(slots);
+  for (const int slot : slots) {
+    active_[slot] = 1;
+    // What is done ahead knows the slots that were free then, not one that has changed hands since.
+    if (!ahead_.empty() && (kept_place_[slot] < 0 || active_ahead_[slot] != 0))
+      ahead_.clear();
+  }
 }
 
-void SchurWindow::deactivate(int slot) {
-  active_[slot] = 0;
-  changed_[slot] = 1;
-  schur_.col(slot).setZero();
-  schur_.row(slot).setZero();
+void SchurWindow::deactivate(const std::vector<int>& slots) {
+  for (const int slot : slots) {
+    active_[slot] = 0;
+    changed_[slot] = 1;
+    schur_.col(slot).setZero();
+  }
+  // All rows column by column: one row alone would fetch every column for a single entry.
+  for (Eigen::Index column = 0; column < schur_.cols(); ++column)
+    if (active_[column] != 0)
+      for (const int slot : slots)
+        if (slot > column)
+          schur_(slot, column) = 0;
 }
 
 /// The lower triangle of S of some slots (ascending), column-major.

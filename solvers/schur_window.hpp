@@ -46,10 +46,10 @@ class SchurWindow {
   [[nodiscard]] bool active(int slot) const { return active_[slot] != 0; }
   /// Whether the slot has changed since the last factor().
   [[nodiscard]] bool changed(int slot) const { return changed_[slot] != 0; }
-  /// A new unknown: its row and column start at zero.
-  void activate(int slot);
-  /// Takes an unknown out of the system; its row and column are forgotten.
-  void deactivate(int slot);
+  /// New unknowns: their rows and columns start at zero.
+  void activate(const std::vector<int>& slots);
+  /// Takes unknowns out of the system; their rows and columns are forgotten.
+  void deactivate(const std::vector<int>& slots);
 
   /// Work done ahead of a change: eliminates what is active and not marked in `kept` (by slot), so that the next
   /// factor() has only the marked unknowns left to do, as long as nothing else has changed by then. Free room is kept

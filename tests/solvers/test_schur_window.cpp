@@ -80,8 +80,7 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
     window.column(high)[high] += stiffness;
     window.column(low)[high] -= stiffness;
   };
-  window.activate(changing);
-  window.activate(changing + 1);
+  window.activate({changing, changing + 1});
   spring(n, far + 4, 0.7);
   spring(n, n + 1, 0.4);
   spring(n + 1, n - 1, 0.9); // a contact unknown
@@ -90,7 +89,7 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   for (int other = far; other < n; ++other)
     if (other != gone && larger(other, gone) != 0)
       spring(other, gone, larger(other, gone));
-  window.deactivate(window.slot_of(gone));
+  window.deactivate({window.slot_of(gone)});
   larger.row(gone).setZero();
   larger.col(gone).setZero();
   larger(gone, gone) = 1;
@@ -140,7 +139,7 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
 TEST_CASE("A window without hold is said, not solved", "[schur_window]") {
   const int n = 40;
   SchurWindow window(lower_of(spring_matrix(n, 5)), 10, 2, 4);
-  window.activate(10); // a new unknown that nothing holds
+  window.activate({10}); // a new unknown that nothing holds
   CHECK_THROWS_AS(window.factor(), NumericalError);
   CHECK_THROWS_AS(SchurWindow(lower_of(spring_matrix(n, 5)), 30, 0, 20), InputError);
 }
