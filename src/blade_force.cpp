@@ -270,17 +270,19 @@ void BladeForce::wait(const BodyModel& now) {
     return;
   }
   for (const std::size_t stop : stops()) {
-    const VectorX start = state_->advance, end = advances(meeting_, now, way_[stop]);
-    if (!is_past_due(end)) {
+    // By poses: what lies behind the edge may end its advance before the motion does.
+    const topology::BladePose from = at_;
+    const auto is_late = [&](const topology::BladePose& pose) { return is_past_due(advances(meeting_, now, pose)); };
+    if (!is_late(way_[stop])) {
       stroke(now, way_[stop], 1);
       continue;
     }
     double low = 0, high = 1;
     for (int k = 0; k < wait_steps; ++k) {
       const double middle = 0.5 * (low + high);
-      (is_past_due(start + middle * (end - start)) ? high : low) = middle;
+      (is_late(pose_between(from, way_[stop], middle)) ? high : low) = middle;
     }
-    stroke(now, way_[stop], low);
+    stroke(now, pose_between(from, way_[stop], low), 1);
     return;
   }
 }

@@ -42,7 +42,6 @@ solvers::DiscretisationOptions method_of(const Scenario& scenario) {
   options.unheld = scenario.cut.unheld;
   if (scenario.cut.sight)
     options.sight = *scenario.cut.sight;
-  options.cut_ahead = scenario.blade || !scenario.precuts.empty();
   return options;
 }
 

@@ -339,6 +339,7 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   if (scenario.blade)
     check_blade_force(scenario, root, offences);
   check_tearing(scenario, root, offences);
+  scenario.method.cut_ahead = scenario.blade || !scenario.precuts.empty();
   if (!scenario.tool && !scenario.blade && scenario.precuts.empty() && !scenario.tearing.enabled)
     offences.add(1, "there is no tool, no blade and no precut: nothing to compute; allowed: one of them or more");
   scenario.haptics = haptics(root.table("haptics"), file, offences);
