@@ -98,6 +98,38 @@ TEST_CASE("Background cells split by a cut keep the volume, and no cell of a sev
   }
 }
 
+TEST_CASE("Around a front what goes with 1 / r is integrated by one point a part", "[cut_galerkin]") {
+  const CutBlock block = cut_block(8, false, 2);
+  const auto nearness = [&](const Vector3& x) { return 1 / block.incision->front_frame(x, 2)->distance; };
+  constexpr int lattice = 100;
+  double sampled = 0;
+  for (int a = 0; a < lattice; ++a)
+    for (int b = 0; b < lattice; ++b)
+      for (int c = 0; c < lattice; ++c)
+        sampled += nearness((Vector3(a, b, c).array() + 0.5) / lattice - 0.5) / (lattice * lattice * lattice);
+  const auto integrated = [&](bool enriched) {
+    double sum = 0;
+    for (const QuadraturePoint& point :
+         background_cells(*block.domain, block.nodes, {0.75, 2, enriched}, block.incision.get()).points)
+      sum += point.weight * nearness(point.position);
+    return sum;
+  };
+  CHECK(integrated(true) == Approx(sampled).epsilon(1.5e-3));
+  CHECK(integrated(false) < 0.995 * sampled); // at the centroids
+}
+
+TEST_CASE("Bodies that are cut, or will be, take smaller spheres", "[cut_galerkin]") {
+  const CutBlock block = cut_block(4, false, 1);
+  Problem cut = problem_of(block, {1, 0.3, 0}), whole = cut;
+  whole.incision = nullptr;
+  CHECK(galerkin_support_radius(whole, {}) == 2);
+  CHECK(galerkin_support_radius(whole, {.cut_ahead = true}) == 1.8);
+  CHECK(galerkin_support_radius(cut, {}) == 1.8);
+  CHECK(galerkin_support_radius(cut, {.support_radius = 1.9}) == 1.9);
+  cut.material.poisson_ratio = 0.45;
+  CHECK(galerkin_support_radius(cut, {}) == 2.2);
+}
+
 TEST_CASE("Both faces of a cut are integrated as far as they lie in the body", "[cut_galerkin]") {
   const CutBlock block = cut_block(8, false, 1);
   double area = 0, plus = 0;

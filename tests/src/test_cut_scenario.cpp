@@ -59,6 +59,7 @@ rotation = [0, 0, 90]
   CHECK(scenario.cut.lips == solvers::LipCondition::frictionless);
   CHECK(scenario.cut.front_spacing == 0);
   REQUIRE(scenario.blade);
+  CHECK(scenario.method.cut_ahead);
   CHECK(scenario.blade->edge.size() == 2);
   CHECK(scenario.blade->edge_radius == 1e-4);
   CHECK(scenario.blade->path[0].rotation == Vector3::Zero());

@@ -41,6 +41,7 @@ TEST_CASE("A scenario is read with its values and the documented defaults") {
   CHECK(scenario.nodes.random_seed == 1);
   CHECK(scenario.method.method == solvers::Method::galerkin);
   CHECK(scenario.method.support_radius == 0);
+  CHECK_FALSE(scenario.method.cut_ahead);
   CHECK_FALSE(scenario.gravity);
   CHECK(std::get<topology::SphereTip>(scenario.tool->shape).radius == 0.01);
   const auto& approach = std::get<Approach>(scenario.tool->motion);
