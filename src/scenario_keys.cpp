@@ -141,7 +141,8 @@ constexpr std::array keys = {
     ScenarioKey{
         "method.support_radius", number, "", "",
         "Radius of a sphere of influence in units of the local spacing (galerkin below a Poisson ratio of 0.45: less "
-        "where the sphere would reach into finer nodes); left out: the method's own.",
+        "where the sphere would reach into finer nodes); left out: collocation 1.8, galerkin 2.2 from that ratio on, "
+        "below it 1.8 where a precut or a blade cuts the body and 2 elsewhere.",
         from(1.2, 4)},
     ScenarioKey{"method.quadrature", integer, "", "2",
                 "Rule of a background cell (galerkin): 1, its centre; 2, six points, exact to degree three; 3, 27 "
