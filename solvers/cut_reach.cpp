@@ -199,9 +199,11 @@ bool Reach::sees(const Vector3& centre, const Vector3& half) const {
 }
 
 bool Reach::near_front(const Vector3& centre, const Vector3& half, double radii) const {
-  return near_front(centre, half.norm(), radii) && std::any_of(front_.begin(), front_.end(), [&](const Vector3& place) {
-           return distance_to_box(place, centre, half) - slack_ < radii * radius_beside(to_front_, centre);
-         });
+  const double nearest = to_front_(centre) - slack_, reach = radii * radius_beside(to_front_, centre);
+  return nearest < half.minCoeff() + reach ||
+         (nearest < half.norm() + reach && std::any_of(front_.begin(), front_.end(), [&](const Vector3& place) {
+            return distance_to_box(place, centre, half) - slack_ < reach;
+          }));
 }
 
 ReachAlong::ReachAlong(const topology::SurfaceMesh& way, const topology::Incision* before, const NodeCloud& nodes,
