@@ -12,10 +12,10 @@ namespace {
 constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
 constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
 constexpr double largest_share = 0.8;  // of the nodes in a window that is worth its while
-// The same where blade.advance is above so many fine spacings: a window serves fewer increments. 1000 nodes, 0.27 to
-// 0.55 of them in the window, 0.3 spacings an increment: 50 to 65 ms of processor time a step with windows, 24 to 27
+// The same where blade.advance is above so many fine spacings: a window serves fewer increments. 1000 nodes, 0.23 to
+// 0.5 of them in the window, 0.3 spacings an increment: 50 to 65 ms of processor time a step with windows, 24 to 27
 // rebuilt.
-constexpr double long_advance = 0.2, largest_share_of_long = 0.25;
+constexpr double long_advance = 0.2, largest_share_of_long = 0.2;
 // Nodes of a body of `collocation` that is followed: the dense L U of its window costs more than the sparse one of the
 // whole body beyond. A run of liver_cut.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with windows
 // and takes 27 s without; steps of 0.1 mm at 1000 nodes a third of the rebuild's time with them.
