@@ -251,14 +251,14 @@ class BoxFiller {
     return sum;
   }
 
-  /// x moved on its ray from the front to where 1 / r is `nearness`, 1/m, unless the cut is in the way.
+  /// x moved on its ray from the front to where 1 / r is `nearness`, 1/m, unless the cut or the surface is in the way.
   [[nodiscard]] Vector3 drawn_to(const topology::FrontFrame& front, const Vector3& x, double nearness) const {
     const Vector3 arm = off_front(front, x);
     const double r = arm.norm();
     if (!options_.enriched || !(r > 0) || !(nearness > 0))
       return x;
     const Vector3 drawn = x + (1 / (nearness * r) - 1) * arm;
-    return incision_->blocks(x, drawn) ? x : drawn;
+    return incision_->blocks(x, drawn) || domain_.signed_distance(drawn) > 0 ? x : drawn;
   }
 
   /// Whether each part's centroid sees the part's corners of the octant: then the plane is the whole cut there.

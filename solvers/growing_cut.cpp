@@ -409,8 +409,11 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   };
   std::vector<Vector3> skin_changes, lip_changes = changes.faces;
   const auto add_surface_change = [&](NodeKind kind, const Vector3& x) {
-    if (kind != NodeKind::interior)
-      (kind == NodeKind::lip ? lip_changes : skin_changes).push_back(x);
+    if (kind == NodeKind::interior)
+      return;
+    lip_changes.push_back(x); // the points of faces go by the spacing of whatever is nearest
+    if (kind != NodeKind::lip)
+      skin_changes.push_back(x);
   };
   for (int node : change.removed)
     add_surface_change(s.problem.nodes.kinds[node], s.problem.nodes.positions[node]);
