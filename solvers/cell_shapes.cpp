@@ -15,6 +15,7 @@ void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes
   cell.points = static_cast<int>(points.size());
   cell.stride =
       (cell.points + shape_kernel::points_together - 1) / shape_kernel::points_together * shape_kernel::points_together;
+  cell.growth = 1;
   cell.nodes.clear();
   cell.reached.clear();
   if (!evaluate_together(points, cell))
@@ -143,8 +144,11 @@ bool CellEvaluator::add_altered(std::span<const QuadraturePoint> points, CellSha
       support.count = n;
       sound = cut.evaluate_seen(kernel, x, view_.points[q], hidden_, support, spheres_.worst_condition(), shape);
     }
-    if (!sound && !solvers::evaluate(spheres_, x, shape))
-      return false;
+    if (!sound) {
+      if (!solvers::evaluate(spheres_, x, shape))
+        return false;
+      cell.growth = std::max(cell.growth, shape.growth);
+    }
   }
 
   for (std::size_t k = 0; k < count; ++k) {
@@ -201,6 +205,7 @@ void CellEvaluator::evaluate_each(std::span<const QuadraturePoint> points, CellS
       throw NumericalError(fmt::format("the quadrature point ({:.6g}, {:.6g}, {:.6g}) m has {} supporting nodes: the "
                                        "nodes leave a hole there",
                                        x.x(), x.y(), x.z(), at_point_[q].size()));
+    cell.growth = std::max(cell.growth, at_point_[q].growth);
     for (int node : at_point_[q].nodes)
       if (place_[node] < 0) {
         place_[node] = 0;

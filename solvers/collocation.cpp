@@ -24,8 +24,7 @@ double collocation_support_radius(const DiscretisationOptions& options) {
 }
 
 Collocation::Collocation(Problem problem, const DiscretisationOptions& options, Assembled)
-    : ElasticBody(std::move(problem), collocation_support_radius(options), options.sight,
-                  options.sight == SightRule::enriched ? front_radius_factor : 1),
+    : ElasticBody(std::move(problem), Method::collocation, collocation_support_radius(options), options.sight),
       mixed_(problem_.material.poisson_ratio > mixed_above), stride_(mixed_ ? 4 : 3) {
   const Stopwatch assembly;
   const NodeCloud& nodes = problem_.nodes;

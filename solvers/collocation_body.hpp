@@ -9,8 +9,7 @@
 
 namespace spherecut::solvers {
 
-inline constexpr double mixed_above = 0.40;        // Poisson ratio from which the pressure unknown is used
-inline constexpr double front_radius_factor = 1.2; // supports at a front are larger by this
+inline constexpr double mixed_above = 0.40; // Poisson ratio from which the pressure unknown is used
 
 /// rho, in spacings.
 double collocation_support_radius(const DiscretisationOptions& options);

@@ -135,8 +135,8 @@ void add_front(const topology::Incision* incision, double spacing, std::vector<V
 Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front,
              const std::vector<Vector3>& all_front, double enriched, const std::vector<Vector3>& nodes,
              const std::vector<double>& radii, double slack)
-    : faces_(faces), front_(front), to_faces_(faces), to_front_(front), to_all_(all_front), enriched_(enriched),
-      slack_(slack) {
+    : faces_(faces), front_(front), all_front_(all_front), to_faces_(faces), to_front_(front), to_all_(all_front),
+      enriched_(enriched), slack_(slack) {
   std::vector<Vector3> present;
   for (std::size_t j = 0; j < nodes.size(); ++j) {
     if (!(radii[j] > 0))
@@ -194,14 +194,18 @@ bool Reach::sees(const Vector3& centre, const Vector3& half) const {
   return sees(centre, size) &&
          (to_faces_(centre) - slack_ < half.minCoeff() || passes(faces_, by_faces_, centre, half) ||
           passes(front_, by_front_, centre, half) ||
-          (!by_branch_.empty() && to_all_(centre) - size - slack_ < enriched_ * radius_beside(to_all_, centre) &&
-           std::any_of(by_branch_.begin(), by_branch_.end(), holds)));
+          (std::any_of(by_branch_.begin(), by_branch_.end(), holds) && is_enriched(centre, half)));
 }
 
 bool Reach::near_front(const Vector3& centre, const Vector3& half, double radii) const {
-  const double nearest = to_front_(centre) - slack_, reach = radii * radius_beside(to_front_, centre);
+  return is_near(to_front_, front_, centre, half, radii);
+}
+
+bool Reach::is_near(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
+                    const Vector3& half, double radii) const {
+  const double nearest = nearness(centre) - slack_, reach = radii * radius_beside(nearness, centre);
   return nearest < half.minCoeff() + reach ||
-         (nearest < half.norm() + reach && std::any_of(front_.begin(), front_.end(), [&](const Vector3& place) {
+         (nearest < half.norm() + reach && std::any_of(places.begin(), places.end(), [&](const Vector3& place) {
             return distance_to_box(place, centre, half) - slack_ < reach;
           }));
 }

@@ -112,7 +112,14 @@ class Reach {
     return place ? present_radii_[static_cast<std::size_t>(present_->nearest(*place).index)] : 0;
   }
 
-  std::vector<Vector3> faces_, front_;
+  /// Whether some place of a box may be enriched, by whatever front.
+  [[nodiscard]] bool is_enriched(const Vector3& centre, const Vector3& half) const {
+    return is_near(to_all_, all_front_, centre, half, enriched_);
+  }
+  [[nodiscard]] bool is_near(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
+                             const Vector3& half, double radii) const;
+
+  std::vector<Vector3> faces_, front_, all_front_;
   Nearness to_faces_, to_front_, to_all_;
   double enriched_;
   std::optional<topology::PointTree> present_;

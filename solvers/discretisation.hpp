@@ -20,6 +20,10 @@ enum class Method {
 std::string_view to_string(Method method);
 /// Throws InputError naming the value and the three allowed names.
 Method method_from_string(std::string_view name);
+/// Whether a cut body's nodes should have a ring ahead of the front (SprinkleOptions::ring_ahead). The cells of point
+/// collocation then end along the front, and no face lies where the stress is singular; the weak form gains nothing by
+/// it (docs/experiments/precut_straight.md).
+bool wants_ring_ahead(Method method);
 
 /// Prescribed displacement of one node. Free components carry no constraint.
 struct Prescribed {

@@ -101,19 +101,24 @@ Matrix3 initial_stress(const Problem& problem) {
                               0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose()));
 }
 
-Sight sight_about_cut(const Problem& problem, SightRule rule, double front_radius_factor) {
-  Sight sight{.incision = problem.incision, .rule = rule, .radius_factor = front_radius_factor};
+Sight sight_about_cut(const Problem& problem, Method method, SightRule rule) {
+  Sight sight{.incision = problem.incision, .rule = rule};
+  if (method == Method::collocation && rule == SightRule::enriched) {
+    sight.reach = 1.75;
+    sight.enriched_growth = 2;
+    sight.radius_factor = front_radius_factor;
+  }
   if (problem.material.poisson_ratio >= 0.45)
     sight.reach = 2.5;
   return sight;
 }
 
-ElasticBody::ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor,
+ElasticBody::ElasticBody(Problem problem, Method method, double rho, SightRule rule,
                          std::vector<double> NodeCloud::*lengths)
     : problem_(checked(std::move(problem))), spheres_([&] {
         const Stopwatch watch;
         Spheres spheres(problem_.nodes.positions, problem_.nodes.*lengths, rho, Basis::linear, worst_moment_condition,
-                        sight_about_cut(problem_, rule, front_radius_factor));
+                        sight_about_cut(problem_, method, rule));
         report_.supports_seconds = watch.seconds();
         return spheres;
       }()) {

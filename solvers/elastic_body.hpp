@@ -12,6 +12,7 @@ namespace spherecut::solvers {
 /// with little but lip nodes of one plane in sight, it comes to 3e8, and shape functions to gradients of 1e4 per
 /// spacing.
 inline constexpr double worst_moment_condition = 1e7;
+inline constexpr double front_radius_factor = 1.2; // supports of collocation at a front are larger by this
 
 /// Shape functions at every node in compressed rows: support of node i is entries start[i] .. start[i+1].
 struct NodalSupports {
@@ -41,11 +42,14 @@ Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient);
 /// sigma = C strain - initial_stress, Pa.
 Matrix3 initial_stress(const Problem& problem);
 
-/// How the spheres of both discretisations reach around the cut of a problem. Near incompressibility the enrichment
-/// reaches farther, as the supports of the weak form do: at nu = 0.49 a reach of 1.75 spacings leaves 3.0 % of a
-/// penny's volume and 7.6 % of its K wrong, one of 2.5 leaves 1.0 and 2.3 %; at nu = 0.3 the shorter one is as right (K
-/// of a straight crack in mode II 0.3 against 1.6 %) and an increment of a cut changes less than half as much.
-Sight sight_about_cut(const Problem& problem, SightRule rule, double front_radius_factor = 1);
+/// How the spheres of a method reach around the cut of a problem. Near incompressibility the enrichment reaches
+/// farther, as the supports of the weak form do: at nu = 0.49 a reach of 1.75 spacings leaves 3.0 % of a penny's volume
+/// and 7.6 % of its K wrong, one of 2.5 leaves 1.0 and 2.3 %; at nu = 0.3 the shorter one is as right (K of a straight
+/// crack in mode II 0.3 against 1.6 %) and an increment of a cut changes less than half as much. The weak form does
+/// with 1.35. Where nodes near the front see too few others for the enriched basis the spheres of collocation grow,
+/// because its stresses are those at points; the weak form leaves that to the points, and keeps its spheres as the cut
+/// goes on.
+Sight sight_about_cut(const Problem& problem, Method method, SightRule rule);
 
 /// Force of each pattern on each node's coefficients, sum of h_j(x) f over its points: 3N rows, a column a pattern.
 /// Throws NumericalError at a point without a sound support.
@@ -80,9 +84,9 @@ class ElasticBody : public Discretisation {
                                               const std::vector<Field>& fields) const override;
 
  protected:
-  /// Radii are rho times the `lengths` of the nodes, at the front of a cut times `front_radius_factor` too; the reach
-  /// of an enrichment is measured in `lengths` as well.
-  ElasticBody(Problem problem, double rho, SightRule rule, double front_radius_factor = 1,
+  /// Radii are rho times the `lengths` of the nodes, around a cut as sight_about_cut has it; the reach of an enrichment
+  /// is measured in `lengths` as well.
+  ElasticBody(Problem problem, Method method, double rho, SightRule rule,
               std::vector<double> NodeCloud::*lengths = &NodeCloud::spacings);
   Problem problem_;
   AssemblyReport report_;

@@ -32,7 +32,7 @@ constexpr double penalty = 1e4;
 class Galerkin final : public ElasticBody {
  public:
   Galerkin(Problem problem, const DiscretisationOptions& options, bool is_factored = true)
-      : ElasticBody(std::move(problem), galerkin_support_radius(problem, options), options.sight, 1,
+      : ElasticBody(std::move(problem), Method::galerkin, galerkin_support_radius(problem, options), options.sight,
                     galerkin_lengths(problem.material)) {
     const Stopwatch assembly;
     cells_ = background_cells(*problem_.domain, problem_.nodes, background_of(options), problem_.incision.get());
@@ -465,7 +465,7 @@ double galerkin_support_radius(const Problem& problem, const DiscretisationOptio
     return options.support_radius;
   if (is_nearly_incompressible(problem.material))
     return 2.2;
-  return problem.incision != nullptr || options.cut_ahead ? 1.8 : 2.0;
+  return problem.incision != nullptr || options.cut_ahead ? 1.75 : 2.0;
 }
 
 BackgroundOptions background_of(const DiscretisationOptions& options) {

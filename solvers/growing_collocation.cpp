@@ -62,9 +62,8 @@ GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& ch
   for (int i = 0; i < old.size(); ++i)
     if (next.place[i] >= 0)
       next.was[next.place[i]] = i;
-  const double growth = options_.method.sight == SightRule::enriched ? front_radius_factor : 1;
   next.spheres.emplace(nodes.positions, nodes.spacings, rho(), Basis::linear, worst_moment_condition,
-                       sight_about_cut(grown, options_.method.sight, growth));
+                       sight_about_cut(grown, Method::collocation, options_.method.sight));
   const std::vector<double>&radii = next.spheres->radii(), &old_radii = spheres_.radii();
   report.spheres_seconds = sphere_watch.seconds();
 

@@ -34,10 +34,10 @@ void GrowingCollocation::make_window() {
   const int count = problem_.nodes.size();
   const std::vector<Vector3>& x = problem_.nodes.positions;
   const bool enriched = options_.method.sight == SightRule::enriched;
-  const double growth = enriched ? front_radius_factor : 1;
-  const double front_reach = enriched ? sight_about_cut(problem_, options_.method.sight).reach : 0; // in spacings
+  const Sight sight = sight_about_cut(problem_, Method::collocation, options_.method.sight);
+  const double front_reach = enriched ? sight.reach : 0; // in spacings
   const ReachAlong in_reach(options_.way, problem_.incision.get(), problem_.nodes, std::vector<char>(count, 0),
-                            spheres_.radii(), front_reach / rho(), growth, true);
+                            spheres_.radii(), front_reach / rho(), sight.radius_factor, true);
   // Spheres that the front comes to, or leaves, change their size.
   const double finest = *std::min_element(problem_.nodes.spacings.begin(), problem_.nodes.spacings.end());
   std::vector<Vector3> fronts = sample_points(options_.way, 0, 0.5 * finest), left;
@@ -51,7 +51,7 @@ void GrowingCollocation::make_window() {
   std::vector<int> resized;
   for (int j = 0; enriched && j < count; ++j)
     if (to_fronts(x[j]) < front_reach * problem_.nodes.spacings[j] + finest) {
-      radii[j] *= growth;
+      radii[j] *= sight.radius_factor;
       resized.push_back(j);
     }
   const auto sees_change = [&](int i, double half) {

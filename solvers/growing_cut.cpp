@@ -157,7 +157,10 @@ void GrowingCut::State::condense_all() {
   for (Eigen::Index i = 0; i < std::ssize(id); ++i)
     cell_loads.segment<3>(3 * static_cast<Eigen::Index>(id[i])) = stiffness.loads.segment<3>(3 * i);
   cell_loads -= tractions();
-  find_contact();
+  drop_removed_contact();
+  std::vector<std::size_t> all_candidates(options.contact.size());
+  std::iota(all_candidates.begin(), all_candidates.end(), std::size_t{0});
+  find_contact(all_candidates);
   std::vector<char> in_contact(problem.nodes.size(), 0);
   for (const DisplacementMean& mean : contact)
     for (int node : mean.nodes)
@@ -287,9 +290,9 @@ GrowingCut::State::increment(const NodeChange& change,
 
   const Stopwatch sphere_watch;
   const std::vector<double>& old_radii = spheres->radii();
-  increment.spheres =
-      std::make_unique<Spheres>(next.nodes.positions, next.nodes.*galerkin_lengths(next.material), rho, Basis::linear,
-                                worst_moment_condition, sight_about_cut(next, options.method.sight), gone);
+  increment.spheres = std::make_unique<Spheres>(next.nodes.positions, next.nodes.*galerkin_lengths(next.material), rho,
+                                                Basis::linear, worst_moment_condition,
+                                                sight_about_cut(next, Method::galerkin, options.method.sight), gone);
   std::vector<double> radii = increment.spheres->radii();
   std::vector<int> changed_nodes = change.removed;
   for (int i = 0; i < next.nodes.size(); ++i)
@@ -312,8 +315,11 @@ GrowingCut::State::increment(const NodeChange& change,
   const double largest = *std::max_element(radii.begin(), radii.end());
   for (const Vector3& x : changes.faces)
     include(x, largest);
+  // The branch functions at a node are those of the front nearest to it: an enriched point that sees a node which has
+  // lost its front, or found a new one.
+  const double enriched = enrichment_reach();
   for (const Vector3& x : changes.front)
-    include(x, largest * std::max(1.0, enrichment_reach()));
+    include(x, largest * (enriched > 0 ? enriched + 2 : 1));
   std::vector<Vector3> all_front = changes.front;
   add_front(before, 2 * slack, all_front);
   add_front(incision.get(), 2 * slack, all_front);
@@ -324,7 +330,11 @@ GrowingCut::State::increment(const NodeChange& change,
     include(next.nodes.positions[i], radii[i]);
   }
   for (int b = 0; b < std::ssize(boxes); ++b) {
-    const BackgroundBox& leaf = boxes[b].box;
+    BackgroundBox leaf = boxes[b].box;
+    double growth = 1;
+    for (const CellShapes& cell : boxes[b].cells)
+      growth = std::max(growth, cell.growth);
+    leaf.half.array() += growth_room(leaf.centre, growth);
     if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
         ((touched.upper - leaf.centre).array() < -leaf.half.array()).any() ||
         !increment.concerns(leaf, enrichment_reach()))
@@ -332,7 +342,7 @@ GrowingCut::State::increment(const NodeChange& change,
     if (boxes[b].cells.empty())
       return uncovered("the cut left the predicted way");
     for (int k = 0; k < change.added.size(); ++k)
-      if (is_too_large(leaf, change.added.positions[k], change.added.spacings[k], background()))
+      if (is_too_large(boxes[b].box, change.added.positions[k], change.added.spacings[k], background()))
         return uncovered("the added nodes are finer than the cells");
     increment.boxes.push_back(b);
   }
@@ -404,9 +414,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   }
   // The same for means over the surface: those whose points see the change have new weights, and where the faces or
   // surface nodes come near the shares themselves are new.
-  const auto is_near = [&](const DisplacementMean& mean) {
-    return increment.concerns(mean.centroid, s.share_extent(mean.centroid), s.enrichment_reach());
-  };
+  const auto is_near = [&](const DisplacementMean& mean) { return s.is_concerned(mean, increment); };
   std::vector<Vector3> skin_changes, lip_changes = changes.faces;
   const auto add_surface_change = [&](NodeKind kind, const Vector3& x) {
     if (kind == NodeKind::interior)
@@ -535,15 +543,14 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     report.factored = s.window->factored();
     report.factor_seconds = factor_watch.seconds();
     const Stopwatch condense_watch;
-    bool contact_reshaped = false;
+    s.drop_removed_contact();
+    std::vector<std::size_t> reshaped_contact;
     for (std::size_t c = 0; c < s.contact.size(); ++c)
-      contact_reshaped = contact_reshaped || is_reshaped(s.contact[c], s.options.contact[c]);
-    if (contact_reshaped)
-      s.find_contact();
-    else
-      for (DisplacementMean& mean : s.contact)
-        if (is_near(mean))
-          mean = reweighed(mean, *s.spheres);
+      if (is_reshaped(s.contact[c], s.options.contact[c]))
+        reshaped_contact.push_back(c);
+      else if (is_near(s.contact[c]))
+        s.contact[c] = reweighed(s.contact[c], *s.spheres);
+    s.find_contact(reshaped_contact);
     s.condense_contact();
     report.condense_seconds = condense_watch.seconds();
   } catch (const NumericalError&) {
@@ -583,10 +590,11 @@ double GrowingCut::prepare(const NodeChange& change, const std::shared_ptr<const
       for (int node : cell.nodes)
         keep(node);
   for (const DisplacementMean& mean : s.held)
-    if (next.concerns(mean.centroid, s.share_extent(mean.centroid), s.enrichment_reach()))
+    if (s.is_concerned(mean, next))
       for (int node : mean.nodes)
         keep(node);
   s.window->prepare(kept);
+  s.window->see_ahead(s.contact_functionals(), s.window_right(s.loads));
   return watch.seconds();
 }
 

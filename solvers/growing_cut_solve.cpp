@@ -160,14 +160,18 @@ bool GrowingCut::State::factor_window(const std::vector<Vector3>& places) {
   return false;
 }
 
-void GrowingCut::State::condense_contact() {
+MatrixX GrowingCut::State::contact_functionals() const {
   const auto count = static_cast<Eigen::Index>(contact.size());
   MatrixX functionals = MatrixX::Zero(window->slots(), 3 * count);
   for (Eigen::Index c = 0; c < count; ++c)
     for (std::size_t k = 0; k < contact[c].nodes.size(); ++k)
       for (int a = 0; a < 3; ++a)
         functionals(3 * slot[contact[c].nodes[k]] + a, 3 * c + a) += contact[c].weights[k];
-  SchurWindow::Condensed condensed = window->condense(functionals, window_right(loads));
+  return functionals;
+}
+
+void GrowingCut::State::condense_contact() {
+  SchurWindow::Condensed condensed = window->condense(contact_functionals(), window_right(loads));
   compliance = std::move(condensed.compliance);
   base = std::move(condensed.response);
 }

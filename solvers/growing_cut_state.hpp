@@ -99,11 +99,12 @@ struct GrowingCut::State {
   [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
     return std::make_unique<Spheres>(problem.nodes.positions, problem.nodes.*galerkin_lengths(problem.material), rho,
                                      Basis::linear, worst_moment_condition,
-                                     sight_about_cut(problem, options.method.sight), removed);
+                                     sight_about_cut(problem, Method::galerkin, options.method.sight), removed);
   }
   [[nodiscard]] double enrichment_reach() const {
-    return options.method.sight == SightRule::enriched ? sight_about_cut(problem, options.method.sight).reach / rho
-                                                       : 0; // in sphere radii
+    return options.method.sight == SightRule::enriched
+               ? sight_about_cut(problem, Method::galerkin, options.method.sight).reach / rho
+               : 0; // in sphere radii
   }
   /// How far from the centroid of a node's share of the surface there may be points of it, m.
   [[nodiscard]] double share_extent(const Vector3& x) const {
@@ -111,6 +112,19 @@ struct GrowingCut::State {
     for (int node : spheres->candidates(x))
       spacing = std::max(spacing, problem.nodes.spacings[node]);
     return 0.5 * rho * spacing;
+  }
+  /// How much farther than its spheres reach a change concerns a place about x where some support had to grow, m.
+  [[nodiscard]] double growth_room(const Vector3& x, double growth) const {
+    double largest = 0;
+    if (growth > 1)
+      for (int node : spheres->candidates(x))
+        largest = std::max(largest, spheres->radii()[node]);
+    return 1.1 * (growth - 1) * largest; // those of new nodes may be a little larger
+  }
+  /// Whether an increment concerns the mean.
+  [[nodiscard]] bool is_concerned(const DisplacementMean& mean, const Increment& increment) const {
+    return increment.concerns(mean.centroid, share_extent(mean.centroid) + growth_room(mean.centroid, mean.growth),
+                              enrichment_reach());
   }
   [[nodiscard]] bool has_cell_loads() const {
     return problem.loads.body_force != nullptr || !problem.loads.initial_strain.isZero(0);
@@ -194,21 +208,35 @@ struct GrowingCut::State {
   /// Kept until the cut grows: every step of a run asks for the same ones.
   [[nodiscard]] const DisplacementMean& mean(int node) const;
 
-  /// Candidates that the cut has removed are none any more.
-  void find_contact() {
-    std::erase_if(options.contact, [&](int node) { return removed[node] != 0; });
-    contact.clear();
-    if (options.contact.empty())
+  /// Means of some candidates (places in options.contact), from the surface about them.
+  void find_contact(const std::vector<std::size_t>& wanted) {
+    contact.resize(options.contact.size());
+    if (wanted.empty())
       return;
     BoundingBox region{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
-    for (int node : options.contact) {
+    for (const std::size_t c : wanted) {
+      const int node = options.contact[c];
       const double room = shares_reach * problem.nodes.spacings[node];
       region.lower = region.lower.cwiseMin((problem.nodes.positions[node].array() - room).matrix());
       region.upper = region.upper.cwiseMax((problem.nodes.positions[node].array() + room).matrix());
     }
     const Shares regional(problem, removed, region);
-    for (int node : options.contact)
-      contact.push_back(regional.patches.mean(regional.compact[node], *spheres, problem.prescribed_region));
+    for (const std::size_t c : wanted)
+      contact[c] = regional.patches.mean(regional.compact[options.contact[c]], *spheres, problem.prescribed_region);
+  }
+  /// Candidates that the cut has removed are none any more.
+  void drop_removed_contact() {
+    std::size_t kept = 0;
+    for (std::size_t c = 0; c < options.contact.size(); ++c) {
+      if (removed[options.contact[c]] != 0)
+        continue;
+      options.contact[kept] = options.contact[c];
+      if (kept < c && c < contact.size())
+        contact[kept] = std::move(contact[c]);
+      ++kept;
+    }
+    options.contact.resize(kept);
+    contact.resize(std::min(kept, contact.size()));
   }
 
   /// Whether an increment along `way` may change what lies within `half` of x, m; also where the nodes that it
@@ -225,6 +253,7 @@ struct GrowingCut::State {
   [[nodiscard]] std::vector<char> slots_within(const std::vector<Vector3>& places, double reach) const;
   void condense_all();
   void condense_contact();
+  [[nodiscard]] MatrixX contact_functionals() const; // slots x 3 per candidate
   [[nodiscard]] VectorX window_right(const VectorX& right) const;
   /// Forces (3N rows) as the window sees them.
   struct OnWindow {

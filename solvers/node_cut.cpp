@@ -43,7 +43,7 @@ class Chooser {
           const topology::SurfaceMesh& surface, const SheetLayout& layout, const Surroundings& there)
       : domain_(domain), incision_(*options.incision), spacing_(options.spacing), layout_(layout), there_(there),
         singles_(spacing_.finest(), spacing_.slope), lips_(spacing_.finest(), spacing_.slope),
-        previous_(spacing_.finest(), spacing_.slope), random_(options.random_seed) {
+        previous_(spacing_.finest(), spacing_.slope), random_(options.random_seed), ring_ahead_(options.ring_ahead) {
     const std::size_t sheets = incision_.sheets().size();
     fresh_.assign(sheets, NodeGrid(spacing_.finest(), spacing_.slope));
     settled_ = fresh_;
@@ -70,8 +70,9 @@ class Chooser {
   std::vector<CutNode> choose() {
     for (const FrontChain& chain : layout_.fronts)
       ring_behind(chain);
-    for (const FrontChain& chain : layout_.fronts)
-      ring_ahead(chain);
+    if (ring_ahead_)
+      for (const FrontChain& chain : layout_.fronts)
+        ring_ahead(chain);
     for (const RimChain& chain : layout_.rims)
       line(chain);
     fill();
@@ -266,7 +267,7 @@ class Chooser {
     for (double at = 0; at < curve.length(); at += 0.25) // places that the regular steps have missed
       station(chain, curve, at, strip_crowding);
     for (int end : {0, 1})
-      if (chain.at_front[end])
+      if (ring_ahead_ && chain.at_front[end])
         ahead_on_surface(chain, end);
   }
 
@@ -378,6 +379,7 @@ class Chooser {
   std::vector<Pair> pairs_;
   std::vector<CutNode> nodes_;
   std::mt19937_64 random_;
+  bool ring_ahead_;
 };
 
 } // namespace

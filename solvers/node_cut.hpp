@@ -1,4 +1,5 @@
-// Where the nodes of a cut go: pairs of lip nodes on its sheets and a ring of single nodes ahead of its front.
+// Where the nodes of a cut go: pairs of lip nodes on its sheets and, where wanted, a ring of single nodes ahead of its
+// front.
 #pragma once
 
 #include "solvers/node_search.hpp"
@@ -27,9 +28,9 @@ struct Surroundings {
 };
 
 /// Pairs follow one another, the node on the + side of the sheet first. In this order: rings of pairs ring_offset
-/// behind the fronts and of single nodes as far ahead, spaced by h along them; pairs on the rims and single nodes ahead
-/// of the fronts on the surface; pairs that fill the sheets. A pair that would crowd the lip nodes there are is left
-/// out; a previous node stands in for a single one that it almost coincides with.
+/// behind the fronts and, with options.ring_ahead, of single nodes as far ahead, spaced by h along them; pairs on the
+/// rims and single nodes ahead of the fronts on the surface; pairs that fill the sheets. A pair that would crowd the
+/// lip nodes there are is left out; a previous node stands in for a single one that it almost coincides with.
 std::vector<CutNode> choose_cut_nodes(const topology::Domain& domain, const SprinkleOptions& options,
                                       const SharpFeatures& features, const topology::SurfaceMesh& surface,
                                       const SheetLayout& layout, const Surroundings& there);

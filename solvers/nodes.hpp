@@ -75,9 +75,11 @@ struct SprinkleOptions {
   double wall_clearance = 0.45;   // in units of h: interior nodes stay this far from the surface
   int maximum_nodes = 200000;     // refused above, InputError
   double minimum_density = 0.8;   // a zone below is under-filled, NumericalError
-  /// The cut of the body: lip nodes in pairs on both faces, a ring of pairs behind the front and a ring of single nodes
-  /// ahead of it. Null: uncut.
+  /// The cut of the body: lip nodes in pairs on both faces, a ring of pairs behind the front. Null: uncut.
   std::shared_ptr<const topology::Incision> incision;
+  /// A ring of single nodes ahead of the front, too, where a method wants it (wants_ring_ahead). It moves with the
+  /// front: an increment exchanges ten nodes where it exchanges one or two without.
+  bool ring_ahead = false;
 };
 
 /// What was checked about a sprinkled cloud, per zone of distance from the fine zone. Every node counts with the share
@@ -135,7 +137,7 @@ struct SprinkleIncrement {
 
 /// The fast variant of resprinkle for a cut that has grown: looks at what lies within two spacings of the sheets' new
 /// triangles alone. Nodes there that the new sheet crowds go, those farther away are left as they are; lip pairs stay
-/// where they are when the front moves on, the ring ahead moves with it, new pairs and nodes fill what has become
+/// where they are when the front moves on, a ring ahead moves with it, new pairs and nodes fill what has become
 /// empty. options.incision is the cut as it is now, `before` as it was (null: uncut); options.spacing must be the field
 /// that `previous` was placed with, fine where the cut goes. Nodes marked in `retired` (one entry a node, or empty)
 /// have been removed by earlier increments: the ids of the others stay valid. Throws as sprinkle does, of the density

@@ -48,6 +48,9 @@ std::string_view to_string(Method method) {
 Method method_from_string(std::string_view name) {
   return option_of(methods, name, fmt::format("method '{}' does not exist", name));
 }
+bool wants_ring_ahead(Method method) {
+  return method != Method::galerkin;
+}
 
 std::string_view to_string(UnheldPieces treatment) {
   return name_of(treatments, treatment);

@@ -43,7 +43,8 @@ double support_radius(const DiscretisationOptions& options) {
 class Published final : public ElasticBody {
  public:
   Published(Problem problem, const DiscretisationOptions& options)
-      : ElasticBody(std::move(problem), support_radius(options), SightRule::visibility), tip_(options.tip_node) {
+      : ElasticBody(std::move(problem), Method::published, support_radius(options), SightRule::visibility),
+        tip_(options.tip_node) {
     find_held_components();
     const Stopwatch assembly;
     evaluate_rows();

@@ -235,7 +235,7 @@ MatrixX SchurWindow::product(const Half& one, const Half& other) {
 MatrixX SchurWindow::seen_by_condensed(const Half& right) const {
   MatrixX result = MatrixX::Zero(condensed_rest_.cols(), right.rest.cols());
   if (!ahead_.empty())
-    add_product(1, seen_ahead_.halfway, true, right.ahead, result);
+    add_product(1, seen_ahead_.halfway.leftCols(result.rows()), true, right.ahead, result);
   add_product(1, condensed_rest_, true, right.rest.bottomRows(condensed_rest_.rows()), result);
   return result;
 }
@@ -258,34 +258,58 @@ MatrixX SchurWindow::solve(const MatrixX& right) const {
   return by_slot;
 }
 
-void SchurWindow::see_ahead(const MatrixX& functionals) {
-  MatrixX there(std::ssize(ahead_), functionals.cols());
-  for (Eigen::Index i = 0; i < there.rows(); ++i)
-    there.row(i) = functionals.row(ahead_[i]);
-  if (seen_ahead_.functionals.rows() == there.rows() && seen_ahead_.functionals.cols() == there.cols() &&
-      seen_ahead_.functionals == there)
+void SchurWindow::see_ahead(const MatrixX& functionals, const VectorX& right) {
+  const auto rows = std::ssize(ahead_);
+  const Eigen::Index count = functionals.cols() + 1;
+  MatrixX there(rows, count);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    there.row(i).head(count - 1) = functionals.row(ahead_[i]);
+    there(i, count - 1) = right[ahead_[i]];
+  }
+  SeenAhead& seen = seen_ahead_;
+  if (seen.there.rows() != rows || seen.there.cols() != count) {
+    seen.there = MatrixX::Zero(rows, count);
+    seen.halfway = seen.there;
+    seen.taken = MatrixX::Zero(coupling_.rows(), count);
+    seen.products = MatrixX::Zero(count, count);
+  }
+  std::vector<Eigen::Index> fresh;
+  for (Eigen::Index c = 0; c < count; ++c)
+    if (seen.there.col(c) != there.col(c))
+      fresh.push_back(c);
+  if (fresh.empty())
     return;
-  seen_ahead_.halfway = there;
-  triangular_solve(false, ahead_factor_.data(), static_cast<int>(ahead_.size()), seen_ahead_.halfway);
-  seen_ahead_.taken = MatrixX::Zero(coupling_.rows(), there.cols());
-  add_product(1, coupling_, false, seen_ahead_.halfway, seen_ahead_.taken);
-  seen_ahead_.compliance = gram(seen_ahead_.halfway);
-  seen_ahead_.functionals = std::move(there);
+  MatrixX halfway(rows, std::ssize(fresh)), taken = MatrixX::Zero(coupling_.rows(), std::ssize(fresh));
+  for (Eigen::Index k = 0; k < halfway.cols(); ++k)
+    halfway.col(k) = there.col(fresh[k]);
+  triangular_solve(false, ahead_factor_.data(), static_cast<int>(rows), halfway);
+  add_product(1, coupling_, false, halfway, taken);
+  for (Eigen::Index k = 0; k < halfway.cols(); ++k) {
+    seen.halfway.col(fresh[k]) = halfway.col(k);
+    seen.taken.col(fresh[k]) = taken.col(k);
+  }
+  seen.products = gram(seen.halfway);
+  seen.there = std::move(there);
 }
 
 SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const VectorX& right) {
   // With Y = L^-1 F: F^T S^-1 F = Y^T Y and F^T S^-1 b = Y^T (L^-1 b). Above its first entry F leaves Y zero.
-  const auto [load_ahead, load] = half(right);
-  MatrixX seen(std::ssize(order_), functionals.cols());
-  for (Eigen::Index i = 0; i < seen.rows(); ++i)
+  const Eigen::Index count = functionals.cols();
+  MatrixX seen(std::ssize(order_), count), load(std::ssize(order_), 1);
+  for (Eigen::Index i = 0; i < seen.rows(); ++i) {
     seen.row(i) = functionals.row(order_[i]);
-  Condensed condensed{MatrixX::Zero(functionals.cols(), functionals.cols()), VectorX::Zero(functionals.cols())};
+    load(i, 0) = right[order_[i]];
+  }
+  Condensed condensed{MatrixX::Zero(count, count), VectorX::Zero(count)};
   if (!ahead_.empty()) {
-    see_ahead(functionals);
-    for (Eigen::Index i = 0; i < seen.rows(); ++i)
-      seen.row(i) -= seen_ahead_.taken.row(kept_place_[order_[i]]);
-    condensed.compliance = seen_ahead_.compliance;
-    condensed.response = seen_ahead_.halfway.transpose() * load_ahead;
+    see_ahead(functionals, right);
+    for (Eigen::Index i = 0; i < seen.rows(); ++i) {
+      const auto taken = seen_ahead_.taken.row(kept_place_[order_[i]]);
+      seen.row(i) -= taken.head(count);
+      load(i, 0) -= taken[count];
+    }
+    condensed.compliance = seen_ahead_.products.topLeftCorner(count, count);
+    condensed.response = seen_ahead_.products.col(count).head(count);
   }
   Eigen::Index first = 0;
   while (first < seen.rows() && seen.row(first).isZero(0))
@@ -293,6 +317,7 @@ SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const V
   MatrixX& rest = condensed_rest_;
   rest = seen.bottomRows(seen.rows() - first);
   const int n = static_cast<int>(order_.size());
+  triangular_solve(false, factor_.data(), n, load);
   if (rest.rows() > 0)
     triangular_solve(false, factor_.data() + first * n + first, n, rest);
   condensed.compliance += gram(rest);

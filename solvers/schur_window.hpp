@@ -80,6 +80,9 @@ class SchurWindow {
     VectorX response;   // count
   };
   [[nodiscard]] Condensed condense(const MatrixX& functionals, const VectorX& right);
+  /// What condense() will see of the part done ahead, found now; functionals and loads that come otherwise are found
+  /// again then, one by one.
+  void see_ahead(const MatrixX& functionals, const VectorX& right);
 
   /// Half of S^-1 right, by slots as right: F^T S^-1 G is the product of their halves.
   struct Half {
@@ -99,7 +102,6 @@ class SchurWindow {
 
  private:
   void gather(const std::vector<int>& slots, std::vector<double>& square) const;
-  void see_ahead(const MatrixX& functionals);
   [[nodiscard]] MatrixX recover_from(MatrixX halfway, const MatrixX& window) const;
 
   int far_, changing_, room_, contact_;
@@ -116,9 +118,9 @@ class SchurWindow {
   std::vector<double> ahead_factor_;           // column-major, ahead squared
   MatrixX coupling_, eliminated_;
   struct SeenAhead {
-    MatrixX functionals;    // ahead x count
+    MatrixX there;          // ahead x count + 1: functionals, and the load as the last column
     MatrixX halfway, taken; // L^-1 of them, and what that takes from the kept slots
-    MatrixX compliance;     // count x count
+    MatrixX products;       // count + 1 squared
   } seen_ahead_;
   MatrixX condensed_rest_;     // half of the functionals of the last condense(), last rows: those above are zero
   std::vector<int> order_;     // slots at the last factor(), but those done ahead

@@ -21,7 +21,6 @@ namespace {
 constexpr double radius_growth = 1.25;
 constexpr int growth_steps_at_node = 6;
 constexpr int growth_steps_at_point = 4;
-constexpr int growth_steps_for_enrichment = 2;
 
 // Memory of one support: on the stack unless it is unusually large.
 class SupportMemory {
@@ -103,8 +102,10 @@ bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3&
   double factor = 1;
   for (int step = 0; step < growth_steps_at_point; ++step) {
     collect_grown(spheres, x, factor *= radius_growth, memory.support);
-    if (evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out))
+    if (evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out)) {
+      out.growth = factor;
       return true;
+    }
   }
   return nothing(out);
 }
@@ -118,8 +119,11 @@ bool evaluate_grown_near_cut(const Kernel& kernel, const Spheres& spheres, const
     const int steps = enrich == CutSight::Enrich::never ? growth_steps_at_point + 1 : growth_steps_at_point;
     for (int step = 0; step < steps; ++step) {
       collect_grown(spheres, x, factor *= radius_growth, memory.support);
-      if (spheres.cut()->evaluate(kernel, x, memory.support, true, second, 0, spheres.worst_condition(), enrich, out))
+      if (spheres.cut()->evaluate(kernel, x, memory.support, true, second, 0, spheres.worst_condition(), enrich, out)) {
+        out.growth = std::max(out.growth, factor);
         return true;
+      }
+      out.growth = std::max(1.0, factor);
     }
   }
   return nothing(out);
@@ -141,6 +145,7 @@ bool evaluate_near_cut(const Kernel& kernel, const Spheres& spheres, const Vecto
 }
 
 bool evaluate_point(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
+  out.growth = 1;
   const SphereGrid::Cell cell = spheres.grid().find(x);
   SupportMemory memory(cell.padded);
   kernel.collect(cell, x.data(), memory.support);
@@ -239,9 +244,9 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
   std::iota(everyone.begin(), everyone.end(), 0);
   const auto is_sound = [&](int i, Support& support, bool grown) {
     if (cut_ != nullptr && (grown || cut_->concerns(support)))
-      return cut_->evaluate(
-          kernel, centres_[i], support, grown, false, 2, worst_condition,
-          wanted[i] < growth_steps_for_enrichment ? CutSight::Enrich::where_near : CutSight::Enrich::never, shape);
+      return cut_->evaluate(kernel, centres_[i], support, grown, false, 2, worst_condition,
+                            wanted[i] < sight.enriched_growth ? CutSight::Enrich::where_near : CutSight::Enrich::never,
+                            shape);
     return support.count >= needed && evaluate_support(kernel, support, basis, false, worst_condition, shape);
   };
   const auto unsound_nodes = [&] {

@@ -21,8 +21,11 @@ SightRule sight_rule_from_string(std::string_view name);
 struct Sight {
   std::shared_ptr<const topology::Incision> incision; // null: uncut
   SightRule rule = SightRule::enriched;
-  double reach = 1.75; // enrichment ends this far from the front, in units of h as the spheres take it
+  double reach = 1.35; // enrichment ends this far from the front, in units of h as the spheres take it
   double blend = 0.5;  // and fades from this part of the reach on, so that the shape functions stay continuous
+  /// So often all spheres about a node may grow where it sees too few others for the enriched basis; then the linear
+  /// one does for it, and points beside it look farther for themselves.
+  int enriched_growth = 0;
   /// Spheres of nodes within `reach` of the front are larger by this; an enriched basis may want it.
   double radius_factor = 1;
 };

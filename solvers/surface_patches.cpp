@@ -29,6 +29,7 @@ DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::v
       throw NumericalError(fmt::format("no sound support covers the surface point ({:.6g}, {:.6g}, {:.6g}) m",
                                        points[p].position.x(), points[p].position.y(), points[p].position.z()));
     }
+    mean.growth = std::max(mean.growth, shape.growth);
     mean.area += points[p].weight;
     mean.centroid += points[p].weight * points[p].position;
     mean.share.push_back({points[p].position, points[p].weight});
@@ -127,7 +128,7 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
   if (!evaluate(spheres, x, shape))
     throw NumericalError(
         fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
-  return {shape.nodes, shape.value, x, 0, {{x, 1}}};
+  return {shape.nodes, shape.value, x, 0, {{x, 1}}, shape.growth};
 }
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,

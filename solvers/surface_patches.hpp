@@ -16,6 +16,7 @@ struct DisplacementMean {
   Vector3 centroid = Vector3::Zero(); // m, of the share
   double area = 0;                    // m2, 0 when the mean is the value at a point
   std::vector<QuadraturePoint> share; // the points it is taken over; weights add up to one
+  double growth = 1;                  // of the radii for a point of it that the spheres as they are do not support
   [[nodiscard]] Vector3 of(const VectorX& coefficients) const;
   /// The same mean of a field given point by point.
   [[nodiscard]] Vector3 of(const std::function<Vector3(const Vector3& x)>& field) const;

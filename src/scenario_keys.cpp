@@ -142,7 +142,7 @@ constexpr std::array keys = {
         "method.support_radius", number, "", "",
         "Radius of a sphere of influence in units of the local spacing (galerkin below a Poisson ratio of 0.45: less "
         "where the sphere would reach into finer nodes); left out: collocation 1.8, galerkin 2.2 from that ratio on, "
-        "below it 1.8 where a precut or a blade cuts the body and 2 elsewhere.",
+        "below it 1.75 where a precut or a blade cuts the body and 2 elsewhere.",
         from(1.2, 4)},
     ScenarioKey{"method.quadrature", integer, "", "2",
                 "Rule of a background cell (galerkin): 1, its centre; 2, six points, exact to degree three; 3, 27 "

@@ -47,7 +47,7 @@ struct Length {
 Length solve_length(const TiltedStrip& strip, const std::vector<topology::SurfaceMesh>& sheets, int nodes,
                     std::uint64_t seed, const solvers::DiscretisationOptions& options) {
   const CutFrame& frame = strip.frame;
-  CutBody body = cut_body({strip.domain, sheets, 2.5, 0.35, nodes, seed});
+  CutBody body = cut_body({strip.domain, sheets, 2.5, 0.35, nodes, seed, 0, options.method});
   body.problem.material = material;
   hold_strip(body.problem, strip);
   body.problem.loads.traction = [frame](const Vector3& x, const Vector3& n) -> Vector3 {

@@ -57,6 +57,7 @@ CuttingBody cutting_body(const CuttingCase& block, double depth, const solvers::
   solvers::SprinkleOptions options;
   options.random_seed = block.seed;
   options.incision = problem.incision;
+  options.ring_ahead = solvers::wants_ring_ahead(block.method);
   options.spacing.fine = block.spacing;
   options.spacing.coarse = 4 * block.spacing;
   options.spacing.slope = 0.35;

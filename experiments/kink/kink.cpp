@@ -51,7 +51,7 @@ std::vector<Check> run_kink(const ExperimentContext& context) {
     std::vector<std::vector<double>> errors(mixes.size());
     app::Series points{std::string(solvers::to_string(method)), {}, {}, app::SeriesStyle::points};
     for (int seed = 1; seed <= seeds; ++seed) {
-      CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.1);
+      CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.1, method);
       const solvers::Material& material = body.problem.material;
       solvers::Intensities acting = Vector3::Zero();
       hold_whole_surface(body.problem, [&acting, material](const Vector3& x) {

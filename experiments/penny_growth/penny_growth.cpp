@@ -51,6 +51,7 @@ Size solve_size(const std::vector<topology::SurfaceMesh>& sheets, int nodes, std
   cut.slope = 0.25;
   cut.nodes = nodes;
   cut.seed = seed;
+  cut.method = options.method;
   CutBody body = cut_body(cut);
   body.problem.material = material;
   const topology::Incision& incision = *body.problem.incision;

@@ -37,6 +37,7 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
       for (int seed = 1; seed <= (method.judged ? seeds : std::min(seeds, 3)); ++seed) {
         CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0, 0.4)}, 1.5, 0.35,
                         size,         static_cast<std::uint64_t>(seed)};
+        cut.method = method.method;
         CutBody body = cut_body(cut);
         body.problem.material = material;
         hold_strip(body.problem, strip);

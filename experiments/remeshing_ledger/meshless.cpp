@@ -104,6 +104,7 @@ class Meshless final : public BackEnd {
   solvers::SprinkleOptions sprinkle_options() {
     solvers::SprinkleOptions options;
     options.incision = incision_;
+    options.ring_ahead = solvers::wants_ring_ahead(options_.method);
     solvers::SpacingField& spacing = options.spacing;
     spacing.fine = resolution_.fine;
     spacing.coarse = resolution_.coarse_over_fine * resolution_.fine;

@@ -120,6 +120,7 @@ Severed sever_cube(std::uint64_t seed, solvers::Method method) {
   cut.coarse = 1;
   cut.nodes = 350;
   cut.seed = seed;
+  cut.method = method;
   CutBody body = cut_body(cut);
   body.problem.material = {1, 0.3, 0};
   solvers::Problem moved = body.problem, loose = body.problem;

@@ -51,7 +51,7 @@ void add_errors(const solvers::Discretisation& body, const solvers::Field& field
 std::array<double, 4> straight(std::uint64_t seed, solvers::Method method) {
   const CutFrame& crack = straight_crack_frame();
   const solvers::Intensities exact(1, 0.6, 0.4);
-  CutBody body = straight_crack_body(seed, 0.3);
+  CutBody body = straight_crack_body(seed, 0.3, method);
   hold_whole_surface(body.problem, [&crack, exact, material = body.problem.material](const Vector3& x) {
     return straight_crack_displacement(material, crack, exact, x);
   });
@@ -77,6 +77,7 @@ std::array<double, 4> tilted_penny(std::uint64_t seed, solvers::Method method, i
   cut.slope = 0.25;
   cut.nodes = nodes;
   cut.seed = seed;
+  cut.method = method;
   CutBody body = cut_body(cut);
   body.problem.material = material;
   const Vector3 pull = std::cos(tilt) * crack.normal + std::sin(tilt) * crack.ahead;

@@ -47,7 +47,7 @@ Path tear(double spacing, double way, double last, std::uint64_t seed, const sol
   path.spacing = spacing;
   double work = 0, taken = 0, last_stored = 0, last_opening = 0, last_area = 0;
   for (double torn = 0;; torn += way) {
-    CutBody body = cut_body({strip.domain, sheets, 3, 0.35, 0, seed, spacing});
+    CutBody body = cut_body({strip.domain, sheets, 3, 0.35, 0, seed, spacing, options.method});
     body.problem.material = material;
     hold_strip(body.problem, strip);
     body.problem.loads.traction = [frame](const Vector3&, const Vector3& n) -> Vector3 {

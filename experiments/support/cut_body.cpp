@@ -9,6 +9,7 @@ CutBody cut_body(const CutBodyCase& cut) {
   solvers::SprinkleOptions options;
   options.incision = body.problem.incision;
   options.random_seed = cut.seed;
+  options.ring_ahead = solvers::wants_ring_ahead(cut.method);
   solvers::SpacingField shape;
   shape.fine = 1;
   shape.coarse = cut.coarse;

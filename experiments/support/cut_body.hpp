@@ -14,7 +14,8 @@ struct CutBodyCase {
   double slope = 0.35; // growth of the spacing away from the front, m per m
   int nodes = 1000;    // about
   std::uint64_t seed = 1;
-  double fine = 0; // m, spacing at the front; 0: as `nodes` asks for
+  double fine = 0;                                    // m, spacing at the front; 0: as `nodes` asks for
+  solvers::Method method = solvers::Method::galerkin; // the nodes are for
 };
 
 struct CutBody {

@@ -37,6 +37,7 @@ solvers::SprinkleOptions sprinkle_options(const topology::Domain& domain, const 
     options.seeds = {{Vector3::Zero()}};
   }
   options.incision = incision;
+  options.ring_ahead = solvers::wants_ring_ahead(half_space.method);
   return options;
 }
 

@@ -9,7 +9,7 @@ const CutFrame& straight_crack_frame() {
   return frame;
 }
 
-CutBody straight_crack_body(std::uint64_t seed, double edge) {
+CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method method) {
   const CutFrame& crack = straight_crack_frame();
   CutBodyCase cut;
   cut.domain = topology::make_box_domain({-1, -0.5, -1}, {1, 0.5, 1}, 0.25);
@@ -17,6 +17,7 @@ CutBody straight_crack_body(std::uint64_t seed, double edge) {
       topology::make_rectangle_sheet(crack.origin - 1.5 * crack.ahead, crack.normal, crack.ahead, 4, 3, edge)};
   cut.nodes = 350;
   cut.seed = seed;
+  cut.method = method;
   CutBody body = cut_body(cut);
   body.problem.material = {1, 0.3, 0};
   return body;

@@ -29,10 +29,12 @@ struct Scene {
   std::vector<bool> retired;
   double travelled = 0, time = 0;
 
-  explicit Scene(int target) : sweep({{{0, 0, -depth}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.002}) {
+  explicit Scene(int target, Method method = Method::galerkin)
+      : sweep({{{0, 0, -depth}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.002}) {
     for (int k = 0; k < 24; ++k) // from outside to 15 mm inside
       advance();
     sprinkling.incision = sweep.incision();
+    sprinkling.ring_ahead = wants_ring_ahead(method);
     double low = 0.002, high = 0.02;
     for (int trial = 0; trial < 12; ++trial) {
       sprinkling.spacing.fine = sprinkling.spacing.coarse = std::sqrt(low * high);
@@ -163,7 +165,7 @@ void growth_of_collocation(benchmark::State& state, SightRule sight) {
   double anew = 0, rebuild = 0, compliance = 0, prepared_seconds = 0;
   int count = 0, condensed = 0, prepared = 0;
   for (auto _ : state) {
-    Scene scene(static_cast<int>(state.range(0)));
+    Scene scene(static_cast<int>(state.range(0)), Method::collocation);
     GrowthOptions options = scene.options(4, false, sight);
     options.method.method = Method::collocation;
     std::vector<Vector3> candidates;

@@ -18,14 +18,14 @@ struct GrowingScene {
   topology::BladeSweep sweep;
   SprinkleOptions sprinkling;
   NodeCloud nodes;
-  Method method = Method::galerkin;
+  Method method;
   double poisson_ratio = 0.4;
   double time = 0;
   double lower_end;
 
-  explicit GrowingScene(double lower = -depth, double half_width = 0.02)
+  explicit GrowingScene(double lower = -depth, double half_width = 0.02, Method wanted = Method::galerkin)
       : domain(topology::make_box_domain({-0.03, -half_width, -0.03}, {0.03, half_width, 0}, 0.005)),
-        sweep({{{0, 0, lower}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.003}), lower_end(lower) {
+        sweep({{{0, 0, lower}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.003}), method(wanted), lower_end(lower) {
     for (int k = 0; k < 8; ++k)
       advance();
     sprinkling.spacing.fine = sprinkling.spacing.coarse = 0.006;
@@ -35,6 +35,7 @@ struct GrowingScene {
                                      {Vector3(-0.03, 0, -depth), Vector3(0.03, 0, -depth)}};
     }
     sprinkling.incision = sweep.incision();
+    sprinkling.ring_ahead = wants_ring_ahead(method);
     nodes = sprinkle(*domain, sprinkling).nodes;
   }
 

@@ -34,6 +34,7 @@ CutBody cut_body(double reach, double poisson_ratio, const Vector3& normal = ske
       problem.domain);
   SprinkleOptions options;
   options.spacing.coarse = options.spacing.fine = spacing;
+  options.ring_ahead = true;
   options.incision = problem.incision;
   problem.nodes = sprinkle(*problem.domain, options).nodes;
   problem.material.young_modulus = 3000;

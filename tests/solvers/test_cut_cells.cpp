@@ -24,6 +24,7 @@ CutCells cut_cells(const std::shared_ptr<const topology::Domain>& domain, topolo
   SprinkleOptions options;
   options.spacing.fine = h;
   options.spacing.coarse = coarse > 0 ? coarse : h;
+  options.ring_ahead = true;
   options.incision = std::make_shared<topology::Incision>(std::vector{std::move(sheet)}, domain);
   if (coarse > 0)
     options.spacing.segments = front_segments(*options.incision, 2 * h);

@@ -123,8 +123,8 @@ TEST_CASE("Bodies that are cut, or will be, take smaller spheres", "[cut_galerki
   Problem cut = problem_of(block, {1, 0.3, 0}), whole = cut;
   whole.incision = nullptr;
   CHECK(galerkin_support_radius(whole, {}) == 2);
-  CHECK(galerkin_support_radius(whole, {.cut_ahead = true}) == 1.8);
-  CHECK(galerkin_support_radius(cut, {}) == 1.8);
+  CHECK(galerkin_support_radius(whole, {.cut_ahead = true}) == 1.75);
+  CHECK(galerkin_support_radius(cut, {}) == 1.75);
   CHECK(galerkin_support_radius(cut, {.support_radius = 1.9}) == 1.9);
   cut.material.poisson_ratio = 0.45;
   CHECK(galerkin_support_radius(cut, {}) == 2.2);

@@ -15,8 +15,7 @@ namespace {
 
 struct CollocationScene : tests::GrowingScene {
   explicit CollocationScene(double nu, double lower = -depth, double half_width = 0.02)
-      : GrowingScene(lower, half_width) {
-    method = Method::collocation;
+      : GrowingScene(lower, half_width, Method::collocation) {
     poisson_ratio = nu;
   }
 };

@@ -24,6 +24,7 @@ std::shared_ptr<const topology::Domain> block() {
 
 SprinkleOptions cut_options(const std::shared_ptr<const topology::Domain>& domain, Sheets sheets, double h) {
   SprinkleOptions options;
+  options.ring_ahead = true;
   options.spacing.fine = options.spacing.coarse = h;
   options.incision = std::make_shared<topology::Incision>(std::move(sheets), domain);
   return options;
