@@ -1,5 +1,7 @@
 #include "solvers/cut_reach.hpp"
 
+#include "solvers/cut_sight.hpp"
+
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -13,6 +15,8 @@ namespace {
 
 /// Of a sphere radius: eyes at a bulging face are lifted off it before they look (cut_sight.cpp), by 0.05 at both ends.
 constexpr double looking_around = 1.1;
+/// Of a sphere radius: nearer to a sheet an eye is lifted off it (topology::eye_at).
+constexpr double lifted_below = 0.02;
 
 } // namespace
 
@@ -82,6 +86,18 @@ std::vector<int> places_after(const SprinkleIncrement& change, int count, int gr
   return place;
 }
 
+KnownChange known_change(const topology::Incision* before, const topology::Incision& now, const Spheres& spheres_before,
+                         const Spheres& spheres_now) {
+  KnownChange known{&now, {}, std::vector<char>(static_cast<std::size_t>(spheres_now.size()), 1)};
+  if (before != nullptr)
+    for (const topology::SurfaceMesh& sheet : before->sheets())
+      known.triangles.push_back(static_cast<int>(sheet.triangles.size()));
+  if (spheres_before.cut() != nullptr)
+    for (int i = 0; i < spheres_now.size(); ++i)
+      known.turned[static_cast<std::size_t>(i)] = spheres_now.cut()->has_branch_of(*spheres_before.cut(), i) ? 0 : 1;
+  return known;
+}
+
 Changes changes_between(const topology::Incision* before, const SpacingAt& spacing_before,
                         const topology::Incision& now, const SpacingAt& spacing_now, double spacing) {
   Changes changes;
@@ -134,23 +150,27 @@ void add_front(const topology::Incision* incision, double spacing, std::vector<V
 
 Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front,
              const std::vector<Vector3>& all_front, double enriched, const std::vector<Vector3>& nodes,
-             const std::vector<double>& radii, double slack)
+             const std::vector<double>& radii, double slack, KnownChange known)
     : faces_(faces), front_(front), all_front_(all_front), to_faces_(faces), to_front_(front), to_all_(all_front),
-      enriched_(enriched), slack_(slack) {
+      enriched_(enriched), known_(std::move(known)), slack_(slack) {
   std::vector<Vector3> present;
   for (std::size_t j = 0; j < nodes.size(); ++j) {
     if (!(radii[j] > 0))
       continue;
     present.push_back(nodes[j]);
     present_radii_.push_back(radii[j]);
-    if (const double spare = looking_around * radii[j] - to_faces_(nodes[j]) + slack; spare > 0)
-      by_faces_.push_back({nodes[j], radii[j], spare});
-    if (const double spare = looking_around * radii[j] - to_front_(nodes[j]) + slack; spare > 0)
-      by_front_.push_back({nodes[j], radii[j], spare});
+    const double to_front = to_front_(nodes[j]), to_faces = to_faces_(nodes[j]);
+    const double longest = looking_around * radii[j] + slack;
+    const bool at_face = std::min(to_front, to_faces) < longest &&
+                         (known_.incision == nullptr || known_.incision->near(nodes[j], lifted_below * radii[j]));
+    if (const double spare = longest - to_faces; spare > 0)
+      by_faces_.push_back({nodes[j], radii[j], spare, at_face});
+    if (const double spare = longest - to_front; spare > 0)
+      by_front_.push_back({nodes[j], radii[j], spare, at_face});
     // The branch functions at a node are those of the front nearest to it.
-    if (const double distance = to_front_(nodes[j]);
-        enriched > 0 && distance < (2 * enriched + 1) * radii[j] && distance < to_all_(nodes[j]) + 2 * slack)
-      by_branch_.push_back({nodes[j], radii[j], 0});
+    if (enriched > 0 && to_front < (2 * enriched + 1) * radii[j] &&
+        (known_.incision == nullptr ? to_front < to_all_(nodes[j]) + 2 * slack : known_.turned[j] != 0))
+      by_branch_.push_back({nodes[j], radii[j], 0, at_face});
   }
   present_.emplace(present);
   for (std::vector<Eye>* eyes : {&by_faces_, &by_front_}) // those nearest to the change first: they tell most often
@@ -163,47 +183,80 @@ bool Reach::sees(const Vector3& x, double half) const {
     return (eye.position - x).squaredNorm() < (eye.radius + half) * (eye.radius + half);
   };
   const auto concerns = [&](const std::vector<Eye>& eyes, double distance) {
-    return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) { return distance < eye.spare && holds(eye); });
+    for (const Eye& eye : eyes) {
+      if (eye.spare <= distance)
+        return false;
+      if (holds(eye))
+        return true;
+    }
+    return false;
   };
   return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front) ||
-         (!by_branch_.empty() && to_all_(x) - half - slack_ < enriched_ * radius_beside(to_all_, x) &&
-          std::any_of(by_branch_.begin(), by_branch_.end(), holds));
+         (std::any_of(by_branch_.begin(), by_branch_.end(), holds) &&
+          to_all_(x) - half - slack_ < enriched_ * radius_beside(to_all_, x));
 }
 
-bool Reach::passes(const std::vector<Vector3>& places, const std::vector<Eye>& eyes, const Vector3& centre,
-                   const Vector3& half) const {
+bool Reach::is_hidden(const Vector3& centre, const Vector3& half, const Eye& eye, bool by_new) const {
+  thread_local std::vector<int> walls;
+  walls.clear();
+  known_.incision->walls_between(centre, half, eye.position, walls);
+  return by_new ? std::any_of(walls.begin(), walls.end(),
+                              [&](const int wall) {
+                                const auto [sheet, triangle] = known_.incision->triangle_of(wall);
+                                return sheet >= std::ssize(known_.triangles) ||
+                                       triangle >= known_.triangles[static_cast<std::size_t>(sheet)];
+                              })
+                : !walls.empty();
+}
+
+bool Reach::passes(const std::vector<Vector3>& places, const std::vector<Eye>& eyes, bool by_new, double nearest,
+                   const Vector3& centre, const Vector3& half) const {
   std::vector<double> to_places; // from the box; found when some eye is near
-  return std::any_of(eyes.begin(), eyes.end(), [&](const Eye& eye) {
-    if (distance_to_box(eye.position, centre, half) >= eye.radius)
+  bool box_at_face = false;
+  for (const Eye& eye : eyes) {
+    if (eye.spare <= nearest)
       return false;
-    if (to_places.empty())
+    if (distance_to_box(eye.position, centre, half) >= eye.radius)
+      continue;
+    if (to_places.empty()) {
       for (const Vector3& place : places)
         to_places.push_back(distance_to_box(place, centre, half));
-    const double longest = looking_around * eye.radius + 2 * slack_;
-    for (std::size_t k = 0; k < places.size(); ++k)
-      if (const double left = longest - to_places[k];
-          left > 0 && (places[k] - eye.position).squaredNorm() < left * left)
-        return true;
-    return false;
-  });
+      box_at_face =
+          known_.incision == nullptr || known_.incision->near(centre, half.norm() + lifted_below * eye.radius);
+    }
+    // Eyes at a face look from off it: what hides them then may be new, whatever stands between them as they are.
+    const bool at_face = eye.at_face || box_at_face;
+    const double longest = (at_face ? looking_around : 1) * eye.radius + 2 * slack_;
+    const auto leads = [&](std::size_t k) {
+      const double left = longest - to_places[k];
+      return left > 0 && (places[k] - eye.position).squaredNorm() < left * left;
+    };
+    std::size_t k = 0;
+    while (k < places.size() && !leads(k))
+      ++k;
+    if (k < places.size() && (known_.incision == nullptr || is_hidden(centre, half, eye, by_new && !at_face)))
+      return true;
+  }
+  return false;
 }
 
 bool Reach::sees(const Vector3& centre, const Vector3& half) const {
   const auto holds = [&](const Eye& eye) { return distance_to_box(eye.position, centre, half) < eye.radius; };
-  const double size = half.norm();
-  return sees(centre, size) &&
-         (to_faces_(centre) - slack_ < half.minCoeff() || passes(faces_, by_faces_, centre, half) ||
-          passes(front_, by_front_, centre, half) ||
-          (std::any_of(by_branch_.begin(), by_branch_.end(), holds) && is_enriched(centre, half)));
+  const double faces = to_faces_(centre) - slack_, front = to_front_(centre) - slack_, size = half.norm();
+  return faces < half.minCoeff() || passes(faces_, by_faces_, true, faces - size, centre, half) ||
+         passes(front_, by_front_, false, front - size, centre, half) ||
+         (std::any_of(by_branch_.begin(), by_branch_.end(), holds) &&
+          is_enriched(to_all_, all_front_, centre, half, 0));
 }
 
-bool Reach::near_front(const Vector3& centre, const Vector3& half, double radii) const {
-  return is_near(to_front_, front_, centre, half, radii);
+bool Reach::at_front(const Vector3& centre, const Vector3& half) const {
+  return is_enriched(to_front_, front_, centre, half, half.norm());
 }
 
-bool Reach::is_near(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
-                    const Vector3& half, double radii) const {
-  const double nearest = nearness(centre) - slack_, reach = radii * radius_beside(nearness, centre);
+bool Reach::is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
+                        const Vector3& half, double least) const {
+  const double nearest = nearness(centre) - slack_,
+               reach = std::max(least, enriched_ > 0 ? enriched_ * radius_beside(nearness, centre) : 0.0);
   return nearest < half.minCoeff() + reach ||
          (nearest < half.norm() + reach && std::any_of(places.begin(), places.end(), [&](const Vector3& place) {
             return distance_to_box(place, centre, half) - slack_ < reach;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "solvers/nodes.hpp"
+#include "solvers/shape_functions.hpp"
 #include "topology/point_tree.hpp"
 
 #include <optional>
@@ -70,6 +71,15 @@ class Nearness {
   std::optional<topology::PointTree> tree_;
 };
 
+/// What is known of a change beside its places: what is new of the incision, and who has other branch functions.
+struct KnownChange {
+  const topology::Incision* incision = nullptr; // as it is now
+  std::vector<int> triangles;                   // of each sheet those from here on are new, and all of sheets beyond
+  std::vector<char> turned;                     // by node: the front nearest to it is another one
+};
+KnownChange known_change(const topology::Incision* before, const topology::Incision& now, const Spheres& spheres_before,
+                         const Spheres& spheres_now);
+
 /// How far x is from the box centre +- half, m.
 inline double distance_to_box(const Vector3& x, const Vector3& centre, const Vector3& half) {
   return ((x - centre).cwiseAbs() - half).cwiseMax(0).norm();
@@ -82,8 +92,10 @@ class Reach {
  public:
   /// `radii` of the spheres about `nodes`, 0: absent. `slack` m: how far places between the given ones may be off.
   /// `all_front`: all there is of the front, changed or not; `enriched`: reach of its enrichment in sphere radii.
+  /// Without what is `known` whatever is near enough counts as hidden, and as turned.
   Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front, const std::vector<Vector3>& all_front,
-        double enriched, const std::vector<Vector3>& nodes, const std::vector<double>& radii, double slack);
+        double enriched, const std::vector<Vector3>& nodes, const std::vector<double>& radii, double slack,
+        KnownChange known = {});
 
   /// Whether something within `half` m of x sees or is hidden differently, or is enriched by other functions.
   [[nodiscard]] bool sees(const Vector3& x, double half) const;
@@ -95,36 +107,40 @@ class Reach {
     return to_faces_(x) - half - slack_ < radii * radius_beside(to_faces_, x);
   }
 
-  /// Both of a box centre +- half, m, more closely: by the ways over every changed place.
+  /// The same of a box centre +- half, m, more closely: by the ways over every changed place and what stands between.
   [[nodiscard]] bool sees(const Vector3& centre, const Vector3& half) const;
-  [[nodiscard]] bool near_front(const Vector3& centre, const Vector3& half, double radii) const;
+  /// Whether some place of a box may be enriched by a front that has changed, or points of its quadrature be placed by
+  /// it (background_cells.hpp).
+  [[nodiscard]] bool at_front(const Vector3& centre, const Vector3& half) const;
 
  private:
   struct Eye {
     Vector3 position;
     double radius, spare;
+    bool at_face; // and lifted off it
   };
-  [[nodiscard]] bool passes(const std::vector<Vector3>& places, const std::vector<Eye>& eyes, const Vector3& centre,
-                            const Vector3& half) const;
+  /// Whether a way from a box, `nearest` m off the places, leads over one of them to one of the eyes.
+  [[nodiscard]] bool passes(const std::vector<Vector3>& places, const std::vector<Eye>& eyes, bool by_new,
+                            double nearest, const Vector3& centre, const Vector3& half) const;
+  /// Whether a sheet may hide some place of a box from an eye; with `by_new` a new face of it.
+  [[nodiscard]] bool is_hidden(const Vector3& centre, const Vector3& half, const Eye& eye, bool by_new) const;
   /// Radius of the sphere about the node nearest to the change's place nearest to x.
   [[nodiscard]] double radius_beside(const Nearness& change, const Vector3& x) const {
     const std::optional<Vector3> place = change.place(x);
     return place ? present_radii_[static_cast<std::size_t>(present_->nearest(*place).index)] : 0;
   }
 
-  /// Whether some place of a box may be enriched, by whatever front.
-  [[nodiscard]] bool is_enriched(const Vector3& centre, const Vector3& half) const {
-    return is_near(to_all_, all_front_, centre, half, enriched_);
-  }
-  [[nodiscard]] bool is_near(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
-                             const Vector3& half, double radii) const;
+  /// Whether a box is nearer to one of the places than the enrichment reaches there, or than `least` m.
+  [[nodiscard]] bool is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
+                                 const Vector3& half, double least) const;
 
   std::vector<Vector3> faces_, front_, all_front_;
   Nearness to_faces_, to_front_, to_all_;
   double enriched_;
   std::optional<topology::PointTree> present_;
   std::vector<double> present_radii_;
-  std::vector<Eye> by_faces_, by_front_, by_branch_;
+  std::vector<Eye> by_faces_, by_front_, by_branch_; // the first two by falling spare
+  KnownChange known_;
   double slack_;
 };
 

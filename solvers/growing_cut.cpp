@@ -324,7 +324,7 @@ GrowingCut::State::increment(const NodeChange& change,
   add_front(before, 2 * slack, all_front);
   add_front(incision.get(), 2 * slack, all_front);
   increment.reach.emplace(changes.faces, changes.front, all_front, enrichment_reach(), next.nodes.positions, radii,
-                          slack);
+                          slack, known_change(before, *incision, *spheres, *increment.spheres));
   for (int i : changed_nodes) {
     increment.balls.emplace_back(next.nodes.positions[i], radii[i]);
     include(next.nodes.positions[i], radii[i]);
@@ -336,8 +336,7 @@ GrowingCut::State::increment(const NodeChange& change,
       growth = std::max(growth, cell.growth);
     leaf.half.array() += growth_room(leaf.centre, growth);
     if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
-        ((touched.upper - leaf.centre).array() < -leaf.half.array()).any() ||
-        !increment.concerns(leaf, enrichment_reach()))
+        ((touched.upper - leaf.centre).array() < -leaf.half.array()).any() || !increment.concerns(leaf))
       continue;
     if (boxes[b].cells.empty())
       return uncovered("the cut left the predicted way");

@@ -18,8 +18,8 @@
 
 namespace spherecut::solvers {
 
-/// Shares of the surface about some nodes are found from the surface this far around them, in spacings.
-inline constexpr double shares_reach = 4;
+/// Shares of the surface about some nodes are found from points and nodes this far around them, in spacings.
+inline constexpr double points_reach = 2, nodes_reach = 4;
 /// A share itself changes when faces or surface nodes come this near to it, in spacings.
 inline constexpr double share_size = 2;
 /// And a share of the skin where faces come this near to its node, in units of how far it reaches from it: nearer they
@@ -81,8 +81,8 @@ struct GrowingCut::State {
                          [&](const auto& ball) { return (ball.first - x).norm() < ball.second + half; });
     }
     /// The same of a box, more closely.
-    [[nodiscard]] bool concerns(const BackgroundBox& box, double enriched) const {
-      return reach->near_front(box.centre, box.half, std::max(1.0, enriched)) ||
+    [[nodiscard]] bool concerns(const BackgroundBox& box) const {
+      return reach->at_front(box.centre, box.half) ||
              std::any_of(
                  balls.begin(), balls.end(),
                  [&](const auto& ball) { return distance_to_box(ball.first, box.centre, box.half) < ball.second; }) ||
@@ -213,14 +213,17 @@ struct GrowingCut::State {
     contact.resize(options.contact.size());
     if (wanted.empty())
       return;
-    BoundingBox region{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
-    for (const std::size_t c : wanted) {
-      const int node = options.contact[c];
-      const double room = shares_reach * problem.nodes.spacings[node];
-      region.lower = region.lower.cwiseMin((problem.nodes.positions[node].array() - room).matrix());
-      region.upper = region.upper.cwiseMax((problem.nodes.positions[node].array() + room).matrix());
-    }
-    const Shares regional(problem, removed, region);
+    const auto around = [&](double reach) {
+      BoundingBox box{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
+      for (const std::size_t c : wanted) {
+        const int node = options.contact[c];
+        const Vector3 room = Vector3::Constant(reach * problem.nodes.spacings[node]);
+        box.lower = box.lower.cwiseMin(problem.nodes.positions[node] - room);
+        box.upper = box.upper.cwiseMax(problem.nodes.positions[node] + room);
+      }
+      return box;
+    };
+    const Shares regional(problem, removed, SurfacePatches::Part{around(points_reach), around(nodes_reach)});
     for (const std::size_t c : wanted)
       contact[c] = regional.patches.mean(regional.compact[options.contact[c]], *spheres, problem.prescribed_region);
   }

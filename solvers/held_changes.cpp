@@ -11,9 +11,9 @@ bool equal_to_rounding(const DisplacementMean& a, const DisplacementMean& b) {
                                           [](double v, double w) { return std::abs(v - w) <= 1e-14; });
 }
 
-Shares::Shares(const Problem& problem, const std::vector<char>& removed, const std::optional<BoundingBox>& region,
-               SurfacePatches::Of of)
-    : nodes(present_nodes(problem.nodes, removed)), patches(*problem.domain, nodes, problem.incision, region, of) {
+Shares::Shares(const Problem& problem, const std::vector<char>& removed,
+               const std::optional<SurfacePatches::Part>& part, SurfacePatches::Of of)
+    : nodes(present_nodes(problem.nodes, removed)), patches(*problem.domain, nodes, problem.incision, part, of) {
   int place = 0;
   for (const char gone : removed)
     compact.push_back(gone != 0 ? -1 : place++);

@@ -13,7 +13,7 @@ struct Shares {
   SurfacePatches patches;
 
   Shares(const Problem& problem, const std::vector<char>& removed,
-         const std::optional<BoundingBox>& region = std::nullopt,
+         const std::optional<SurfacePatches::Part>& part = std::nullopt,
          SurfacePatches::Of of = SurfacePatches::Of::skin_and_faces);
 };
 

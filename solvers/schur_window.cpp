@@ -109,20 +109,25 @@ void SchurWindow::deactivate(const std::vector<int>& slots) {
           schur_(slot, column) = 0;
 }
 
-/// The lower triangle of S of some slots (ascending), column-major.
-void SchurWindow::gather(const std::vector<int>& slots, std::vector<double>& square) const {
+/// The lower triangle of S of some slots (ascending), column-major; with `less_eliminated` less what is done ahead.
+void SchurWindow::gather(const std::vector<int>& slots, bool less_eliminated, std::vector<double>& square) const {
   const auto n = std::ssize(slots);
   square.resize(static_cast<std::size_t>(n * n));
+  // Runs of consecutive slots, which are consecutive among the kept ones as well.
+  std::vector<std::ptrdiff_t> run_end(static_cast<std::size_t>(n));
+  for (std::ptrdiff_t i = n; i-- > 0;)
+    run_end[i] = i + 1 < n && slots[i + 1] == slots[i] + 1 ? run_end[i + 1] : i + 1;
   for (std::ptrdiff_t j = 0; j < n; ++j) {
     const double* from = schur_.data() + static_cast<std::ptrdiff_t>(slots[j]) * schur_.rows();
+    const double* less = less_eliminated ? eliminated_.data() + kept_place_[slots[j]] * eliminated_.rows() : nullptr;
     double* to = square.data() + j * n;
-    // Runs of consecutive slots are copied as they are.
-    for (std::ptrdiff_t i = j; i < n;) {
-      std::ptrdiff_t end = i + 1;
-      while (end < n && slots[end] == slots[end - 1] + 1)
-        ++end;
-      std::copy(from + slots[i], from + slots[end - 1] + 1, to + i);
-      i = end;
+    for (std::ptrdiff_t i = j; i < n; i = run_end[i]) {
+      const std::ptrdiff_t length = run_end[i] - i;
+      const Eigen::Map<const VectorX> part(from + slots[i], length);
+      if (less != nullptr)
+        Eigen::Map<VectorX>(to + i, length) = part - Eigen::Map<const VectorX>(less + kept_place_[slots[i]], length);
+      else
+        Eigen::Map<VectorX>(to + i, length) = part;
     }
   }
 }
@@ -144,7 +149,7 @@ void SchurWindow::prepare(const std::vector<char>& kept) {
     }
   }
   std::fill(changed_.begin(), changed_.end(), 0);
-  gather(ahead_, ahead_factor_);
+  gather(ahead_, false, ahead_factor_);
   try {
     cholesky(ahead_, schur_, ahead_factor_);
   } catch (...) {
@@ -179,16 +184,7 @@ bool SchurWindow::factor() {
   for (int slot = 0; slot < slots(); ++slot)
     if (active_[slot] != 0 && (!usable || kept_place_[slot] >= 0))
       order_.push_back(slot);
-  gather(order_, factor_);
-  if (usable) {
-    const auto n = std::ssize(order_);
-    for (std::ptrdiff_t j = 0; j < n; ++j) {
-      const double* less = eliminated_.data() + kept_place_[order_[j]] * eliminated_.rows();
-      double* to = factor_.data() + j * n;
-      for (std::ptrdiff_t i = j; i < n; ++i)
-        to[i] -= less[kept_place_[order_[i]]];
-    }
-  }
+  gather(order_, usable, factor_);
   cholesky(order_, schur_, factor_);
   return usable;
 }

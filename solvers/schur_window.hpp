@@ -101,7 +101,7 @@ class SchurWindow {
   [[nodiscard]] MatrixX recover_from_half(const MatrixX& window, const MatrixX& far) const;
 
  private:
-  void gather(const std::vector<int>& slots, std::vector<double>& square) const;
+  void gather(const std::vector<int>& slots, bool less_eliminated, std::vector<double>& square) const;
   [[nodiscard]] MatrixX recover_from(MatrixX halfway, const MatrixX& window) const;
 
   int far_, changing_, room_, contact_;

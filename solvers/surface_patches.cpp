@@ -132,16 +132,16 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
 }
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
-                               std::shared_ptr<const topology::Incision> incision,
-                               const std::optional<BoundingBox>& region, Of of)
+                               std::shared_ptr<const topology::Incision> incision, const std::optional<Part>& part,
+                               Of of)
     : nodes_(nodes), incision_(std::move(incision)), points_of_node_(nodes.size()) {
   if (of == Of::skin_and_faces)
     points_ = surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision_.get(),
-                                 region ? &*region : nullptr);
+                                 part ? &part->points : nullptr);
   faces_begin_ = static_cast<int>(points_.size());
   if (incision_ != nullptr) {
     const std::vector<SurfacePoint> faces =
-        lip_quadrature(*incision_, nodes, share_edge, share_centroid_below, region ? &*region : nullptr);
+        lip_quadrature(*incision_, nodes, share_edge, share_centroid_below, part ? &part->points : nullptr);
     points_.insert(points_.end(), faces.begin(), faces.end());
   }
   for (const bool lips : {false, true}) {
@@ -152,7 +152,7 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
     std::vector<int> ids;
     for (int i = 0; i < nodes.size(); ++i)
       if (nodes.kinds[i] != NodeKind::interior && (nodes.kinds[i] == NodeKind::lip) == lips &&
-          (!region || region->contains(nodes.positions[i]))) {
+          (!part || part->nodes.contains(nodes.positions[i]))) {
         positions.push_back(nodes.positions[i]);
         ids.push_back(i);
       }

@@ -34,11 +34,15 @@ class SurfacePatches {
  public:
   enum class Of { skin_and_faces, faces };
 
-  /// With `region` only the shares of nodes deep enough inside it (two spacings) are meant to be asked for; of `faces`
-  /// only those of lip nodes.
+  /// Part of a surface: the points that some nodes may own, and all nodes that those points may belong to.
+  struct Part {
+    BoundingBox points, nodes; // m
+  };
+
+  /// Of a `part` the shares of those nodes alone are meant to be asked for; of `faces` only those of lip nodes.
   SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
                  std::shared_ptr<const topology::Incision> incision = nullptr,
-                 const std::optional<BoundingBox>& region = std::nullopt, Of of = Of::skin_and_faces);
+                 const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces);
 
   /// Mean over the share of `node` of the surface outside `held` (null: all of it) or, for a lip node, of its face; the
   /// node itself when it has no share.

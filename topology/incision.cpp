@@ -251,6 +251,10 @@ void Incision::walls_between(const Vector3& centre, const Vector3& half, const V
   });
 }
 
+std::pair<int, int> Incision::triangle_of(int wall) const {
+  return {data_->triangles[wall].sheet, data_->triangles[wall].triangle};
+}
+
 bool Incision::blocks(const Vector3& a, const Vector3& b, std::span<int> walls) const {
   const Data& data = *data_;
   const Vector3 p = a - data.tree.origin(), q = b - data.tree.origin();

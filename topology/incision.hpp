@@ -78,6 +78,9 @@ class Incision {
   /// numbers for the next query. When there are none no such segment is blocked.
   void walls_between(const Vector3& centre, const Vector3& half, const Vector3& y, std::vector<int>& walls) const;
 
+  /// Sheet and triangle that such a number stands for.
+  [[nodiscard]] std::pair<int, int> triangle_of(int wall) const;
+
   /// What blocks(a, b) says, for a in a box whose walls before b are given; changes their order, the one that blocks
   /// comes first.
   [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b, std::span<int> walls) const;
