@@ -11,7 +11,8 @@
 
 namespace spherecut::solvers {
 
-void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes& cell) {
+void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes& out) {
+  CellShapes& cell = work_; // with room for all candidates; few of them stay
   cell.points = static_cast<int>(points.size());
   cell.stride =
       (cell.points + shape_kernel::points_together - 1) / shape_kernel::points_together * shape_kernel::points_together;
@@ -20,6 +21,7 @@ void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes
   cell.reached.clear();
   if (!evaluate_together(points, cell))
     evaluate_each(points, cell);
+  out = cell;
 }
 
 bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, CellShapes& cell) {

@@ -30,7 +30,7 @@ class CellEvaluator {
       : spheres_(spheres), place_(spheres.size(), -1), marked_(spheres.size() / 64 + 1, 0) {}
 
   /// Throws NumericalError when a point has no sound support.
-  void evaluate(std::span<const QuadraturePoint> points, CellShapes& cell);
+  void evaluate(std::span<const QuadraturePoint> points, CellShapes& out);
 
  private:
   /// All points at once but those whose shape functions a cut alters; false where a support is not sound.
@@ -50,6 +50,7 @@ class CellEvaluator {
   std::vector<double> coordinates_;
   std::vector<char> hidden_;
   std::array<ShapeFunctions, most_cell_points> at_point_;
+  CellShapes work_;
 };
 
 /// Cells in an order in which neighbours follow one another (Morton order of their boxes).

@@ -154,11 +154,12 @@ Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& fron
     : faces_(faces), front_(front), all_front_(all_front), to_faces_(faces), to_front_(front), to_all_(all_front),
       enriched_(enriched), known_(std::move(known)), slack_(slack) {
   std::vector<Vector3> present;
+  std::vector<double> present_radii;
   for (std::size_t j = 0; j < nodes.size(); ++j) {
     if (!(radii[j] > 0))
       continue;
     present.push_back(nodes[j]);
-    present_radii_.push_back(radii[j]);
+    present_radii.push_back(radii[j]);
     const double to_front = to_front_(nodes[j]), to_faces = to_faces_(nodes[j]);
     const double longest = looking_around * radii[j] + slack;
     const bool at_face = std::min(to_front, to_faces) < longest &&
@@ -172,7 +173,17 @@ Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& fron
         (known_.incision == nullptr ? to_front < to_all_(nodes[j]) + 2 * slack : known_.turned[j] != 0))
       by_branch_.push_back({nodes[j], radii[j], 0, at_face});
   }
-  present_.emplace(present);
+  const topology::PointTree tree(present);
+  const auto radii_beside = [&](const std::vector<Vector3>& places) {
+    std::vector<double> beside;
+    beside.reserve(places.size());
+    for (const Vector3& place : places)
+      beside.push_back(present_radii[static_cast<std::size_t>(tree.nearest(place).index)]);
+    return beside;
+  };
+  faces_radii_ = radii_beside(faces_);
+  front_radii_ = radii_beside(front_);
+  all_radii_ = radii_beside(all_front_);
   for (std::vector<Eye>* eyes : {&by_faces_, &by_front_}) // those nearest to the change first: they tell most often
     std::stable_sort(eyes->begin(), eyes->end(), [](const Eye& a, const Eye& b) { return a.spare > b.spare; });
 }
@@ -191,9 +202,12 @@ bool Reach::sees(const Vector3& x, double half) const {
     }
     return false;
   };
-  return faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front) ||
-         (std::any_of(by_branch_.begin(), by_branch_.end(), holds) &&
-          to_all_(x) - half - slack_ < enriched_ * radius_beside(to_all_, x));
+  if (faces < 0 || concerns(by_faces_, faces) || concerns(by_front_, front))
+    return true;
+  if (std::none_of(by_branch_.begin(), by_branch_.end(), holds))
+    return false;
+  const Nearness::Found enriching = to_all_.find(x);
+  return enriching.distance - half - slack_ < enriched_ * radius_beside(enriching, all_radii_);
 }
 
 bool Reach::is_hidden(const Vector3& centre, const Vector3& half, const Eye& eye, bool by_new) const {
@@ -246,17 +260,17 @@ bool Reach::sees(const Vector3& centre, const Vector3& half) const {
   return faces < half.minCoeff() || passes(faces_, by_faces_, true, faces - size, centre, half) ||
          passes(front_, by_front_, false, front - size, centre, half) ||
          (std::any_of(by_branch_.begin(), by_branch_.end(), holds) &&
-          is_enriched(to_all_, all_front_, centre, half, 0));
+          is_enriched(to_all_, all_front_, all_radii_, centre, half, 0));
 }
 
 bool Reach::at_front(const Vector3& centre, const Vector3& half) const {
-  return is_enriched(to_front_, front_, centre, half, half.norm());
+  return is_enriched(to_front_, front_, front_radii_, centre, half, half.norm());
 }
 
-bool Reach::is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
-                        const Vector3& half, double least) const {
-  const double nearest = nearness(centre) - slack_,
-               reach = std::max(least, enriched_ > 0 ? enriched_ * radius_beside(nearness, centre) : 0.0);
+bool Reach::is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const std::vector<double>& radii,
+                        const Vector3& centre, const Vector3& half, double least) const {
+  const Nearness::Found found = nearness.find(centre);
+  const double nearest = found.distance - slack_, reach = std::max(least, enriched_ * radius_beside(found, radii));
   return nearest < half.minCoeff() + reach ||
          (nearest < half.norm() + reach && std::any_of(places.begin(), places.end(), [&](const Vector3& place) {
             return distance_to_box(place, centre, half) - slack_ < reach;

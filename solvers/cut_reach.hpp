@@ -55,19 +55,23 @@ void add_front(const topology::Incision* incision, double spacing, std::vector<V
 /// Distance to the nearest of some points, infinite when there are none.
 class Nearness {
  public:
-  explicit Nearness(const std::vector<Vector3>& points) : points_(points) {
+  explicit Nearness(const std::vector<Vector3>& points) {
     if (!points.empty())
       tree_.emplace(points);
   }
-  [[nodiscard]] std::optional<Vector3> place(const Vector3& x) const {
-    return tree_ ? std::optional(points_[static_cast<std::size_t>(tree_->nearest(x).index)]) : std::nullopt;
+  struct Found {
+    int index = -1;
+    double distance = std::numeric_limits<double>::infinity(); // m
+  };
+  [[nodiscard]] Found find(const Vector3& x) const {
+    if (!tree_)
+      return {};
+    const topology::PointTree::Found nearest = tree_->nearest(x);
+    return {nearest.index, std::sqrt(nearest.squared_distance)};
   }
-  [[nodiscard]] double operator()(const Vector3& x) const {
-    return tree_ ? std::sqrt(tree_->nearest(x).squared_distance) : std::numeric_limits<double>::infinity();
-  }
+  [[nodiscard]] double operator()(const Vector3& x) const { return find(x).distance; }
 
  private:
-  std::vector<Vector3> points_;
   std::optional<topology::PointTree> tree_;
 };
 
@@ -101,10 +105,12 @@ class Reach {
   [[nodiscard]] bool sees(const Vector3& x, double half) const;
   /// Whether a place within `half` m of x is nearer to the front, or to the faces, than `radii` sphere radii there.
   [[nodiscard]] bool near_front(const Vector3& x, double half, double radii) const {
-    return to_front_(x) - half - slack_ < radii * radius_beside(to_front_, x);
+    const Nearness::Found front = to_front_.find(x);
+    return front.distance - half - slack_ < radii * radius_beside(front, front_radii_);
   }
   [[nodiscard]] bool near_faces(const Vector3& x, double half, double radii) const {
-    return to_faces_(x) - half - slack_ < radii * radius_beside(to_faces_, x);
+    const Nearness::Found faces = to_faces_.find(x);
+    return faces.distance - half - slack_ < radii * radius_beside(faces, faces_radii_);
   }
 
   /// The same of a box centre +- half, m, more closely: by the ways over every changed place and what stands between.
@@ -124,21 +130,20 @@ class Reach {
                             double nearest, const Vector3& centre, const Vector3& half) const;
   /// Whether a sheet may hide some place of a box from an eye; with `by_new` a new face of it.
   [[nodiscard]] bool is_hidden(const Vector3& centre, const Vector3& half, const Eye& eye, bool by_new) const;
-  /// Radius of the sphere about the node nearest to the change's place nearest to x.
-  [[nodiscard]] double radius_beside(const Nearness& change, const Vector3& x) const {
-    const std::optional<Vector3> place = change.place(x);
-    return place ? present_radii_[static_cast<std::size_t>(present_->nearest(*place).index)] : 0;
+  /// Radius of the sphere about the node nearest to a place.
+  static double radius_beside(const Nearness::Found& place, const std::vector<double>& radii) {
+    return place.index >= 0 ? radii[static_cast<std::size_t>(place.index)] : 0;
   }
 
   /// Whether a box is nearer to one of the places than the enrichment reaches there, or than `least` m.
-  [[nodiscard]] bool is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const Vector3& centre,
-                                 const Vector3& half, double least) const;
+  [[nodiscard]] bool is_enriched(const Nearness& nearness, const std::vector<Vector3>& places,
+                                 const std::vector<double>& radii, const Vector3& centre, const Vector3& half,
+                                 double least) const;
 
   std::vector<Vector3> faces_, front_, all_front_;
+  std::vector<double> faces_radii_, front_radii_, all_radii_; // m, of the spheres about the nodes nearest to them
   Nearness to_faces_, to_front_, to_all_;
   double enriched_;
-  std::optional<topology::PointTree> present_;
-  std::vector<double> present_radii_;
   std::vector<Eye> by_faces_, by_front_, by_branch_; // the first two by falling spare
   KnownChange known_;
   double slack_;
