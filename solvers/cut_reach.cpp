@@ -18,6 +18,21 @@ constexpr double looking_around = 1.1;
 /// Of a sphere radius: nearer to a sheet an eye is lifted off it (topology::eye_at).
 constexpr double lifted_below = 0.02;
 
+/// Empty (lower above upper) without places, and infinitely far then.
+BoundingBox bounds_of(const std::vector<Vector3>& places) {
+  BoundingBox box{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
+  for (const Vector3& place : places) {
+    box.lower = box.lower.cwiseMin(place);
+    box.upper = box.upper.cwiseMax(place);
+  }
+  return box;
+}
+
+/// Between a box and centre +- half, m.
+double distance_between(const BoundingBox& box, const Vector3& centre, const Vector3& half) {
+  return (box.lower - centre - half).cwiseMax(centre - half - box.upper).cwiseMax(0).norm();
+}
+
 } // namespace
 
 std::vector<Vector3> sample_points(const topology::SurfaceMesh& sheet, std::size_t first_triangle, double spacing) {
@@ -184,6 +199,12 @@ Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& fron
   faces_radii_ = radii_beside(faces_);
   front_radii_ = radii_beside(front_);
   all_radii_ = radii_beside(all_front_);
+  for (const std::vector<double>* some : {&front_radii_, &all_radii_})
+    for (const double radius : *some)
+      largest_beside_ = std::max(largest_beside_, radius);
+  around_faces_ = bounds_of(faces_);
+  around_front_ = bounds_of(front_);
+  around_all_ = bounds_of(all_front_);
   for (std::vector<Eye>* eyes : {&by_faces_, &by_front_}) // those nearest to the change first: they tell most often
     std::stable_sort(eyes->begin(), eyes->end(), [](const Eye& a, const Eye& b) { return a.spare > b.spare; });
 }
@@ -256,25 +277,33 @@ bool Reach::passes(const std::vector<Vector3>& places, const std::vector<Eye>& e
 
 bool Reach::sees(const Vector3& centre, const Vector3& half) const {
   const auto holds = [&](const Eye& eye) { return distance_to_box(eye.position, centre, half) < eye.radius; };
-  const double faces = to_faces_(centre) - slack_, front = to_front_(centre) - slack_, size = half.norm();
-  return faces < half.minCoeff() || passes(faces_, by_faces_, true, faces - size, centre, half) ||
-         passes(front_, by_front_, false, front - size, centre, half) ||
+  return passes(faces_, by_faces_, true, distance_between(around_faces_, centre, half) - slack_, centre, half) ||
+         passes(front_, by_front_, false, distance_between(around_front_, centre, half) - slack_, centre, half) ||
          (std::any_of(by_branch_.begin(), by_branch_.end(), holds) &&
-          is_enriched(to_all_, all_front_, all_radii_, centre, half, 0));
+          is_enriched(to_all_, all_front_, around_all_, all_radii_, centre, half));
 }
 
 bool Reach::at_front(const Vector3& centre, const Vector3& half) const {
-  return is_enriched(to_front_, front_, front_radii_, centre, half, half.norm());
+  return is_enriched(to_front_, front_, around_front_, front_radii_, centre, half);
 }
 
-bool Reach::is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const std::vector<double>& radii,
-                        const Vector3& centre, const Vector3& half, double least) const {
-  const Nearness::Found found = nearness.find(centre);
-  const double nearest = found.distance - slack_, reach = std::max(least, enriched_ * radius_beside(found, radii));
-  return nearest < half.minCoeff() + reach ||
-         (nearest < half.norm() + reach && std::any_of(places.begin(), places.end(), [&](const Vector3& place) {
-            return distance_to_box(place, centre, half) - slack_ < reach;
-          }));
+bool Reach::moves_points(const Vector3& centre, const Vector3& half) const {
+  return comes_near(faces_, around_faces_, 0, centre, half) ||
+         comes_near(front_, around_front_, half.norm(), centre, half);
+}
+
+bool Reach::is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const BoundingBox& around,
+                        const std::vector<double>& radii, const Vector3& centre, const Vector3& half) const {
+  if (!(enriched_ > 0) || distance_between(around, centre, half) - slack_ >= enriched_ * largest_beside_)
+    return false;
+  return comes_near(places, around, enriched_ * radius_beside(nearness.find(centre), radii), centre, half);
+}
+
+bool Reach::comes_near(const std::vector<Vector3>& places, const BoundingBox& around, double reach,
+                       const Vector3& centre, const Vector3& half) const {
+  return distance_between(around, centre, half) - slack_ <= reach &&
+         std::any_of(places.begin(), places.end(),
+                     [&](const Vector3& place) { return distance_to_box(place, centre, half) - slack_ <= reach; });
 }
 
 ReachAlong::ReachAlong(const topology::SurfaceMesh& way, const topology::Incision* before, const NodeCloud& nodes,

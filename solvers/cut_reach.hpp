@@ -115,9 +115,11 @@ class Reach {
 
   /// The same of a box centre +- half, m, more closely: by the ways over every changed place and what stands between.
   [[nodiscard]] bool sees(const Vector3& centre, const Vector3& half) const;
-  /// Whether some place of a box may be enriched by a front that has changed, or points of its quadrature be placed by
-  /// it (background_cells.hpp).
+  /// Whether some place of a box may be enriched by a front that has changed.
   [[nodiscard]] bool at_front(const Vector3& centre, const Vector3& half) const;
+  /// Whether new faces come into a box of the quadrature, or a front that has changed so near that points of it are
+  /// placed for it (background_cells.hpp).
+  [[nodiscard]] bool moves_points(const Vector3& centre, const Vector3& half) const;
 
  private:
   struct Eye {
@@ -135,13 +137,18 @@ class Reach {
     return place.index >= 0 ? radii[static_cast<std::size_t>(place.index)] : 0;
   }
 
-  /// Whether a box is nearer to one of the places than the enrichment reaches there, or than `least` m.
+  /// Whether a box is nearer to one of the places than the enrichment reaches there.
   [[nodiscard]] bool is_enriched(const Nearness& nearness, const std::vector<Vector3>& places,
-                                 const std::vector<double>& radii, const Vector3& centre, const Vector3& half,
-                                 double least) const;
+                                 const BoundingBox& around, const std::vector<double>& radii, const Vector3& centre,
+                                 const Vector3& half) const;
+  /// Whether a box is nearer to one of some places, all inside `around`, than `reach` m.
+  [[nodiscard]] bool comes_near(const std::vector<Vector3>& places, const BoundingBox& around, double reach,
+                                const Vector3& centre, const Vector3& half) const;
 
   std::vector<Vector3> faces_, front_, all_front_;
+  BoundingBox around_faces_, around_front_, around_all_;      // m
   std::vector<double> faces_radii_, front_radii_, all_radii_; // m, of the spheres about the nodes nearest to them
+  double largest_beside_ = 0;                                 // m, of these
   Nearness to_faces_, to_front_, to_all_;
   double enriched_;
   std::vector<Eye> by_faces_, by_front_, by_branch_; // the first two by falling spare

@@ -141,6 +141,8 @@ void GrowingCut::State::condense_all() {
   const auto in_reach = reach_of(options.way, true);
   for (const BackgroundBox& leaf : stiffness.cells.boxes) {
     Box box{leaf, {}, {}};
+    for (int c = leaf.first_cell; c < leaf.last_cell; ++c)
+      box.include(stiffness.cells.of(c));
     if (is_whole || in_reach(leaf.centre, leaf.half.norm()))
       for (int c = leaf.first_cell; c < leaf.last_cell; ++c) {
         box.cells.push_back(stiffness.shapes[static_cast<std::size_t>(c)]);
@@ -330,18 +332,19 @@ GrowingCut::State::increment(const NodeChange& change,
     include(next.nodes.positions[i], radii[i]);
   }
   for (int b = 0; b < std::ssize(boxes); ++b) {
-    BackgroundBox leaf = boxes[b].box;
+    const BackgroundBox& leaf = boxes[b].box;
     double growth = 1;
     for (const CellShapes& cell : boxes[b].cells)
       growth = std::max(growth, cell.growth);
-    leaf.half.array() += growth_room(leaf.centre, growth);
-    if (((leaf.centre - touched.lower).array() < -leaf.half.array()).any() ||
-        ((touched.upper - leaf.centre).array() < -leaf.half.array()).any() || !increment.concerns(leaf))
+    const double room = growth_room(leaf.centre, growth);
+    if (((leaf.centre - touched.lower).array() < -(leaf.half.array() + room)).any() ||
+        ((touched.upper - leaf.centre).array() < -(leaf.half.array() + room)).any() ||
+        !increment.concerns(boxes[b], room))
       continue;
     if (boxes[b].cells.empty())
       return uncovered("the cut left the predicted way");
     for (int k = 0; k < change.added.size(); ++k)
-      if (is_too_large(boxes[b].box, change.added.positions[k], change.added.spacings[k], background()))
+      if (is_too_large(leaf, change.added.positions[k], change.added.spacings[k], background()))
         return uncovered("the added nodes are finer than the cells");
     increment.boxes.push_back(b);
   }

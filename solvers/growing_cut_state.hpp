@@ -29,10 +29,17 @@ inline constexpr double share_crossing = 1.6;
 struct GrowingCut::State {
   struct Box {
     BackgroundBox box;
-    std::vector<CellShapes> cells;                    // by node ids
-    std::vector<std::vector<QuadraturePoint>> points; // of each cell, kept where loads need them
-    bool exchanged = false;                           // since the condensation
-    std::vector<CellShapes> first{};                  // then: as they were at it
+    std::vector<CellShapes> cells;                                           // by node ids
+    std::vector<std::vector<QuadraturePoint>> points;                        // of each cell, kept where loads need them
+    bool exchanged = false;                                                  // since the condensation
+    std::vector<CellShapes> first{};                                         // then: as they were at it
+    BoundingBox extent{Vector3::Constant(1e300), Vector3::Constant(-1e300)}; // of its points
+    void include(std::span<const QuadraturePoint> of_cell) {
+      for (const QuadraturePoint& point : of_cell) {
+        extent.lower = extent.lower.cwiseMin(point.position);
+        extent.upper = extent.upper.cwiseMax(point.position);
+      }
+    }
   };
 
   Problem problem;
@@ -80,13 +87,15 @@ struct GrowingCut::State {
              std::any_of(balls.begin(), balls.end(),
                          [&](const auto& ball) { return (ball.first - x).norm() < ball.second + half; });
     }
-    /// The same of a box, more closely.
-    [[nodiscard]] bool concerns(const BackgroundBox& box) const {
-      return reach->at_front(box.centre, box.half) ||
-             std::any_of(
-                 balls.begin(), balls.end(),
-                 [&](const auto& ball) { return distance_to_box(ball.first, box.centre, box.half) < ball.second; }) ||
-             reach->sees(box.centre, box.half);
+    /// The same of a box, more closely: by its points unless those are placed anew. `room`: of growth_room, m.
+    [[nodiscard]] bool concerns(const Box& box, double room) const {
+      if (reach->moves_points(box.box.centre, box.box.half))
+        return true;
+      const Vector3 centre = box.extent.centre(), half = (0.5 * box.extent.extent().array() + room).matrix();
+      return reach->at_front(centre, half) ||
+             std::any_of(balls.begin(), balls.end(),
+                         [&](const auto& ball) { return distance_to_box(ball.first, centre, half) < ball.second; }) ||
+             reach->sees(centre, half);
     }
   };
 
@@ -135,6 +144,7 @@ struct GrowingCut::State {
     box.points.resize(has_cell_loads() ? box.cells.size() : 0);
     for (std::size_t c = 0; c < box.cells.size(); ++c) {
       evaluator.evaluate(filled.of(static_cast<int>(c)), box.cells[c]);
+      box.include(filled.of(static_cast<int>(c)));
       if (has_cell_loads())
         box.points[c].assign(filled.of(static_cast<int>(c)).begin(), filled.of(static_cast<int>(c)).end());
     }
