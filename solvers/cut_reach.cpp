@@ -29,7 +29,7 @@ BoundingBox bounds_of(const std::vector<Vector3>& places) {
 }
 
 /// Between a box and centre +- half, m.
-double distance_between(const BoundingBox& box, const Vector3& centre, const Vector3& half) {
+double distance_between(const BoundingBox& box, const Vector3& centre, const Vector3& half = Vector3::Zero()) {
   return (box.lower - centre - half).cwiseMax(centre - half - box.upper).cwiseMax(0).norm();
 }
 
@@ -166,8 +166,9 @@ void add_front(const topology::Incision* incision, double spacing, std::vector<V
 Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& front,
              const std::vector<Vector3>& all_front, double enriched, const std::vector<Vector3>& nodes,
              const std::vector<double>& radii, double slack, KnownChange known)
-    : faces_(faces), front_(front), all_front_(all_front), to_faces_(faces), to_front_(front), to_all_(all_front),
-      enriched_(enriched), known_(std::move(known)), slack_(slack) {
+    : faces_(faces), front_(front), all_front_(all_front), around_faces_(bounds_of(faces)),
+      around_front_(bounds_of(front)), around_all_(bounds_of(all_front)), to_faces_(faces), to_front_(front),
+      to_all_(all_front), enriched_(enriched), known_(std::move(known)), slack_(slack) {
   std::vector<Vector3> present;
   std::vector<double> present_radii;
   for (std::size_t j = 0; j < nodes.size(); ++j) {
@@ -175,8 +176,11 @@ Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& fron
       continue;
     present.push_back(nodes[j]);
     present_radii.push_back(radii[j]);
+    const double longest = looking_around * radii[j] + slack,
+                 farthest = std::max(longest, (2 * enriched + 1) * radii[j]);
+    if (std::min(distance_between(around_faces_, nodes[j]), distance_between(around_front_, nodes[j])) > farthest)
+      continue; // most nodes
     const double to_front = to_front_(nodes[j]), to_faces = to_faces_(nodes[j]);
-    const double longest = looking_around * radii[j] + slack;
     const bool at_face = std::min(to_front, to_faces) < longest &&
                          (known_.incision == nullptr || known_.incision->near(nodes[j], lifted_below * radii[j]));
     if (const double spare = longest - to_faces; spare > 0)
@@ -202,9 +206,6 @@ Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& fron
   for (const std::vector<double>* some : {&front_radii_, &all_radii_})
     for (const double radius : *some)
       largest_beside_ = std::max(largest_beside_, radius);
-  around_faces_ = bounds_of(faces_);
-  around_front_ = bounds_of(front_);
-  around_all_ = bounds_of(all_front_);
   for (std::vector<Eye>* eyes : {&by_faces_, &by_front_}) // those nearest to the change first: they tell most often
     std::stable_sort(eyes->begin(), eyes->end(), [](const Eye& a, const Eye& b) { return a.spare > b.spare; });
 }

@@ -148,8 +148,7 @@ void GrowingCut::State::condense_all() {
         box.cells.push_back(stiffness.shapes[static_cast<std::size_t>(c)]);
         for (int& node : box.cells.back().nodes)
           node = id[node]; // ascending still
-        if (has_cell_loads())
-          box.points.emplace_back(stiffness.cells.of(c).begin(), stiffness.cells.of(c).end());
+        box.points.emplace_back(stiffness.cells.of(c).begin(), stiffness.cells.of(c).end());
         for (int node : box.cells.back().nodes)
           in_window[node] = 1;
       }
@@ -338,8 +337,10 @@ GrowingCut::State::increment(const NodeChange& change,
       growth = std::max(growth, cell.growth);
     const double room = growth_room(leaf.centre, growth);
     if (((leaf.centre - touched.lower).array() < -(leaf.half.array() + room)).any() ||
-        ((touched.upper - leaf.centre).array() < -(leaf.half.array() + room)).any() ||
-        !increment.concerns(boxes[b], room))
+        ((touched.upper - leaf.centre).array() < -(leaf.half.array() + room)).any())
+      continue;
+    const bool moved = increment.reach->moves_points(leaf.centre, leaf.half);
+    if (!moved && !increment.concerns(boxes[b], room))
       continue;
     if (boxes[b].cells.empty())
       return uncovered("the cut left the predicted way");
@@ -347,6 +348,7 @@ GrowingCut::State::increment(const NodeChange& change,
       if (is_too_large(leaf, change.added.positions[k], change.added.spacings[k], background()))
         return uncovered("the added nodes are finer than the cells");
     increment.boxes.push_back(b);
+    increment.moved.push_back(moved ? 1 : 0);
   }
   return increment;
 }
@@ -400,9 +402,20 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
       CellEvaluator evaluator(*fresh_spheres);
       BackgroundCells filled;
       for (int k = begin; k < end; ++k) {
-        fresh_boxes[k].box = s.boxes[touched_boxes[k]].box;
-        refill_box(*next.domain, fresh_boxes[k].box, s.background(), incision.get(), filled);
-        s.evaluate(fresh_boxes[k], filled, evaluator);
+        State::Box& fresh = fresh_boxes[k];
+        const State::Box& old = s.boxes[touched_boxes[k]];
+        fresh.box = old.box;
+        if (increment.moved[k] != 0) {
+          refill_box(*next.domain, fresh.box, s.background(), incision.get(), filled);
+          for (int c = 0; c + 1 < std::ssize(filled.start); ++c) {
+            fresh.points.emplace_back(filled.of(c).begin(), filled.of(c).end());
+            fresh.include(filled.of(c));
+          }
+        } else {
+          fresh.points = old.points;
+          fresh.extent = old.extent;
+        }
+        State::evaluate(fresh, evaluator);
       }
     });
   }

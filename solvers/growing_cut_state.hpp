@@ -30,7 +30,7 @@ struct GrowingCut::State {
   struct Box {
     BackgroundBox box;
     std::vector<CellShapes> cells;                                           // by node ids
-    std::vector<std::vector<QuadraturePoint>> points;                        // of each cell, kept where loads need them
+    std::vector<std::vector<QuadraturePoint>> points;                        // of each cell
     bool exchanged = false;                                                  // since the condensation
     std::vector<CellShapes> first{};                                         // then: as they were at it
     BoundingBox extent{Vector3::Constant(1e300), Vector3::Constant(-1e300)}; // of its points
@@ -80,6 +80,7 @@ struct GrowingCut::State {
     std::optional<Reach> reach{};
     std::vector<std::pair<Vector3, double>> balls{}; // places and radii of the spheres that change
     std::vector<int> boxes{};                        // touched
+    std::vector<char> moved{};                       // of these: their points are placed anew
 
     /// Whether something within `half` m of x changes; `enriched`: reach of the enrichment in sphere radii.
     [[nodiscard]] bool concerns(const Vector3& x, double half, double enriched) const {
@@ -87,10 +88,8 @@ struct GrowingCut::State {
              std::any_of(balls.begin(), balls.end(),
                          [&](const auto& ball) { return (ball.first - x).norm() < ball.second + half; });
     }
-    /// The same of a box, more closely: by its points unless those are placed anew. `room`: of growth_room, m.
+    /// The same of a box the points of which stay, more closely. `room`: of growth_room, m.
     [[nodiscard]] bool concerns(const Box& box, double room) const {
-      if (reach->moves_points(box.box.centre, box.box.half))
-        return true;
       const Vector3 centre = box.extent.centre(), half = (0.5 * box.extent.extent().array() + room).matrix();
       return reach->at_front(centre, half) ||
              std::any_of(balls.begin(), balls.end(),
@@ -139,15 +138,11 @@ struct GrowingCut::State {
     return problem.loads.body_force != nullptr || !problem.loads.initial_strain.isZero(0);
   }
 
-  void evaluate(Box& box, const BackgroundCells& filled, CellEvaluator& evaluator) const {
-    box.cells.resize(filled.start.size() - 1);
-    box.points.resize(has_cell_loads() ? box.cells.size() : 0);
-    for (std::size_t c = 0; c < box.cells.size(); ++c) {
-      evaluator.evaluate(filled.of(static_cast<int>(c)), box.cells[c]);
-      box.include(filled.of(static_cast<int>(c)));
-      if (has_cell_loads())
-        box.points[c].assign(filled.of(static_cast<int>(c)).begin(), filled.of(static_cast<int>(c)).end());
-    }
+  /// The cells of a box on its points.
+  static void evaluate(Box& box, CellEvaluator& evaluator) {
+    box.cells.resize(box.points.size());
+    for (std::size_t c = 0; c < box.cells.size(); ++c)
+      evaluator.evaluate(box.points[c], box.cells[c]);
   }
 
   /// Adds the stiffness of cells, whose nodes are all in the window, to S.
