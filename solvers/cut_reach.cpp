@@ -202,9 +202,8 @@ Reach::Reach(const std::vector<Vector3>& faces, const std::vector<Vector3>& fron
   };
   faces_radii_ = radii_beside(faces_);
   front_radii_ = radii_beside(front_);
-  all_radii_ = radii_beside(all_front_);
-  for (const std::vector<double>* some : {&front_radii_, &all_radii_})
-    for (const double radius : *some)
+  for (const std::vector<double>& some : {front_radii_, radii_beside(all_front_)})
+    for (const double radius : some)
       largest_beside_ = std::max(largest_beside_, radius);
   for (std::vector<Eye>* eyes : {&by_faces_, &by_front_}) // those nearest to the change first: they tell most often
     std::stable_sort(eyes->begin(), eyes->end(), [](const Eye& a, const Eye& b) { return a.spare > b.spare; });
@@ -228,8 +227,7 @@ bool Reach::sees(const Vector3& x, double half) const {
     return true;
   if (std::none_of(by_branch_.begin(), by_branch_.end(), holds))
     return false;
-  const Nearness::Found enriching = to_all_.find(x);
-  return enriching.distance - half - slack_ < enriched_ * radius_beside(enriching, all_radii_);
+  return to_all_(x) - half - slack_ < enriched_ * largest_beside_;
 }
 
 bool Reach::is_hidden(const Vector3& centre, const Vector3& half, const Eye& eye, bool by_new) const {
@@ -281,23 +279,29 @@ bool Reach::sees(const Vector3& centre, const Vector3& half) const {
   return passes(faces_, by_faces_, true, distance_between(around_faces_, centre, half) - slack_, centre, half) ||
          passes(front_, by_front_, false, distance_between(around_front_, centre, half) - slack_, centre, half) ||
          (std::any_of(by_branch_.begin(), by_branch_.end(), holds) &&
-          is_enriched(to_all_, all_front_, around_all_, all_radii_, centre, half));
+          is_enriched(all_front_, around_all_, centre, half));
 }
 
 bool Reach::at_front(const Vector3& centre, const Vector3& half) const {
-  return is_enriched(to_front_, front_, around_front_, front_radii_, centre, half);
+  return is_enriched(front_, around_front_, centre, half);
 }
 
 bool Reach::moves_points(const Vector3& centre, const Vector3& half) const {
-  return comes_near(faces_, around_faces_, 0, centre, half) ||
-         comes_near(front_, around_front_, half.norm(), centre, half);
+  // Whether a box is parted goes by the faces in the ball about it.
+  const double size = half.norm();
+  return (distance_between(around_faces_, centre) - 2 * slack_ < size &&
+          std::any_of(faces_.begin(), faces_.end(),
+                      [&](const Vector3& face) { return (face - centre).norm() - 2 * slack_ < size; })) ||
+         comes_near(front_, around_front_, size, centre, half);
 }
 
-bool Reach::is_enriched(const Nearness& nearness, const std::vector<Vector3>& places, const BoundingBox& around,
-                        const std::vector<double>& radii, const Vector3& centre, const Vector3& half) const {
+bool Reach::is_enriched(const std::vector<Vector3>& places, const BoundingBox& around, const Vector3& centre,
+                        const Vector3& half) const {
   if (!(enriched_ > 0) || distance_between(around, centre, half) - slack_ >= enriched_ * largest_beside_)
     return false;
-  return comes_near(places, around, enriched_ * radius_beside(nearness.find(centre), radii), centre, half);
+  // Between the ends of a segment the reach goes from that of one to that of the other: the longest of all will do
+  // where they differ.
+  return comes_near(places, around, enriched_ * largest_beside_, centre, half);
 }
 
 bool Reach::comes_near(const std::vector<Vector3>& places, const BoundingBox& around, double reach,

@@ -138,17 +138,16 @@ class Reach {
   }
 
   /// Whether a box is nearer to one of the places than the enrichment reaches there.
-  [[nodiscard]] bool is_enriched(const Nearness& nearness, const std::vector<Vector3>& places,
-                                 const BoundingBox& around, const std::vector<double>& radii, const Vector3& centre,
+  [[nodiscard]] bool is_enriched(const std::vector<Vector3>& places, const BoundingBox& around, const Vector3& centre,
                                  const Vector3& half) const;
   /// Whether a box is nearer to one of some places, all inside `around`, than `reach` m.
   [[nodiscard]] bool comes_near(const std::vector<Vector3>& places, const BoundingBox& around, double reach,
                                 const Vector3& centre, const Vector3& half) const;
 
   std::vector<Vector3> faces_, front_, all_front_;
-  BoundingBox around_faces_, around_front_, around_all_;      // m
-  std::vector<double> faces_radii_, front_radii_, all_radii_; // m, of the spheres about the nodes nearest to them
-  double largest_beside_ = 0;                                 // m, of these
+  BoundingBox around_faces_, around_front_, around_all_; // m
+  std::vector<double> faces_radii_, front_radii_;        // m, of the spheres about the nodes nearest to them
+  double largest_beside_ = 0;                            // m, of those beside any front
   Nearness to_faces_, to_front_, to_all_;
   double enriched_;
   std::vector<Eye> by_faces_, by_front_, by_branch_; // the first two by falling spare

@@ -143,7 +143,10 @@ void GrowingCut::State::condense_all() {
     Box box{leaf, {}, {}};
     for (int c = leaf.first_cell; c < leaf.last_cell; ++c)
       box.include(stiffness.cells.of(c));
-    if (is_whole || in_reach(leaf.centre, leaf.half.norm()))
+    box.find_growth(std::span(stiffness.shapes)
+                        .subspan(static_cast<std::size_t>(leaf.first_cell),
+                                 static_cast<std::size_t>(leaf.last_cell - leaf.first_cell)));
+    if (is_whole || in_reach(leaf.centre, leaf.half.norm() + growth_room(leaf.centre, box.growth)))
       for (int c = leaf.first_cell; c < leaf.last_cell; ++c) {
         box.cells.push_back(stiffness.shapes[static_cast<std::size_t>(c)]);
         for (int& node : box.cells.back().nodes)
@@ -315,12 +318,12 @@ GrowingCut::State::increment(const NodeChange& change,
   };
   const double largest = *std::max_element(radii.begin(), radii.end());
   for (const Vector3& x : changes.faces)
-    include(x, largest);
+    include(x, 1.1 * largest + 2 * slack);
   // The branch functions at a node are those of the front nearest to it: an enriched point that sees a node which has
   // lost its front, or found a new one.
   const double enriched = enrichment_reach();
   for (const Vector3& x : changes.front)
-    include(x, largest * (enriched > 0 ? enriched + 2 : 1));
+    include(x, largest * (enriched > 0 ? enriched + 2 : 1.1) + 2 * slack);
   std::vector<Vector3> all_front = changes.front;
   add_front(before, 2 * slack, all_front);
   add_front(incision.get(), 2 * slack, all_front);
@@ -332,10 +335,7 @@ GrowingCut::State::increment(const NodeChange& change,
   }
   for (int b = 0; b < std::ssize(boxes); ++b) {
     const BackgroundBox& leaf = boxes[b].box;
-    double growth = 1;
-    for (const CellShapes& cell : boxes[b].cells)
-      growth = std::max(growth, cell.growth);
-    const double room = growth_room(leaf.centre, growth);
+    const double room = growth_room(leaf.centre, boxes[b].growth);
     if (((leaf.centre - touched.lower).array() < -(leaf.half.array() + room)).any() ||
         ((touched.upper - leaf.centre).array() < -(leaf.half.array() + room)).any())
       continue;
@@ -540,6 +540,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.window->deactivate(gone_slots);
   Problem previous = std::move(s.problem);
   std::vector<char> previously_removed = std::move(s.removed);
+  const std::vector<int> previous_candidates = s.options.contact;
   s.problem = std::move(next);
   s.removed = std::move(removed);
   s.spheres = std::move(fresh_spheres);
@@ -559,13 +560,25 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     report.factor_seconds = factor_watch.seconds();
     const Stopwatch condense_watch;
     s.drop_removed_contact();
-    std::vector<std::size_t> reshaped_contact;
+    std::vector<Vector3> reshaped_places;
     for (std::size_t c = 0; c < s.contact.size(); ++c)
       if (is_reshaped(s.contact[c], s.options.contact[c]))
+        reshaped_places.push_back(s.problem.nodes.positions[s.options.contact[c]]);
+    // What a share loses goes to one beside it.
+    const Nearness to_reshaped(reshaped_places);
+    std::vector<std::size_t> reshaped_contact;
+    for (std::size_t c = 0; c < s.contact.size(); ++c) {
+      const int node = s.options.contact[c];
+      if (to_reshaped(s.problem.nodes.positions[node]) < share_size * s.problem.nodes.spacings[node])
         reshaped_contact.push_back(c);
       else if (is_near(s.contact[c]))
         s.contact[c] = reweighed(s.contact[c], *s.spheres);
+    }
     s.find_contact(reshaped_contact);
+    for (const DisplacementMean& mean : s.contact)
+      for (const int node : mean.nodes)
+        if (s.slot[node] < 0)
+          throw NumericalError("the cut came to the contact outside the window"); // condensed anew, below
     s.condense_contact();
     report.condense_seconds = condense_watch.seconds();
   } catch (const NumericalError&) {
@@ -578,6 +591,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
     } catch (...) {
       auto back = std::make_unique<State>(std::move(previous), s.options);
       back->removed = std::move(previously_removed);
+      back->options.contact = previous_candidates;
       back->condense_all();
       state_ = std::move(back);
       throw;

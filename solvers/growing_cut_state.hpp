@@ -34,6 +34,12 @@ struct GrowingCut::State {
     bool exchanged = false;                                                  // since the condensation
     std::vector<CellShapes> first{};                                         // then: as they were at it
     BoundingBox extent{Vector3::Constant(1e300), Vector3::Constant(-1e300)}; // of its points
+    double growth = 1;                                                       // of a support of some cell
+    void find_growth(std::span<const CellShapes> shapes) {
+      growth = 1;
+      for (const CellShapes& cell : shapes)
+        growth = std::max(growth, cell.growth);
+    }
     void include(std::span<const QuadraturePoint> of_cell) {
       for (const QuadraturePoint& point : of_cell) {
         extent.lower = extent.lower.cwiseMin(point.position);
@@ -143,6 +149,7 @@ struct GrowingCut::State {
     box.cells.resize(box.points.size());
     for (std::size_t c = 0; c < box.cells.size(); ++c)
       evaluator.evaluate(box.points[c], box.cells[c]);
+    box.find_growth(box.cells);
   }
 
   /// Adds the stiffness of cells, whose nodes are all in the window, to S.
@@ -222,7 +229,8 @@ struct GrowingCut::State {
       BoundingBox box{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
       for (const std::size_t c : wanted) {
         const int node = options.contact[c];
-        const Vector3 room = Vector3::Constant(reach * problem.nodes.spacings[node]);
+        const double far = problem.nodes.kinds[node] == NodeKind::lip ? nodes_reach : reach; // lips may be sparse
+        const Vector3 room = Vector3::Constant(far * problem.nodes.spacings[node]);
         box.lower = box.lower.cwiseMin(problem.nodes.positions[node] - room);
         box.upper = box.upper.cwiseMax(problem.nodes.positions[node] + room);
       }

@@ -123,7 +123,7 @@ bool evaluate_grown_near_cut(const Kernel& kernel, const Spheres& spheres, const
         out.growth = std::max(out.growth, factor);
         return true;
       }
-      out.growth = std::max(1.0, factor);
+      out.growth = std::max(out.growth, factor); // what was tried decides, too
     }
   }
   return nothing(out);
