@@ -86,7 +86,10 @@ TEST_CASE("An increment of a tear that is updated gives fields and intensities o
 
 TEST_CASE("A tear whose systems are updated goes the way of one that rebuilds them") {
   const auto torn = [](bool updating) {
-    Session session(scenario_of(long_bar(0.15, 0.3, growing_notch("galerkin") + "most_increments = 3\n")));
+    // At 2.7 mm, or 2.2, the notch is two spacings deep: the largest G along the front differs by 2 to 10 % where one
+    // node more or less is exchanged, and rounding may decide that.
+    Session session(scenario_of(replaced(long_bar(0.15, 0.3, growing_notch("galerkin") + "most_increments = 3\n"),
+                                         "fine_spacing = 0.0027", "fine_spacing = 0.002")));
     session.set_updating(updating);
     return *session.step(session.steps().front()).tear;
   };
@@ -94,7 +97,6 @@ TEST_CASE("A tear whose systems are updated goes the way of one that rebuilds th
   CHECK(count(updated.increments, SystemUpdate::updated) == 2);
   CHECK(count(rebuilt.increments, SystemUpdate::rebuilt) == 3);
   REQUIRE(updated.increments.size() == rebuilt.increments.size());
-  // A rebuild has finer cells at the front as it is now.
   for (std::size_t k = 0; k < rebuilt.increments.size(); ++k)
     CHECK(updated.increments[k].release == Approx(rebuilt.increments[k].release).epsilon(0.02));
   CHECK(updated.area == Approx(rebuilt.area).epsilon(5e-3));
