@@ -452,8 +452,13 @@ TEST_CASE("A body that follows the blade gives what building it anew on the same
 }
 
 TEST_CASE("A run whose systems are updated tells of about the same wound as one that rebuilds them") {
-  Session updated = session_of(long_block + incision_at_end);
-  Session rebuilt = session_of(long_block + incision_at_end);
+  // At -0.042 rounding decides whether the first increment has a pair of nodes at the mouth of the wound, where it
+  // opens by a quarter more.
+  const std::string text =
+      replaced(replaced(long_block + incision_at_end, "[-0.042, 0.001, 0.033]", "[-0.0428, 0.001, 0.033]"),
+               "[-0.043, 0.001, 0.015]", "[-0.0438, 0.001, 0.015]");
+  Session updated = session_of(text);
+  Session rebuilt = session_of(text);
   rebuilt.set_updating(false);
   const std::vector<StepResult> a = run(updated);
   const std::vector<StepResult> b = run(rebuilt);
