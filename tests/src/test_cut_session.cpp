@@ -452,13 +452,8 @@ TEST_CASE("A body that follows the blade gives what building it anew on the same
 }
 
 TEST_CASE("A run whose systems are updated tells of about the same wound as one that rebuilds them") {
-  // At -0.042 rounding decides whether the first increment has a pair of nodes at the mouth of the wound, where it
-  // opens by a quarter more.
-  const std::string text =
-      replaced(replaced(long_block + incision_at_end, "[-0.042, 0.001, 0.033]", "[-0.0428, 0.001, 0.033]"),
-               "[-0.043, 0.001, 0.015]", "[-0.04283, 0.001, 0.015]");
-  Session updated = session_of(text);
-  Session rebuilt = session_of(text);
+  Session updated = session_of(long_block + incision_at_end);
+  Session rebuilt = session_of(long_block + incision_at_end);
   rebuilt.set_updating(false);
   const std::vector<StepResult> a = run(updated);
   const std::vector<StepResult> b = run(rebuilt);
@@ -467,7 +462,8 @@ TEST_CASE("A run whose systems are updated tells of about the same wound as one 
     // The maps to rest differ by the finer cells that a rebuild has at the front, so nodes beside the cut may too.
     CHECK(a[i].cut->area == Approx(b[i].cut->area).epsilon(2e-3));
     CHECK(a[i].cut->pieces == b[i].cut->pieces);
-    CHECK(a[i].cut->opening == Approx(b[i].cut->opening).epsilon(0.1).margin(2e-6));
+    // The largest opening is that of a pair at the mouth, and rounding may decide whether there is one more.
+    CHECK(a[i].cut->opening_volume == Approx(b[i].cut->opening_volume).epsilon(0.05).margin(1e-10));
   }
 }
 
