@@ -50,15 +50,28 @@ MatrixX gram_of_rows(const MatrixX& a) {
 void add_product(double factor, const MatrixX& a, bool transposed, const MatrixX& b, MatrixX& c) {
   const int m = static_cast<int>(c.rows()), n = static_cast<int>(c.cols()), k = static_cast<int>(b.rows()),
             lda = static_cast<int>(a.rows());
+  if (transposed) {
+    add_transposed_product(factor, a.data(), lda, b, c);
+    return;
+  }
   if (m == 0 || n == 0 || k == 0)
     return;
   const double one = 1;
-  if (n == 1) {
-    const int columns = static_cast<int>(a.cols());
-    dgemv_(transposed ? "T" : "N", &lda, &columns, &factor, a.data(), &lda, b.data(), &unit, &one, c.data(), &unit);
+  if (n == 1)
+    dgemv_("N", &m, &k, &factor, a.data(), &lda, b.data(), &unit, &one, c.data(), &unit);
+  else
+    dgemm_("N", "N", &m, &n, &k, &factor, a.data(), &lda, b.data(), &k, &one, c.data(), &m);
+}
+
+void add_transposed_product(double factor, const double* a, int lda, const MatrixX& b, MatrixX& c) {
+  const int m = static_cast<int>(c.rows()), n = static_cast<int>(c.cols()), k = static_cast<int>(b.rows());
+  if (m == 0 || n == 0 || k == 0)
     return;
-  }
-  dgemm_(transposed ? "T" : "N", "N", &m, &n, &k, &factor, a.data(), &lda, b.data(), &k, &one, c.data(), &m);
+  const double one = 1;
+  if (n == 1)
+    dgemv_("T", &k, &m, &factor, a, &lda, b.data(), &unit, &one, c.data(), &unit);
+  else
+    dgemm_("T", "N", &m, &n, &k, &factor, a, &lda, b.data(), &k, &one, c.data(), &m);
 }
 
 void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& b) {

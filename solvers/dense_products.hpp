@@ -11,6 +11,8 @@ namespace spherecut::solvers {
 [[nodiscard]] MatrixX gram_of_rows(const MatrixX& a);
 /// C += factor A B, or factor A^T B. The shapes must fit.
 void add_product(double factor, const MatrixX& a, bool transposed, const MatrixX& b, MatrixX& c);
+/// C += factor A^T B, A with leading dimension `lda`, of as many rows as B and columns as C has rows.
+void add_transposed_product(double factor, const double* a, int lda, const MatrixX& b, MatrixX& c);
 /// Columns of B become L^-1 B, or L^-T B, of a lower triangle with leading dimension `lda`.
 void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& b);
 /// Rows of B become those of B L^-T, of a lower triangle with leading dimension `lda`.

@@ -1,6 +1,7 @@
 #include "solvers/factorisation.hpp"
 
 #include "solvers/cholmod_workspace.inl"
+#include "solvers/dense_products.hpp"
 #include "solvers/large_pages.hpp"
 #include "solvers/sparse_compliance.hpp"
 #include "topology/errors.hpp"
@@ -200,7 +201,27 @@ class CholeskyFactorisation final : public OrderedCholesky {
 
   MatrixX solve(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_A, right_hand_sides); }
   MatrixX forward(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_L, right_hand_sides); }
-  MatrixX backward(const MatrixX& right_hand_sides) const override { return solve_with(CHOLMOD_Lt, right_hand_sides); }
+  void backward(int known, MatrixX& x) const override {
+    const SupernodalFactor lower = supernodes();
+    const int wanted = lower.size - known;
+    MatrixX own, below;
+    for (int s = lower.supernodes; s-- > 0;) {
+      const int begin = lower.first_column[s], width = std::min(lower.first_column[s + 1], wanted) - begin;
+      if (width <= 0)
+        continue;
+      const int height = lower.first_row[s + 1] - lower.first_row[s];
+      const int* const row = lower.row + lower.first_row[s] + width;
+      const double* const panel = lower.value + lower.panel[s];
+      own = x.middleRows(begin, width);
+      below.resize(height - width, x.cols());
+      for (Eigen::Index c = 0; c < below.cols(); ++c)
+        for (Eigen::Index k = 0; k < below.rows(); ++k)
+          below(k, c) = x(row[k], c);
+      add_transposed_product(-1, panel + width, height, below, own);
+      triangular_solve(true, panel, height, own);
+      x.middleRows(begin, width) = own;
+    }
+  }
   MatrixX trailing(int count) const override {
     const SupernodalFactor lower = supernodes();
     const int first = lower.size - count;

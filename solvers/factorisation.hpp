@@ -26,9 +26,11 @@ class Factorisation {
 /// needs.
 class OrderedCholesky : public Factorisation {
  public:
-  /// L^-1 B and L^-T B.
+  /// L^-1 B.
   [[nodiscard]] virtual MatrixX forward(const MatrixX& right_hand_sides) const = 0;
-  [[nodiscard]] virtual MatrixX backward(const MatrixX& right_hand_sides) const = 0;
+  /// Solutions X of L^T X = B of which the last `known` rows are there already: the others of `x` are those of B, and
+  /// become those of X.
+  virtual void backward(int known, MatrixX& x) const = 0;
   /// B^T A^-1 B of sparse columns B.
   [[nodiscard]] virtual MatrixX compliance(const SparseMatrix& columns) const = 0;
   /// The last `count` rows and columns of L, dense; zeros above the diagonal.

@@ -166,11 +166,11 @@ double SubStructure::condition() const {
 void SubStructure::recover(const FemNodes& nodes, const VectorX& right) {
   const Eigen::Index between = 3 * static_cast<Eigen::Index>(between_count_);
   const VectorX x = near_factor_->solve(right);
-  VectorX far;
+  MatrixX far;
   if (far_ != nullptr) {
-    VectorX back = halfway_;
-    back.tail(between) = root_.triangularView<Eigen::Lower>().transpose() * x.tail(between);
-    far = far_->backward(back);
+    far = halfway_;
+    far.bottomRows(between) = x.tail(between);
+    far_->backward(static_cast<int>(between), far);
   }
   displacement_ = VectorX::Zero(3 * static_cast<Eigen::Index>(nodes.positions.size()));
   for (std::size_t i = 0; i < nodes.positions.size(); ++i) {
@@ -178,7 +178,7 @@ void SubStructure::recover(const FemNodes& nodes, const VectorX& right) {
     if (near_place_[i] >= 0)
       displacement_.segment<3>(at) = x.segment<3>(3 * static_cast<Eigen::Index>(near_place_[i]));
     else if (far_place_[i] >= 0)
-      displacement_.segment<3>(at) = far.segment<3>(3 * static_cast<Eigen::Index>(far_place_[i]));
+      displacement_.segment<3>(at) = far.middleRows<3>(3 * static_cast<Eigen::Index>(far_place_[i]));
     else
       displacement_.segment<3>(at) = nodes.prescribed[i];
   }

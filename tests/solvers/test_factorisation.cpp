@@ -76,6 +76,22 @@ TEST_CASE("Cholesky and LU factorisations solve what dense solvers solve") {
   }
 }
 
+TEST_CASE("Halves of a solution, the second where its last rows are known") {
+  for (const int size : {6, 60, 250}) {
+    const MatrixX general = random_matrix(size, 4, 3, 21);
+    const MatrixX symmetric = general * general.transpose() + MatrixX::Identity(size, size);
+    const MatrixX right = random_right(size, 3), exact = symmetric.llt().solve(right);
+    const auto cholesky = solvers::factor_ordered(lower(symmetric));
+    for (const int known : {0, 1, size / 3, size}) // also in the middle of a supernode
+      for (const int columns : {1, 3}) {
+        MatrixX x = cholesky->forward(right.leftCols(columns));
+        x.bottomRows(known) = exact.leftCols(columns).bottomRows(known);
+        cholesky->backward(known, x);
+        CHECK((x - exact.leftCols(columns)).norm() < 1e-10 * exact.norm());
+      }
+  }
+}
+
 TEST_CASE("Many right-hand sides at once agree with one at a time") {
   const MatrixX general = random_matrix(130, 4, 3, 11);
   const MatrixX right = random_right(130, 37); // not a multiple of the panel's width
