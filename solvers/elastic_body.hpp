@@ -20,6 +20,7 @@ struct NodalSupports {
   std::vector<int> nodes;
   std::vector<double> value;
   std::vector<Vector3> gradient; // 1/m
+  std::vector<double> growth;    // per node, of all radii for its support alone
   double worst_moment_condition = 0;
   /// u_h(x_i), 3 a node, m.
   [[nodiscard]] VectorX displacements(const Field& field) const;
@@ -29,6 +30,11 @@ struct NodalSupports {
 /// is not sound.
 NodalSupports nodal_supports(const Spheres& spheres);
 NodalSupports nodal_supports(const Spheres& spheres, const std::vector<int>& nodes);
+
+/// Supports of nodes of which was[i] tells what they were in `before`, with the new numbers `place` of those nodes; -1:
+/// found anew, the next of `fresh`.
+NodalSupports renewed_supports(const NodalSupports& before, const NodalSupports& fresh, const std::vector<int>& was,
+                               const std::vector<int>& place);
 
 /// Throws InputError for bad material, fewer than 4 nodes, arrays of unequal length, non-finite positions, a
 /// prescribed node out of range, a component prescribed twice, or nothing prescribed (the body would float: 6 rigid

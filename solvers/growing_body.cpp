@@ -29,16 +29,31 @@ GrowingBody::GrowingBody(Problem problem, GrowthOptions options)
 }
 
 void GrowingBody::number_nodes() {
-  id_.clear();
-  compact_.clear();
+  std::vector<int> ids, compact;
   for (const char gone : cut_->removed()) {
     if (gone == 0)
-      id_.push_back(static_cast<int>(compact_.size()));
-    compact_.push_back(gone == 0 ? static_cast<int>(id_.size()) - 1 : -1);
+      ids.push_back(static_cast<int>(compact.size()));
+    compact.push_back(gone == 0 ? static_cast<int>(ids.size()) - 1 : -1);
   }
-  supports_ = nodal_supports(cut_->spheres(), id_);
-  for (int& node : supports_.nodes)
-    node = compact_[node];
+  std::vector<int> place; // of the nodes before
+  place.reserve(id_.size());
+  for (const int id : id_)
+    place.push_back(compact[id]);
+  const std::vector<char>& altered = cut_->altered();
+  std::vector<int> was, anew;
+  for (const int id : ids) {
+    const int before = id < std::ssize(compact_) ? compact_[id] : -1;
+    const bool stays = before >= 0 && altered[id] == 0 && supports_.growth[before] == 1;
+    was.push_back(stays ? before : -1);
+    if (!stays)
+      anew.push_back(id);
+  }
+  NodalSupports fresh = nodal_supports(cut_->spheres(), anew);
+  for (int& node : fresh.nodes)
+    node = compact[node];
+  supports_ = renewed_supports(supports_, fresh, was, place);
+  id_ = std::move(ids);
+  compact_ = std::move(compact);
 }
 
 BodyGrowth GrowingBody::grow(const SprinkleIncrement& change, Problem grown,

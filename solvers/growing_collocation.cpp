@@ -24,33 +24,6 @@ constexpr double lifted = 0.15; // eyes are lifted off a sheet, in spacings
 
 } // namespace
 
-/// Supports of the nodes marked are found again, the others get the new numbers.
-NodalSupports GrowingCollocation::next_supports(const Next& next, const std::vector<char>& seen_anew) const {
-  std::vector<int> found;
-  for (int i = 0; i < std::ssize(seen_anew); ++i)
-    if (seen_anew[i] != 0)
-      found.push_back(i);
-  const NodalSupports fresh = nodal_supports(*next.spheres, found);
-  NodalSupports supports;
-  supports.start.assign(1, 0);
-  supports.worst_moment_condition = std::max(fresh.worst_moment_condition, supports_.worst_moment_condition);
-  const auto append = [&](const NodalSupports& from, int row, const std::vector<int>* place) {
-    for (int k = from.start[row]; k < from.start[row + 1]; ++k) {
-      supports.nodes.push_back(place != nullptr ? (*place)[from.nodes[k]] : from.nodes[k]);
-      supports.value.push_back(from.value[k]);
-      supports.gradient.push_back(from.gradient[k]);
-    }
-    supports.start.push_back(static_cast<int>(supports.nodes.size()));
-  };
-  int next_fresh = 0;
-  for (std::size_t i = 0; i < seen_anew.size(); ++i)
-    if (seen_anew[i] != 0)
-      append(fresh, next_fresh++, nullptr);
-    else
-      append(supports_, next.was[i], &next.place);
-  return supports;
-}
-
 GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& change, std::vector<int> place,
                                                      const Problem& grown, GrowthReport& report) const {
   const Stopwatch sphere_watch;
@@ -133,7 +106,13 @@ GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& ch
   for (const topology::CellFace& face : cells.faces) // whose rows ask for each other's supports
     if (seen_anew[face.first] != 0 || seen_anew[face.second] != 0)
       next.wanted[face.first] = next.wanted[face.second] = 1;
-  next.supports = next_supports(next, seen_anew);
+  std::vector<int> found, known = next.was;
+  for (int i = 0; i < count; ++i)
+    if (seen_anew[i] != 0) {
+      found.push_back(i);
+      known[i] = -1;
+    }
+  next.supports = renewed_supports(supports_, nodal_supports(*next.spheres, found), known, next.place);
   assemble_rows(grown, cells, *next.spheres, next.supports, mixed_, next.wanted, next.rows);
   for (const Anchor& anchor : anchors_)
     if (const int node = next.place[anchor.node]; node >= 0 && next.wanted[node] != 0)

@@ -42,7 +42,6 @@ class GrowingCollocation final : public Collocation, public Growable {
   void make_window();
   [[nodiscard]] Next next_of(const SprinkleIncrement& change, std::vector<int> place, const Problem& grown,
                              GrowthReport& report) const;
-  [[nodiscard]] NodalSupports next_supports(const Next& next, const std::vector<char>& seen_anew) const;
   void find_changed_rows(Next& next) const;
   /// Why the window does not cover it; empty: it does.
   [[nodiscard]] const char* hindrance(const Next& next, const std::vector<int>& slot) const;

@@ -21,6 +21,9 @@ namespace {
 /// Of the nodes: a window predicted to hold more than that holds all of them, where one is asked for all the same. The
 /// rest costs little to carry along, and no cut leaves its way then.
 constexpr double whole_window = 0.85;
+/// How far from where its way begins a cut is going to change the system, in spacings.
+constexpr double first_reach = 6;
+constexpr std::size_t first_part = 5; // one of so many parts of the way is where it begins
 
 } // namespace
 
@@ -129,6 +132,7 @@ void GrowingCut::State::condense_all() {
     elastic_order.push_back(id[node]);
 
   spheres = make_spheres();
+  altered.assign(problem.nodes.size(), 1);
   shares.reset();
   lip_shares.reset();
   means.clear();
@@ -207,6 +211,7 @@ void GrowingCut::State::condense_all() {
   }
   slot.assign(problem.nodes.size(), -1);
   window_node.assign(static_cast<std::size_t>(window->slots() / 3), -1);
+  left_alone.assign(window_node.size(), 0);
   far_order.clear();
   for (int k = 0; k < std::ssize(order); ++k) {
     const int node = id[stiffness.order[order[k]]], s = window->slot_of(3 * k);
@@ -224,7 +229,11 @@ void GrowingCut::State::condense_all() {
   for (Eigen::Index k = 0; k < std::ssize(order); ++k)
     ordered.segment<3>(3 * k) = first_loads.segment<3>(3 * id[stiffness.order[order[k]]]);
   reduced_first = window->reduce(ordered);
-  window->factor();
+  std::vector<Vector3> begin; // of the way
+  for (std::size_t t = 0; t < options.way.triangles.size() / first_part + 1; ++t)
+    for (const int corner : options.way.triangles[t])
+      begin.push_back(options.way.vertices[corner]);
+  factor_window(begin, first_reach * *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end()));
   condense_contact();
 }
 
@@ -294,9 +303,9 @@ GrowingCut::State::increment(const NodeChange& change,
 
   const Stopwatch sphere_watch;
   const std::vector<double>& old_radii = spheres->radii();
-  increment.spheres = std::make_unique<Spheres>(next.nodes.positions, next.nodes.*galerkin_lengths(next.material), rho,
-                                                Basis::linear, worst_moment_condition,
-                                                sight_about_cut(next, Method::galerkin, options.method.sight), gone);
+  increment.spheres = std::make_unique<Spheres>(
+      next.nodes.positions, next.nodes.*galerkin_lengths(next.material), rho, Basis::linear, worst_moment_condition,
+      sight_about_cut(next, Method::galerkin, options.method.sight), gone, spheres.get());
   std::vector<double> radii = increment.spheres->radii();
   std::vector<int> changed_nodes = change.removed;
   for (int i = 0; i < next.nodes.size(); ++i)
@@ -311,7 +320,7 @@ GrowingCut::State::increment(const NodeChange& change,
                       SpacingAt(next.nodes, gone, galerkin_lengths(next.material)), 2 * slack);
   for (std::size_t i = 0; i < old_radii.size(); ++i)
     radii[i] = std::max(radii[i], old_radii[i]);
-  BoundingBox touched{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
+  BoundingBox& touched = increment.touched;
   const auto include = [&](const Vector3& x, double reach) {
     touched.lower = touched.lower.cwiseMin((x.array() - reach).matrix());
     touched.upper = touched.upper.cwiseMax((x.array() + reach).matrix());
@@ -351,6 +360,69 @@ GrowingCut::State::increment(const NodeChange& change,
     increment.moved.push_back(moved ? 1 : 0);
   }
   return increment;
+}
+
+/// The boxes that an increment touches as they are after it.
+std::vector<GrowingCut::State::Box> GrowingCut::State::evaluated(const Increment& increment) const {
+  std::vector<Box> fresh_boxes(increment.boxes.size());
+  const SharedSightTime shared_sight;
+  parallel_ranges(static_cast<int>(fresh_boxes.size()), 16, [&](int begin, int end) {
+    const SharedSightTime::Part timed(shared_sight);
+    CellEvaluator evaluator(*increment.spheres);
+    BackgroundCells filled;
+    for (int k = begin; k < end; ++k) {
+      Box& fresh = fresh_boxes[k];
+      const Box& old = boxes[increment.boxes[k]];
+      fresh.box = old.box;
+      if (increment.moved[k] != 0) {
+        refill_box(*increment.next.domain, fresh.box, background(), increment.next.incision.get(), filled);
+        for (int c = 0; c + 1 < std::ssize(filled.start); ++c) {
+          fresh.points.emplace_back(filled.of(c).begin(), filled.of(c).end());
+          fresh.include(filled.of(c));
+        }
+      } else {
+        fresh.points = old.points;
+        fresh.extent = old.extent;
+      }
+      evaluate(fresh, evaluator);
+    }
+  });
+  return fresh_boxes;
+}
+
+void GrowingCut::State::find_altered(const Increment& increment) {
+  const std::vector<Vector3>& positions = increment.next.nodes.positions;
+  const double enriched = enrichment_reach();
+  const auto known = std::ssize(altered);
+  altered.assign(positions.size(), 1);
+  for (Eigen::Index i = 0; i < known; ++i) {
+    const double room = 0.01 * increment.next.nodes.spacings[i]; // a point on the cut is seen from beside it
+    if (((positions[i] - increment.touched.lower).array() < -room).any() ||
+        ((increment.touched.upper - positions[i]).array() < -room).any()) {
+      altered[i] = 0;
+      continue;
+    }
+    altered[i] = increment.concerns(positions[i], room, enriched) ||
+                         increment.reach->at_front(positions[i], Vector3::Constant(room))
+                     ? 1
+                     : 0;
+  }
+}
+
+/// Cells of a box that are not as they were, and what they were. One that came out as it was cancels itself.
+void GrowingCut::State::find_changed(const Box& before, const Box& after, std::vector<const CellShapes*>& gone,
+                                     std::vector<const CellShapes*>& come) {
+  const std::size_t common = std::min(before.cells.size(), after.cells.size());
+  const auto is_same = [&](std::size_t c) {
+    return c < common && before.cells[c].nodes == after.cells[c].nodes &&
+           before.cells[c].gradients == after.cells[c].gradients;
+  };
+  for (std::size_t c = 0; c < before.cells.size(); ++c)
+    if (!is_same(c))
+      gone.push_back(&before.cells[c]);
+  for (std::size_t c = 0; c < after.cells.size(); ++c)
+    if (!is_same(c))
+      come.push_back(&after.cells[c]);
 }
 
 GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
@@ -394,31 +466,7 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   for (int k = 0; k < change.added.size(); ++k)
     new_slot.push_back(s.next_room + k);
   std::vector<std::pair<int, State::Box>> exchanged;
-  std::vector<State::Box> fresh_boxes(touched_boxes.size());
-  {
-    const SharedSightTime shared_sight;
-    parallel_ranges(static_cast<int>(touched_boxes.size()), 16, [&](int begin, int end) {
-      const SharedSightTime::Part timed(shared_sight);
-      CellEvaluator evaluator(*fresh_spheres);
-      BackgroundCells filled;
-      for (int k = begin; k < end; ++k) {
-        State::Box& fresh = fresh_boxes[k];
-        const State::Box& old = s.boxes[touched_boxes[k]];
-        fresh.box = old.box;
-        if (increment.moved[k] != 0) {
-          refill_box(*next.domain, fresh.box, s.background(), incision.get(), filled);
-          for (int c = 0; c + 1 < std::ssize(filled.start); ++c) {
-            fresh.points.emplace_back(filled.of(c).begin(), filled.of(c).end());
-            fresh.include(filled.of(c));
-          }
-        } else {
-          fresh.points = old.points;
-          fresh.extent = old.extent;
-        }
-        State::evaluate(fresh, evaluator);
-      }
-    });
-  }
+  std::vector<State::Box> fresh_boxes = s.evaluated(increment);
   for (std::size_t k = 0; k < touched_boxes.size(); ++k) {
     for (const State::Box* one : {&std::as_const(fresh_boxes[k]), &std::as_const(s.boxes[touched_boxes[k]])})
       for (const CellShapes& cell : one->cells)
@@ -482,6 +530,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   if (outside != nullptr)
     return anew(outside, std::move(next), std::move(removed));
 
+  s.find_altered(increment);
+
   // Exchange.
   const Eigen::Index grown = 3 * static_cast<Eigen::Index>(next.nodes.size());
   s.cell_loads.conservativeResizeLike(VectorX::Zero(grown));
@@ -495,20 +545,8 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   s.next_room += change.added.size();
   s.slot = std::move(new_slot);
   std::vector<const CellShapes*> gone, come;
-  for (const auto& [b, box] : exchanged) {
-    // A cell that came out as it was cancels itself.
-    const std::vector<CellShapes>& old_cells = s.boxes[b].cells;
-    const auto is_same = [&, &fresh = box.cells](std::size_t c) {
-      return c < old_cells.size() && c < fresh.size() && old_cells[c].nodes == fresh[c].nodes &&
-             old_cells[c].gradients == fresh[c].gradients;
-    };
-    for (std::size_t c = 0; c < old_cells.size(); ++c)
-      if (!is_same(c))
-        gone.push_back(&old_cells[c]);
-    for (std::size_t c = 0; c < box.cells.size(); ++c)
-      if (!is_same(c))
-        come.push_back(&box.cells[c]);
-  }
+  for (const auto& [b, box] : exchanged)
+    State::find_changed(s.boxes[b], box, gone, come);
   StiffnessTiles tiles(next.nodes.positions);
   tiles.add_all(gone, -1);
   tiles.add_all(come, 1);
@@ -614,15 +652,21 @@ double GrowingCut::prepare(const NodeChange& change, const std::shared_ptr<const
     if (const int block = node < std::ssize(s.slot) ? s.slot[node] : -1; block >= 0)
       std::fill_n(kept.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
   };
-  for (const int b : next.boxes)
-    for (const CellShapes& cell : s.boxes[b].cells)
-      for (int node : cell.nodes)
-        keep(node);
+  const std::vector<State::Box> boxes = s.evaluated(next);
+  std::vector<const CellShapes*> changed;
+  for (std::size_t k = 0; k < boxes.size(); ++k)
+    State::find_changed(s.boxes[next.boxes[k]], boxes[k], changed, changed);
+  for (const CellShapes* cell : changed)
+    for (const int node : cell->nodes)
+      keep(node);
   for (const DisplacementMean& mean : s.held)
     if (s.is_concerned(mean, next))
-      for (int node : mean.nodes)
-        keep(node);
-  s.window->prepare(kept);
+      if (const DisplacementMean weighed = reweighed(mean, *next.spheres); !equal_to_rounding(mean, weighed))
+        for (const DisplacementMean* one : {&mean, &weighed})
+          for (const int node : one->nodes)
+            keep(node);
+  s.window->prepare({std::move(kept)});
+  s.is_prepared = true;
   s.window->see_ahead(s.contact_functionals(), s.window_right(s.loads));
   return watch.seconds();
 }

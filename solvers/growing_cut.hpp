@@ -25,8 +25,8 @@ struct NodeChange {
 
 struct GrowthOptions {
   DiscretisationOptions method; // galerkin
-  /// Where the faces of the cut may come to lie in the next increments (rest frame): the predicted way of the blade. A
-  /// cut that leaves it is handled all the same, by condensing anew along `way`.
+  /// Where the faces of the cut may come to lie in the next increments (rest frame): the predicted way of the blade,
+  /// from its first triangle on. A cut that leaves it is handled all the same, by condensing anew along `way`.
   topology::SurfaceMesh way;
   std::vector<int> contact; // candidates of the tool: free surface nodes
   int room = 200;           // nodes that may be added before the window is condensed anew
@@ -43,7 +43,7 @@ struct GrowthReport {
   const char* reason = ""; // why it had to be, or cannot
   int boxes = 0;           // background boxes exchanged; rows of cells made again (collocation)
   int window_nodes = 0;    // nodes in the dense system
-  bool prepared = false;   // what prepare() had eliminated ahead could stay
+  bool prepared = false;   // all that was eliminated ahead could stay
   int factored = 0;        // unknowns of the dense system factored in the increment itself
   double spheres_seconds = 0, cells_seconds = 0, factor_seconds = 0, condense_seconds = 0, total_seconds = 0;
 };
@@ -65,9 +65,9 @@ class GrowingCut {
   GrowthReport grow(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
                     const std::function<topology::SurfaceMesh()>& way_ahead = {}, bool only_update = false);
 
-  /// Work ahead of the next increment, where it is known: eliminates the part of the window that it will not touch.
-  /// Returns the seconds it took (those of the background, not of the increment). Another increment than this one costs
-  /// the whole window, no more. Throws as grow() does.
+  /// Work ahead of the next increment, where it is known: finds which unknowns it will change and eliminates the others
+  /// in the window. Returns the seconds it took (those of the background, not of the increment). Another increment than
+  /// this one costs what of that it changes, no more than the whole window. Throws as grow() does.
   double prepare(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision);
 
   /// Condenses anew about another predicted way (in the background of a real-time loop, from a copy of problem()).
@@ -90,6 +90,8 @@ class GrowingCut {
   // What a discretisation on top of it asks for (growing_body.hpp). Vectors have 3 entries a node, removed ones
   // included.
   [[nodiscard]] const Spheres& spheres() const;
+  /// Per node: 0 where the last increment left the shape functions at it as they were.
+  [[nodiscard]] const std::vector<char>& altered() const;
   [[nodiscard]] const std::vector<DisplacementMean>& held() const;         // one per entry of problem().prescribed
   [[nodiscard]] const DisplacementMean& mean(int node) const;              // where a force on this node acts
   [[nodiscard]] const AssemblyReport& report() const;                      // of the last condensation

@@ -2,10 +2,23 @@
 #include "solvers/growing_cut_state.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace spherecut::solvers {
+
+namespace {
+
+/// How far a cut may go on, in spacings, until each stage of what was eliminated ahead of it (schur_window.hpp) has to
+/// be chosen anew: what the next few increments leave alone is not eliminated again with what only the next of them
+/// does.
+constexpr std::array advances_before_stages{2.0, 0.6, 0.15};
+constexpr int recent = 8; // increments: what the last ones left alone the last stage eliminates, however near
+constexpr double worth_a_stage = 0.85; // of the nodes that are left: so many at most a further stage leaves
+
+} // namespace
 
 /// Right-hand side by slots under `right` (3N), which differs from the first loads in window nodes alone.
 VectorX GrowingCut::State::window_right(const VectorX& right) const {
@@ -84,7 +97,7 @@ CaseResponses GrowingCut::State::condense_cases(const MatrixX& forces, const std
     }
   const OnWindow on = on_window(all);
   const SchurWindow::Half halves = window->half(on.by_slot);
-  const SchurWindow::Half of_cases{halves.ahead.leftCols(cases), halves.rest.leftCols(cases)};
+  const SchurWindow::Half of_cases = halves.left_columns(cases);
   MatrixX products = SchurWindow::product(halves, of_cases); // all x cases
   const MatrixX far_products = on.far_half.transpose() * on.far_half;
   for (Eigen::Index c = 0; c < far_products.cols() && on.far_columns[c] < cases; ++c)
@@ -137,36 +150,66 @@ VectorX GrowingCut::State::elastic_forces(const VectorX& coefficients) const {
   return forces;
 }
 
-std::vector<char> GrowingCut::State::slots_within(const std::vector<Vector3>& places, double reach) const {
+bool GrowingCut::State::factor_window(const std::vector<Vector3>& places, double reach) {
   const Nearness to_places(places);
-  std::vector<char> slots(window->slots(), 0);
-  for (Eigen::Index block = 0; block < std::ssize(window_node); ++block)
-    if (const int node = window_node[block]; node >= 0 && to_places(problem.nodes.positions[node]) <= reach)
-      std::fill_n(slots.begin() + 3 * block, 3, 1);
-  return slots;
-}
-
-bool GrowingCut::State::factor_window(const std::vector<Vector3>& places) {
-  const Nearness to_places(places);
-  double reach = 0;
-  for (Eigen::Index block = 0; block < std::ssize(window_node); ++block)
-    if (const int node = window_node[block], first = 3 * static_cast<int>(block);
-        node >= 0 && (window->changed(first) || window->changed(first + 1) || window->changed(first + 2)))
-      reach = std::max(reach, to_places(problem.nodes.positions[node]));
-  if (window->is_prepared() || !std::isfinite(reach))
-    return window->factor();
+  std::vector<double> distance(window_node.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t block = 0; block < window_node.size(); ++block)
+    if (const int node = window_node[block], first = 3 * static_cast<int>(block); node >= 0) {
+      distance[block] = to_places(problem.nodes.positions[node]);
+      ++left_alone[block];
+      if (window->changed(first) || window->changed(first + 1) || window->changed(first + 2)) {
+        reach = std::max(reach, distance[block]);
+        left_alone[block] = 0;
+      }
+    }
+  const int stages = window->stages();
+  const bool stood = stages > 0 && window->keep_sound_stages() == stages;
+  if (std::exchange(is_prepared, false) && stood) { // so the next one will be, too
+    window->factor();
+    return true;
+  }
+  std::vector<int> left; // blocks
+  for (int block = 0; block < std::ssize(window_node); ++block)
+    if (std::isfinite(distance[block]) && window->is_kept(3 * block))
+      left.push_back(block);
   const double finest = *std::min_element(problem.nodes.spacings.begin(), problem.nodes.spacings.end());
-  window->prepare(slots_within(places, reach + advance_before_new * finest));
-  return false;
+  std::vector<std::vector<char>> kept;
+  for (const double advance : advances_before_stages) {
+    const bool is_last = advance == advances_before_stages.back();
+    std::vector<int> wanted;
+    for (const int block : left)
+      if (distance[block] <= reach + advance * finest && (!is_last || left_alone[block] < recent))
+        wanted.push_back(block);
+    if (wanted.empty() || static_cast<double>(wanted.size()) > worth_a_stage * static_cast<double>(left.size()))
+      continue;
+    std::vector<char>& slots = kept.emplace_back(window->slots(), 0);
+    for (const int block : wanted)
+      std::fill_n(slots.begin() + 3 * static_cast<std::ptrdiff_t>(block), 3, 1);
+    left = std::move(wanted);
+  }
+  window->prepare(kept);
+  return stood;
 }
 
-MatrixX GrowingCut::State::contact_functionals() const {
-  const auto count = static_cast<Eigen::Index>(contact.size());
-  MatrixX functionals = MatrixX::Zero(window->slots(), 3 * count);
-  for (Eigen::Index c = 0; c < count; ++c)
+SparseMatrix GrowingCut::State::contact_functionals() const {
+  SparseMatrix functionals(window->slots(), 3 * std::ssize(contact));
+  Eigen::Index entries = 0;
+  for (const DisplacementMean& mean : contact)
+    entries += 3 * std::ssize(mean.nodes);
+  functionals.reserve(entries);
+  std::vector<std::pair<int, double>> of_blocks; // weights, by the places of the nodes
+  for (Eigen::Index c = 0; c < std::ssize(contact); ++c) {
+    of_blocks.clear();
     for (std::size_t k = 0; k < contact[c].nodes.size(); ++k)
-      for (int a = 0; a < 3; ++a)
-        functionals(3 * slot[contact[c].nodes[k]] + a, 3 * c + a) += contact[c].weights[k];
+      of_blocks.emplace_back(slot[contact[c].nodes[k]], contact[c].weights[k]);
+    std::sort(of_blocks.begin(), of_blocks.end());
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      functionals.startVec(3 * c + axis);
+      for (const auto& [block, weight] : of_blocks)
+        functionals.insertBack(3 * static_cast<Eigen::Index>(block) + axis, 3 * c + axis) = weight;
+    }
+  }
+  functionals.finalize();
   return functionals;
 }
 
@@ -195,6 +238,9 @@ const VectorX& GrowingCut::base_displacement() const {
 
 const Spheres& GrowingCut::spheres() const {
   return *state_->spheres;
+}
+const std::vector<char>& GrowingCut::altered() const {
+  return state_->altered;
 }
 const std::vector<DisplacementMean>& GrowingCut::held() const {
   return state_->held;

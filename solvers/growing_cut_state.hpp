@@ -53,12 +53,15 @@ struct GrowingCut::State {
   double rho = 2;
   std::vector<char> removed;
   std::unique_ptr<Spheres> spheres;
+  std::vector<char> altered; // by node, as GrowingCut::altered
   std::vector<Box> boxes;
   std::vector<DisplacementMean> held;
   std::unique_ptr<SchurWindow> window;
   std::vector<int> far_order;   // node of every far rank
   std::vector<int> slot;        // block of three slots of every node in the window, -1 outside
   std::vector<int> window_node; // node of every block of slots, -1 for room
+  std::vector<int> left_alone;  // increments since one has changed a block of slots
+  bool is_prepared = false;     // for the next increment, which is known
   int next_room = 0;
   VectorX cell_loads;                                 // 3N: body force and initial strain
   VectorX first_loads;                                // 3N at condensation, all loads
@@ -85,8 +88,9 @@ struct GrowingCut::State {
     Changes changes{};
     std::optional<Reach> reach{};
     std::vector<std::pair<Vector3, double>> balls{}; // places and radii of the spheres that change
-    std::vector<int> boxes{};                        // touched
-    std::vector<char> moved{};                       // of these: their points are placed anew
+    BoundingBox touched{Vector3::Constant(1e300), Vector3::Constant(-1e300)}; // about all that may change, m
+    std::vector<int> boxes{};                                                 // touched
+    std::vector<char> moved{};                                                // of these: their points are placed anew
 
     /// Whether something within `half` m of x changes; `enriched`: reach of the enrichment in sphere radii.
     [[nodiscard]] bool concerns(const Vector3& x, double half, double enriched) const {
@@ -108,6 +112,11 @@ struct GrowingCut::State {
 
   [[nodiscard]] Increment increment(const NodeChange& change,
                                     const std::shared_ptr<const topology::Incision>& incision) const;
+
+  void find_altered(const Increment& increment);
+  [[nodiscard]] std::vector<Box> evaluated(const Increment& increment) const;
+  static void find_changed(const Box& before, const Box& after, std::vector<const CellShapes*>& gone,
+                           std::vector<const CellShapes*>& come);
 
   [[nodiscard]] BackgroundOptions background() const { return background_of(options.method); }
   [[nodiscard]] std::unique_ptr<Spheres> make_spheres() const {
@@ -262,14 +271,13 @@ struct GrowingCut::State {
             1,   nodes_may_coarsen};
   }
 
-  /// Factors the window. What the next increments are not going to touch is eliminated on the way and stands until
-  /// one does. `places`: what is new of the cut. Whether it stood.
-  bool factor_window(const std::vector<Vector3>& places);
-  /// Slots that change where a node near new places of the cut does, up to `reach` m.
-  [[nodiscard]] std::vector<char> slots_within(const std::vector<Vector3>& places, double reach) const;
+  /// Factors the window. What the next increments are not going to touch is eliminated on the way, in stages, and
+  /// stands until one does. `places`: what is new of the cut; `reach`: how far from there they are going to change the
+  /// system at least, m. Whether all of it stood.
+  bool factor_window(const std::vector<Vector3>& places, double reach = 0);
   void condense_all();
   void condense_contact();
-  [[nodiscard]] MatrixX contact_functionals() const; // slots x 3 per candidate
+  [[nodiscard]] SparseMatrix contact_functionals() const; // slots x 3 per candidate
   [[nodiscard]] VectorX window_right(const VectorX& right) const;
   /// Forces (3N rows) as the window sees them.
   struct OnWindow {

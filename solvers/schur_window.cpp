@@ -8,8 +8,6 @@
 
 extern "C" {
 void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
-void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
-            const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a,
             const int* lda, const double* beta, double* c, const int* ldc);
 void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha,
@@ -90,8 +88,9 @@ void SchurWindow::activate(const std::vector<int>& slots) {
   for (const int slot : slots) {
     active_[slot] = 1;
     // What is done ahead knows the slots that were free then, not one that has changed hands since.
-    if (!ahead_.empty() && (kept_place_[slot] < 0 || active_ahead_[slot] != 0))
-      ahead_.clear();
+    stages_.erase(
+        std::find_if(stages_.begin(), stages_.end(), [&](const Stage& stage) { return stage.place[slot] != free; }),
+        stages_.end());
   }
 }
 
@@ -109,84 +108,125 @@ void SchurWindow::deactivate(const std::vector<int>& slots) {
           schur_(slot, column) = 0;
 }
 
-/// The lower triangle of S of some slots (ascending), column-major; with `less_eliminated` less what is done ahead.
-void SchurWindow::gather(const std::vector<int>& slots, bool less_eliminated, std::vector<double>& square) const {
+/// The lower triangle of S of some slots (ascending), column-major, less what is done ahead.
+void SchurWindow::gather(const std::vector<int>& slots, std::vector<double>& square) const {
   const auto n = std::ssize(slots);
   square.resize(static_cast<std::size_t>(n * n));
-  // Runs of consecutive slots, which are consecutive among the kept ones as well.
+  const Stage* const last = stages_.empty() ? nullptr : &stages_.back();
+  const auto place = [&](std::ptrdiff_t i) { return last != nullptr ? last->place[slots[i]] : free; };
+  // Runs of slots that are consecutive among the kept ones as well.
   std::vector<std::ptrdiff_t> run_end(static_cast<std::size_t>(n));
-  for (std::ptrdiff_t i = n; i-- > 0;)
-    run_end[i] = i + 1 < n && slots[i + 1] == slots[i] + 1 ? run_end[i + 1] : i + 1;
+  for (std::ptrdiff_t i = n; i-- > 0;) {
+    const bool goes_on = i + 1 < n && slots[i + 1] == slots[i] + 1 &&
+                         (place(i) == free ? place(i + 1) == free : place(i + 1) == place(i) + 1);
+    run_end[i] = goes_on ? run_end[i + 1] : i + 1;
+  }
   for (std::ptrdiff_t j = 0; j < n; ++j) {
     const double* from = schur_.data() + static_cast<std::ptrdiff_t>(slots[j]) * schur_.rows();
-    const double* less = less_eliminated ? eliminated_.data() + kept_place_[slots[j]] * eliminated_.rows() : nullptr;
+    const double* less = place(j) != free ? last->taken_off.data() + place(j) * last->taken_off.rows() : nullptr;
     double* to = square.data() + j * n;
     for (std::ptrdiff_t i = j; i < n; i = run_end[i]) {
       const std::ptrdiff_t length = run_end[i] - i;
       const Eigen::Map<const VectorX> part(from + slots[i], length);
-      if (less != nullptr)
-        Eigen::Map<VectorX>(to + i, length) = part - Eigen::Map<const VectorX>(less + kept_place_[slots[i]], length);
+      if (less != nullptr && place(i) != free)
+        Eigen::Map<VectorX>(to + i, length) = part - Eigen::Map<const VectorX>(less + place(i), length);
       else
         Eigen::Map<VectorX>(to + i, length) = part;
     }
   }
 }
 
-void SchurWindow::prepare(const std::vector<char>& kept) {
-  ahead_.clear();
-  seen_ahead_ = {};
-  condensed_rest_.resize(0, 0);
-  kept_.clear();
-  kept_place_.assign(slots(), -1);
-  active_ahead_ = active_;
-  for (int slot = 0; slot < slots(); ++slot) {
-    const bool free_room = active_[slot] == 0 && slot >= changing_;
-    if (kept[slot] != 0 || free_room) {
-      kept_place_[slot] = static_cast<int>(kept_.size());
-      kept_.push_back(slot);
-    } else if (active_[slot] != 0) {
-      ahead_.push_back(slot);
-    }
-  }
+void SchurWindow::prepare(const std::vector<std::vector<char>>& kept) {
+  keep_sound_stages();
   std::fill(changed_.begin(), changed_.end(), 0);
-  gather(ahead_, false, ahead_factor_);
   try {
-    cholesky(ahead_, schur_, ahead_factor_);
+    for (const std::vector<char>& set : kept)
+      add_stage(set);
+    factor();
   } catch (...) {
-    ahead_.clear();
+    stages_.clear();
+    order_.clear();
+    condensed_rest_.resize(0, 0);
     throw;
   }
-  coupling_.resize(std::ssize(kept_), std::ssize(ahead_));
-  for (Eigen::Index j = 0; j < coupling_.cols(); ++j)
-    for (Eigen::Index i = 0; i < coupling_.rows(); ++i)
-      coupling_(i, j) = kept_[i] > ahead_[j] ? schur_(kept_[i], ahead_[j]) : schur_(ahead_[j], kept_[i]);
-  const int rows = static_cast<int>(kept_.size()), columns = static_cast<int>(ahead_.size());
-  eliminated_ = MatrixX::Zero(rows, rows);
-  if (rows > 0 && columns > 0) {
-    const double one = 1, none = 0;
-    dtrsm_("R", "L", "T", "N", &rows, &columns, &one, ahead_factor_.data(), &columns, coupling_.data(), &rows);
-    dsyrk_("L", "N", &rows, &columns, &one, coupling_.data(), &rows, &none, eliminated_.data(), &rows);
-  }
-  factor();
 }
 
-bool SchurWindow::is_prepared() const {
-  return !ahead_.empty() && std::all_of(ahead_.begin(), ahead_.end(), [&](int slot) { return changed_[slot] == 0; });
+void SchurWindow::add_stage(const std::vector<char>& kept) {
+  const auto eliminates_kept = [&](const Stage& stage) {
+    return std::any_of(stage.ahead.begin(), stage.ahead.end(), [&](int slot) { return kept[slot] != 0; });
+  };
+  stages_.erase(std::find_if(stages_.begin(), stages_.end(), eliminates_kept), stages_.end());
+  const Stage* const last = stages_.empty() ? nullptr : &stages_.back();
+  Stage stage;
+  stage.place.assign(slots(), eliminated);
+  stage.ahead_place.assign(slots(), -1);
+  for (int slot = 0; slot < slots(); ++slot) {
+    if (!is_kept(slot))
+      continue;
+    if (active_[slot] == 0) {
+      stage.place[slot] = free;
+    } else if (kept[slot] != 0) {
+      stage.place[slot] = static_cast<int>(stage.kept.size());
+      stage.kept.push_back(slot);
+    } else {
+      stage.ahead_place[slot] = static_cast<int>(stage.ahead.size());
+      stage.ahead.push_back(slot);
+    }
+  }
+  if (stage.ahead.empty())
+    return;
+  gather(stage.ahead, stage.factor);
+  cholesky(stage.ahead, schur_, stage.factor);
+  const int rows = static_cast<int>(stage.kept.size()), columns = static_cast<int>(stage.ahead.size());
+  stage.coupling.resize(rows, columns);
+  for (Eigen::Index j = 0; j < columns; ++j)
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const auto [column, row] = std::minmax(stage.kept[i], stage.ahead[j]);
+      stage.coupling(i, j) = schur_(row, column);
+      if (last != nullptr && last->place[row] >= 0 && last->place[column] >= 0)
+        stage.coupling(i, j) -= last->taken_off(last->place[row], last->place[column]);
+    }
+  stage.taken_off = MatrixX::Zero(rows, rows);
+  if (last != nullptr)
+    for (Eigen::Index j = 0; j < rows; ++j)
+      for (Eigen::Index i = j; i < rows; ++i)
+        if (const int row = last->place[stage.kept[i]], column = last->place[stage.kept[j]]; row >= 0 && column >= 0)
+          stage.taken_off(i, j) = last->taken_off(row, column);
+  if (rows > 0) {
+    const double one = 1;
+    triangular_solve_from_right(stage.factor.data(), columns, stage.coupling);
+    dsyrk_("L", "N", &rows, &columns, &one, stage.coupling.data(), &rows, &one, stage.taken_off.data(), &rows);
+  }
+  stages_.push_back(std::move(stage));
+}
+
+int SchurWindow::keep_sound_stages() {
+  const auto is_changed = [&](const Stage& stage) {
+    return std::any_of(stage.ahead.begin(), stage.ahead.end(), [&](int slot) { return changed_[slot] != 0; });
+  };
+  stages_.erase(std::find_if(stages_.begin(), stages_.end(), is_changed), stages_.end());
+  return static_cast<int>(stages_.size());
+}
+
+int SchurWindow::done_ahead() const {
+  std::size_t count = 0;
+  for (const Stage& stage : stages_)
+    count += stage.ahead.size();
+  return static_cast<int>(count);
 }
 
 bool SchurWindow::factor() {
-  const bool usable = is_prepared();
-  if (!usable)
-    ahead_.clear();
+  const auto before = std::ssize(stages_);
+  const bool stood = keep_sound_stages() == before && before > 0;
   std::fill(changed_.begin(), changed_.end(), 0);
   condensed_rest_.resize(0, 0);
   order_.clear();
   for (int slot = 0; slot < slots(); ++slot)
-    if (active_[slot] != 0 && (!usable || kept_place_[slot] >= 0))
+    if (active_[slot] != 0 && is_kept(slot))
       order_.push_back(slot);
-  gather(order_, usable, factor_);
+  gather(order_, factor_);
   cholesky(order_, schur_, factor_);
-  return usable;
+  return stood;
 }
 
 MatrixX SchurWindow::reduce(const MatrixX& right, MatrixX* far) const {
@@ -201,37 +241,57 @@ MatrixX SchurWindow::reduce(const MatrixX& right, MatrixX* far) const {
   return by_slot;
 }
 
+SchurWindow::Half SchurWindow::Half::left_columns(Eigen::Index count) const {
+  Half left{{}, rest.leftCols(count)};
+  for (const MatrixX& stage : ahead)
+    left.ahead.emplace_back(stage.leftCols(count));
+  return left;
+}
+
 SchurWindow::Half SchurWindow::half(const MatrixX& right) const {
   Half result;
-  auto& [ahead, rest] = result;
-  ahead.resize(std::ssize(ahead_), right.cols());
-  rest.resize(std::ssize(order_), right.cols());
-  for (Eigen::Index i = 0; i < ahead.rows(); ++i)
-    ahead.row(i) = right.row(ahead_[i]);
-  for (Eigen::Index i = 0; i < rest.rows(); ++i)
-    rest.row(i) = right.row(order_[i]);
-  if (!ahead_.empty()) {
-    triangular_solve(false, ahead_factor_.data(), static_cast<int>(ahead_.size()), ahead);
-    MatrixX taken = MatrixX::Zero(coupling_.rows(), right.cols());
-    add_product(1, coupling_, false, ahead, taken);
-    for (Eigen::Index i = 0; i < rest.rows(); ++i)
-      rest.row(i) -= taken.row(kept_place_[order_[i]]);
+  MatrixX taken; // from the slots that the stage before keeps
+  const Stage* before = nullptr;
+  const auto rows_of = [&](const std::vector<int>& slots) {
+    MatrixX rows(std::ssize(slots), right.cols());
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+      rows.row(i) = right.row(slots[i]);
+      if (before != nullptr)
+        before->take_from(rows, i, taken, slots[i]);
+    }
+    return rows;
+  };
+  for (const Stage& stage : stages_) {
+    MatrixX& ahead = result.ahead.emplace_back(rows_of(stage.ahead));
+    MatrixX next = MatrixX::Zero(stage.coupling.rows(), right.cols());
+    if (before != nullptr)
+      for (Eigen::Index i = 0; i < next.rows(); ++i)
+        if (const int place = before->place[stage.kept[i]]; place >= 0)
+          next.row(i) = taken.row(place);
+    if (!ahead.isZero(0)) {
+      triangular_solve(false, stage.factor.data(), static_cast<int>(stage.ahead.size()), ahead);
+      add_product(1, stage.coupling, false, ahead, next);
+    }
+    taken = std::move(next);
+    before = &stage;
   }
-  triangular_solve(false, factor_.data(), static_cast<int>(order_.size()), rest);
+  result.rest = rows_of(order_);
+  triangular_solve(false, factor_.data(), static_cast<int>(order_.size()), result.rest);
   return result;
 }
 
 MatrixX SchurWindow::product(const Half& one, const Half& other) {
   MatrixX result = MatrixX::Zero(one.rest.cols(), other.rest.cols());
-  add_product(1, one.ahead, true, other.ahead, result);
+  for (std::size_t s = 0; s < one.ahead.size(); ++s)
+    add_product(1, one.ahead[s], true, other.ahead[s], result);
   add_product(1, one.rest, true, other.rest, result);
   return result;
 }
 
 MatrixX SchurWindow::seen_by_condensed(const Half& right) const {
   MatrixX result = MatrixX::Zero(condensed_rest_.cols(), right.rest.cols());
-  if (!ahead_.empty())
-    add_product(1, seen_ahead_.halfway.leftCols(result.rows()), true, right.ahead, result);
+  for (std::size_t s = 0; s < stages_.size(); ++s)
+    add_product(1, stages_[s].halfway.leftCols(result.rows()), true, right.ahead[s], result);
   add_product(1, condensed_rest_, true, right.rest.bottomRows(condensed_rest_.rows()), result);
   return result;
 }
@@ -242,70 +302,123 @@ MatrixX SchurWindow::solve(const MatrixX& right) const {
   MatrixX by_slot = MatrixX::Zero(slots(), right.cols());
   for (Eigen::Index i = 0; i < rest.rows(); ++i)
     by_slot.row(order_[i]) = rest.row(i);
-  if (ahead_.empty())
-    return by_slot;
-  MatrixX below = MatrixX::Zero(std::ssize(kept_), right.cols());
-  for (Eigen::Index i = 0; i < rest.rows(); ++i)
-    below.row(kept_place_[order_[i]]) = rest.row(i);
-  add_product(-1, coupling_, true, below, ahead);
-  triangular_solve(true, ahead_factor_.data(), static_cast<int>(ahead_.size()), ahead);
-  for (Eigen::Index i = 0; i < ahead.rows(); ++i)
-    by_slot.row(ahead_[i]) = ahead.row(i);
+  for (std::size_t s = stages_.size(); s-- > 0;) {
+    const Stage& stage = stages_[s];
+    MatrixX below(std::ssize(stage.kept), right.cols());
+    for (Eigen::Index i = 0; i < below.rows(); ++i)
+      below.row(i) = by_slot.row(stage.kept[i]);
+    add_product(-1, stage.coupling, true, below, ahead[s]);
+    triangular_solve(true, stage.factor.data(), static_cast<int>(stage.ahead.size()), ahead[s]);
+    for (Eigen::Index i = 0; i < ahead[s].rows(); ++i)
+      by_slot.row(stage.ahead[i]) = ahead[s].row(i);
+  }
   return by_slot;
 }
 
-void SchurWindow::see_ahead(const MatrixX& functionals, const VectorX& right) {
-  const auto rows = std::ssize(ahead_);
+void SchurWindow::see_ahead(const SparseMatrix& functionals, const VectorX& right) {
   const Eigen::Index count = functionals.cols() + 1;
-  MatrixX there(rows, count);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    there.row(i).head(count - 1) = functionals.row(ahead_[i]);
-    there(i, count - 1) = right[ahead_[i]];
+  std::vector<char> is_fresh(static_cast<std::size_t>(count), 0); // columns that are not as some stage saw them
+  // The rows of a column that a stage has done ahead.
+  const auto is_same = [](const Stage& stage, const SparseMatrix& other, Eigen::Index column) {
+    SparseMatrix::InnerIterator a(stage.functionals, column), b(other, column);
+    const auto next = [&](SparseMatrix::InnerIterator& entry) {
+      while (entry && stage.ahead_place[entry.row()] < 0)
+        ++entry;
+      return static_cast<bool>(entry);
+    };
+    for (;; ++a, ++b) {
+      const bool has_a = next(a), has_b = next(b);
+      if (!has_a || !has_b)
+        return has_a == has_b;
+      if (a.row() != b.row() || a.value() != b.value())
+        return false;
+    }
+  };
+  const Stage* before = nullptr;
+  for (Stage& stage : stages_) {
+    const auto rows = std::ssize(stage.ahead);
+    VectorX load(rows);
+    for (Eigen::Index i = 0; i < rows; ++i)
+      load[i] = right[stage.ahead[i]];
+    if (stage.functionals.cols() + 1 != count || stage.halfway.cols() != count) {
+      stage.halfway = MatrixX::Zero(rows, count);
+      stage.taken = MatrixX::Zero(stage.coupling.rows(), count);
+      stage.products = MatrixX::Zero(count, count);
+      std::fill(is_fresh.begin(), is_fresh.end(), 1);
+    } else {
+      for (Eigen::Index c = 0; c + 1 < count; ++c)
+        if (!is_same(stage, functionals, c))
+          is_fresh[static_cast<std::size_t>(c)] = 1;
+      if (load != stage.load)
+        is_fresh.back() = 1;
+    }
+    std::vector<Eigen::Index> fresh;
+    for (Eigen::Index c = 0; c < count; ++c)
+      if (is_fresh[static_cast<std::size_t>(c)] != 0)
+        fresh.push_back(c);
+    if (!fresh.empty()) {
+      MatrixX halfway(rows, std::ssize(fresh)), taken = MatrixX::Zero(stage.coupling.rows(), std::ssize(fresh));
+      for (Eigen::Index k = 0; k < halfway.cols(); ++k) {
+        if (fresh[k] + 1 == count) {
+          halfway.col(k) = load;
+        } else {
+          halfway.col(k).setZero();
+          for (SparseMatrix::InnerIterator entry(functionals, fresh[k]); entry; ++entry)
+            if (const int place = stage.ahead_place[entry.row()]; place >= 0)
+              halfway(place, k) = entry.value();
+        }
+        if (before == nullptr)
+          continue;
+        const auto all_taken = before->taken.col(fresh[k]);
+        for (Eigen::Index i = 0; i < rows; ++i)
+          if (const int place = before->place[stage.ahead[i]]; place >= 0)
+            halfway(i, k) -= all_taken[place];
+        for (Eigen::Index i = 0; i < taken.rows(); ++i)
+          if (const int place = before->place[stage.kept[i]]; place >= 0)
+            taken(i, k) = all_taken[place];
+      }
+      triangular_solve(false, stage.factor.data(), static_cast<int>(rows), halfway);
+      add_product(1, stage.coupling, false, halfway, taken);
+      for (Eigen::Index k = 0; k < halfway.cols(); ++k) {
+        stage.halfway.col(fresh[k]) = halfway.col(k);
+        stage.taken.col(fresh[k]) = taken.col(k);
+      }
+      stage.products = gram(stage.halfway);
+      stage.functionals = functionals;
+      stage.load = std::move(load);
+    }
+    before = &stage;
   }
-  SeenAhead& seen = seen_ahead_;
-  if (seen.there.rows() != rows || seen.there.cols() != count) {
-    seen.there = MatrixX::Zero(rows, count);
-    seen.halfway = seen.there;
-    seen.taken = MatrixX::Zero(coupling_.rows(), count);
-    seen.products = MatrixX::Zero(count, count);
-  }
-  std::vector<Eigen::Index> fresh;
-  for (Eigen::Index c = 0; c < count; ++c)
-    if (seen.there.col(c) != there.col(c))
-      fresh.push_back(c);
-  if (fresh.empty())
-    return;
-  MatrixX halfway(rows, std::ssize(fresh)), taken = MatrixX::Zero(coupling_.rows(), std::ssize(fresh));
-  for (Eigen::Index k = 0; k < halfway.cols(); ++k)
-    halfway.col(k) = there.col(fresh[k]);
-  triangular_solve(false, ahead_factor_.data(), static_cast<int>(rows), halfway);
-  add_product(1, coupling_, false, halfway, taken);
-  for (Eigen::Index k = 0; k < halfway.cols(); ++k) {
-    seen.halfway.col(fresh[k]) = halfway.col(k);
-    seen.taken.col(fresh[k]) = taken.col(k);
-  }
-  seen.products = gram(seen.halfway);
-  seen.there = std::move(there);
 }
 
-SchurWindow::Condensed SchurWindow::condense(const MatrixX& functionals, const VectorX& right) {
+SchurWindow::Condensed SchurWindow::condense(const SparseMatrix& functionals, const VectorX& right) {
   // With Y = L^-1 F: F^T S^-1 F = Y^T Y and F^T S^-1 b = Y^T (L^-1 b). Above its first entry F leaves Y zero.
   const Eigen::Index count = functionals.cols();
-  MatrixX seen(std::ssize(order_), count), load(std::ssize(order_), 1);
-  for (Eigen::Index i = 0; i < seen.rows(); ++i) {
-    seen.row(i) = functionals.row(order_[i]);
-    load(i, 0) = right[order_[i]];
+  see_ahead(functionals, right);
+  MatrixX seen = MatrixX::Zero(std::ssize(order_), count), load(std::ssize(order_), 1);
+  std::vector<int> order_place(static_cast<std::size_t>(slots()), -1);
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    order_place[order_[i]] = static_cast<int>(i);
+    load(static_cast<Eigen::Index>(i), 0) = right[order_[i]];
+  }
+  for (Eigen::Index c = 0; c < count; ++c)
+    for (SparseMatrix::InnerIterator entry(functionals, c); entry; ++entry)
+      if (const int place = order_place[entry.row()]; place >= 0)
+        seen(place, c) = entry.value();
+  if (!stages_.empty()) {
+    const Stage& last = stages_.back();
+    for (Eigen::Index c = 0; c <= count; ++c) {
+      const double* const taken = last.taken.col(c).data();
+      double* const from = c < count ? seen.col(c).data() : load.data();
+      for (std::size_t i = 0; i < order_.size(); ++i)
+        if (const int place = last.place[order_[i]]; place >= 0)
+          from[i] -= taken[place];
+    }
   }
   Condensed condensed{MatrixX::Zero(count, count), VectorX::Zero(count)};
-  if (!ahead_.empty()) {
-    see_ahead(functionals, right);
-    for (Eigen::Index i = 0; i < seen.rows(); ++i) {
-      const auto taken = seen_ahead_.taken.row(kept_place_[order_[i]]);
-      seen.row(i) -= taken.head(count);
-      load(i, 0) -= taken[count];
-    }
-    condensed.compliance = seen_ahead_.products.topLeftCorner(count, count);
-    condensed.response = seen_ahead_.products.col(count).head(count);
+  for (const Stage& stage : stages_) {
+    condensed.compliance += stage.products.topLeftCorner(count, count);
+    condensed.response += stage.products.col(count).head(count);
   }
   Eigen::Index first = 0;
   while (first < seen.rows() && seen.row(first).isZero(0))
@@ -333,13 +446,10 @@ MatrixX SchurWindow::recover_from_half(const MatrixX& window, const MatrixX& far
 }
 
 MatrixX SchurWindow::recover_from(MatrixX halfway, const MatrixX& window) const {
-  const int size = changing_ + contact_;
-  MatrixX known(size, window.cols());
-  known.topRows(changing_) = window.topRows(changing_);
-  known.bottomRows(contact_) = window.bottomRows(contact_);
-  triangular_product(true, trailing_, known);
-  halfway.bottomRows(size) = known;
-  return cholesky_->backward(halfway);
+  halfway.middleRows(far_, changing_) = window.topRows(changing_);
+  halfway.bottomRows(contact_) = window.bottomRows(contact_);
+  cholesky_->backward(changing_ + contact_, halfway);
+  return halfway;
 }
 
 } // namespace spherecut::solvers

@@ -212,7 +212,7 @@ double quartic_spline(double s) {
 }
 
 Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis,
-                 double worst_condition, const Sight& sight, const std::vector<char>& absent)
+                 double worst_condition, const Sight& sight, const std::vector<char>& absent, const Spheres* before)
     : centres_(std::move(centres)), basis_(basis), worst_condition_(worst_condition) {
   check(centres_, spacings, rho, basis, worst_condition);
   const int n = size(), needed = basis_size(basis) + 2;
@@ -225,7 +225,8 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
       if (sight.incision->front_frame(centres_[i], sight.reach * spacings[i]))
         base[i] *= sight.radius_factor;
   radii_ = base;
-  grid_ = SphereGrid(centres_, radii_);
+  const bool is_as_before = before != nullptr && before->centres_ == centres_ && before->radii_ == radii_;
+  grid_ = is_as_before ? before->grid_ : std::make_shared<const SphereGrid>(centres_, radii_);
   if (sight.incision != nullptr) {
     if (basis != Basis::linear)
       throw InputError("shape functions: spheres around a cut have the linear basis alone");
@@ -254,7 +255,7 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
     for (int i = 0; i < n; ++i) {
       if (is_absent(i))
         continue;
-      const SphereGrid::Cell cell = grid_.find(centres_[i]);
+      const SphereGrid::Cell cell = grid_->find(centres_[i]);
       SupportMemory memory(cell.padded);
       kernel.collect(cell, centres_[i].data(), memory.support);
       if (!is_sound(i, memory.support, false))
@@ -301,7 +302,7 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
       }
       unsound = std::move(still);
     }
-    grid_ = SphereGrid(centres_, radii_);
+    grid_ = std::make_shared<const SphereGrid>(centres_, radii_);
     if (cut_ != nullptr)
       cut_->update_radii(centres_, radii_);
     unsound = unsound_nodes();

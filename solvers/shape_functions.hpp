@@ -28,9 +28,10 @@ class Spheres {
   /// is sound. Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than
   /// basis + 2 nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, or an incision is
   /// given with the quadratic basis. Nodes marked in `absent` (may be empty) have no sphere, radius 0, and support
-  /// nothing.
+  /// nothing. `before` (may be null): spheres most of which may be the same; where all are, so is their grid.
   Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis = Basis::linear,
-          double worst_condition = 1e9, const Sight& sight = {}, const std::vector<char>& absent = {});
+          double worst_condition = 1e9, const Sight& sight = {}, const std::vector<char>& absent = {},
+          const Spheres* before = nullptr);
 
   [[nodiscard]] int size() const { return static_cast<int>(centres_.size()); }
   [[nodiscard]] const std::vector<Vector3>& centres() const { return centres_; }
@@ -39,8 +40,8 @@ class Spheres {
   [[nodiscard]] int grown() const { return grown_; } // spheres that had to grow
   [[nodiscard]] double worst_condition() const { return worst_condition_; }
   /// Ids of every sphere that may hold x, ascending; a superset of those that do, about 2 to 3 times as many.
-  [[nodiscard]] std::span<const int> candidates(const Vector3& x) const { return grid_.find(x).ids; }
-  [[nodiscard]] const SphereGrid& grid() const { return grid_; }
+  [[nodiscard]] std::span<const int> candidates(const Vector3& x) const { return grid_->find(x).ids; }
+  [[nodiscard]] const SphereGrid& grid() const { return *grid_; }
   /// What the spheres know of the cut; null when there is none.
   [[nodiscard]] const CutSight* cut() const { return cut_.get(); }
 
@@ -50,7 +51,7 @@ class Spheres {
   Basis basis_;
   double worst_condition_;
   int grown_ = 0;
-  SphereGrid grid_;
+  std::shared_ptr<const SphereGrid> grid_;
   std::shared_ptr<CutSight> cut_;
 };
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <catch2/catch.hpp>
+#include <map>
 #include <random>
 
 using namespace spherecut;
@@ -57,16 +58,34 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   const int n = 90, changing = 20, room = 5, contact = 12, far = n - changing - contact;
   const MatrixX k = spring_matrix(n, 3);
   SchurWindow window(lower_of(k), changing, room, contact);
-  // What will not change is eliminated ahead; or too much is, and the window has to start over.
-  const int ahead = GENERATE(0, 1, 2);
+  // What will not change is eliminated ahead, in one or two stages; or too much is, by the first or by the second, and
+  // the window has to start over from there, which another stage may do after the change.
+  enum Ahead { nothing, one_stage, too_much, two_stages, too_much_in_second, second_anew };
+  const Ahead ahead = GENERATE(nothing, one_stage, too_much, two_stages, too_much_in_second, second_anew);
   std::vector<char> kept(window.slots(), 0);
   for (int unknown : {1, 3, 4, 8, 9, 10, 11, 12, 17})
-    kept[window.slot_of(far + unknown)] = 1;
+    kept.at(window.slot_of(far + unknown)) = 1;
   kept[window.slot_of(n - 1)] = 1; // of the contact; the others see what is done ahead
-  if (ahead == 2)
-    kept[window.slot_of(far + 9)] = 0;
-  if (ahead > 0)
-    window.prepare(kept);
+  std::vector<char> more = kept;
+  for (const int unknown : {5, 13, n - 2 - far})
+    more[window.slot_of(far + unknown)] = 1;
+  std::vector<char> less = kept;
+  less[window.slot_of(far + 9)] = 0;
+  if (ahead == one_stage)
+    window.prepare({kept});
+  else if (ahead == too_much)
+    window.prepare({less});
+  else if (ahead != nothing)
+    window.prepare({more, ahead == two_stages ? kept : less});
+  // What some functionals see of it before the change is known: some of it stays, of another only the load does.
+  MatrixX early = MatrixX::Zero(window.slots(), 3);
+  if (ahead != nothing) {
+    for (int slot = window.contact_begin(); slot < window.slots(); ++slot)
+      for (int c = 0; c < 3; ++c)
+        early(slot, c) = std::sin(1.0 + slot * (c + 1));
+    early(window.slot_of(far + 2), 1) = 0.3; // done ahead
+    static_cast<void>(window.condense(early.sparseView(), VectorX::Ones(window.slots())));
+  }
   // From scratch: unknown `gone` leaves with its springs, two new ones come, coupled to each other and the window.
   MatrixX larger = MatrixX::Zero(n + 2, n + 2);
   larger.topLeftCorner(n, n) = k;
@@ -93,8 +112,22 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   larger.row(gone).setZero();
   larger.col(gone).setZero();
   larger(gone, gone) = 1;
-  CHECK(window.factor() == (ahead == 1));
-  CHECK((window.done_ahead() > 0) == (ahead == 1));
+  CHECK(window.factor() == (ahead == one_stage || ahead == two_stages));
+  CHECK(window.stages() == std::map<Ahead, int>{{nothing, 0},
+                                                {one_stage, 1},
+                                                {too_much, 0},
+                                                {two_stages, 2},
+                                                {too_much_in_second, 1},
+                                                {second_anew, 1}}[ahead]);
+  if (ahead == second_anew) {
+    const int before = window.done_ahead();
+    kept[changing + 1] = 1; // what has come stays; of it the other goes
+    window.prepare({kept});
+    CHECK(window.stages() == 2);
+    CHECK(window.done_ahead() == before + 4);
+    CHECK_FALSE(window.is_kept(changing));
+    CHECK(window.is_kept(changing + 1));
+  }
   CHECK(window.factored() + window.done_ahead() == changing - 1 + 2 + contact);
 
   VectorX right = random_vector(n + 2, 4);
@@ -124,13 +157,17 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
       if (unknown_of[slot] >= 0)
         for (int c = 0; c < 3; ++c)
           functionals(slot, c) = by_unknown(unknown_of[slot], c) = std::sin(1.0 + slot * (c + 1));
-    const SchurWindow::Condensed condensed = window.condense(functionals, seen.col(0));
+    const SchurWindow::Condensed condensed = window.condense(functionals.sparseView(), seen.col(0));
     const MatrixX compliance = by_unknown.transpose() * inverse * by_unknown;
     CHECK((condensed.compliance - compliance).norm() < 1e-11 * compliance.norm());
     CHECK((condensed.response - by_unknown.transpose() * exact).norm() < 1e-11 * (by_unknown.norm() * exact.norm()));
+    const SchurWindow::Half of_functionals = window.half(functionals);
+    CHECK((SchurWindow::product(of_functionals, of_functionals) - compliance).norm() < 1e-11 * compliance.norm());
+    CHECK((window.seen_by_condensed(of_functionals.left_columns(2)) - compliance.leftCols(2)).norm() <
+          1e-11 * compliance.norm());
     // What the functionals see of the part done ahead is kept; another right-hand side and half of them ask anew.
-    CHECK(window.condense(functionals, seen.col(0)).compliance == condensed.compliance);
-    const SchurWindow::Condensed halved = window.condense(0.5 * functionals, 2 * seen.col(0));
+    CHECK(window.condense(functionals.sparseView(), seen.col(0)).compliance == condensed.compliance);
+    const SchurWindow::Condensed halved = window.condense((0.5 * functionals).sparseView(), 2 * seen.col(0));
     CHECK((halved.compliance - 0.25 * condensed.compliance).norm() < 1e-13 * condensed.compliance.norm());
     CHECK((halved.response - condensed.response).norm() < 1e-12 * condensed.response.norm());
   }
