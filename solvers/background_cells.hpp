@@ -74,8 +74,10 @@ std::vector<SurfacePoint> surface_quadrature(const topology::Domain& domain, con
 
 /// The same over both faces of an incision, as far as they lie inside the body: positions lip_offset spacings off the
 /// sheet, normals out of the material. Triangles smaller than an equilateral one of edge `centroid_below` spacings
-/// carry their centroid alone.
+/// carry their centroid alone; many of these that lie together make one point, of about half their distance to the
+/// front in size, a distance of `finest` to one spacing.
 std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge = 0.5,
-                                         double centroid_below = 0.36, const BoundingBox* region = nullptr);
+                                         double centroid_below = 0.36, const BoundingBox* region = nullptr,
+                                         double finest = 0.25);
 
 } // namespace spherecut::solvers

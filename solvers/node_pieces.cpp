@@ -27,18 +27,20 @@ std::vector<int> node_pieces(const NodeCloud& nodes, const topology::Incision& i
   };
   const topology::PointTree tree(nodes.positions);
   std::vector<topology::PointTree::Found> found;
-  for (int i = 0; i < count; ++i) {
+  int pieces_left = count;
+  for (int i = 0; i < count && pieces_left > 1; ++i) {
     const Vector3& x = nodes.positions[i];
     const double reach = sight * nodes.spacings[i];
     const bool sheets_near = incision.near(x, reach);
     found.clear();
     tree.within(x, reach, found); // of two nodes the coarser one finds the other
-    std::sort(found.begin(), found.end());
     for (const auto& [squared, j] : found) {
       const double limit = 0.5 * sight * (nodes.spacings[i] + nodes.spacings[j]);
       const int a = root(i), b = root(j);
-      if (a != b && squared < limit * limit && (!sheets_near || !incision.blocks(x, nodes.positions[j])))
+      if (a != b && squared < limit * limit && (!sheets_near || !incision.blocks(x, nodes.positions[j]))) {
         parent[std::max(a, b)] = std::min(a, b);
+        --pieces_left;
+      }
     }
   }
   std::vector<int> size(count, 0), roots;

@@ -14,7 +14,7 @@ namespace spherecut::solvers {
 namespace {
 
 /// Edge of the surface quadrature's triangles in spacings: a mean over a share needs less than a traction does.
-constexpr double share_edge = 0.6, share_centroid_below = 0.36;
+constexpr double share_edge = 0.6, share_centroid_below = 0.36, share_finest = 1;
 
 DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::vector<int>& chosen,
                            const Spheres& spheres) {
@@ -140,8 +140,8 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
                                  part ? &part->points : nullptr);
   faces_begin_ = static_cast<int>(points_.size());
   if (incision_ != nullptr) {
-    const std::vector<SurfacePoint> faces =
-        lip_quadrature(*incision_, nodes, share_edge, share_centroid_below, part ? &part->points : nullptr);
+    const std::vector<SurfacePoint> faces = lip_quadrature(*incision_, nodes, share_edge, share_centroid_below,
+                                                           part ? &part->points : nullptr, share_finest);
     points_.insert(points_.end(), faces.begin(), faces.end());
   }
   for (const bool lips : {false, true}) {

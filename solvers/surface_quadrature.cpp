@@ -116,12 +116,12 @@ namespace {
 /// the nearest of them.
 class SmallTriangles {
  public:
-  explicit SmallTriangles(const topology::Incision& incision) : incision_(incision) {}
+  SmallTriangles(const topology::Incision& incision, double finest) : incision_(incision), finest_(finest) {}
 
   void add(int sheet, const SurfacePoint& point, double spacing) {
     // The opening goes with the root of the distance to the front: finer there.
-    const auto front = incision_.front_frame(point.position, spacing);
-    const int level = std::ilogb(largest_group * (front ? std::max(front->distance, finest * spacing) : spacing));
+    const auto front = finest_ < 1 ? incision_.front_frame(point.position, spacing) : std::nullopt;
+    const int level = std::ilogb(largest_group * (front ? std::max(front->distance, finest_ * spacing) : spacing));
     const double edge = std::ldexp(1.0, level);
     std::array<long, 6> key{sheet, level, 0, 0, 0, 0};
     for (int c = 0; c < 3; ++c)
@@ -163,7 +163,7 @@ class SmallTriangles {
   }
 
  private:
-  static constexpr double largest_group = 0.5, finest = 0.25, same_way = 0.95; // spacings, spacings; a cosine
+  static constexpr double largest_group = 0.5, same_way = 0.95; // spacings; a cosine
   struct Group {
     std::vector<SurfacePoint> members;
     Vector3 moment, area;
@@ -171,6 +171,7 @@ class SmallTriangles {
     int sheet;
   };
   const topology::Incision& incision_;
+  double finest_; // spacings from the front where groups are smallest
   std::map<std::array<long, 6>, std::size_t> group_at_;
   std::vector<Group> groups_;
 };
@@ -178,12 +179,12 @@ class SmallTriangles {
 } // namespace
 
 std::vector<SurfacePoint> lip_quadrature(const topology::Incision& incision, const NodeCloud& nodes, double edge,
-                                         double centroid_below, const BoundingBox* region) {
+                                         double centroid_below, const BoundingBox* region, double finest) {
   const topology::PointTree tree(nodes.positions);
   const topology::Domain& domain = *incision.domain();
   std::vector<SurfacePoint> points, face;
   std::vector<Corners> pending;
-  SmallTriangles small_triangles(incision);
+  SmallTriangles small_triangles(incision, finest);
   const auto push_both_sides = [&](const SurfacePoint& point, const Vector3& off, double spacing) {
     for (const double side : {1.0, -1.0})
       points.push_back({point.position + side * lip_offset * spacing * off, -side * point.normal, point.weight});
