@@ -102,6 +102,35 @@ SpacingField local_field(const SpacingField& spacing, const BoundingBox& box) {
 
 } // namespace
 
+SprinkleIncrement merged(const SprinkleIncrement& first, const SprinkleIncrement& then, int count) {
+  SprinkleIncrement both{first.removed, {}, then.touched};
+  std::vector<int> origin; // of a node between the two: before the first, or count + its place in what that added
+  auto removed = first.removed.begin();
+  for (int i = 0; i < count; ++i) {
+    if (removed != first.removed.end() && *removed == i)
+      ++removed;
+    else
+      origin.push_back(i);
+  }
+  for (int k = 0; k < first.added.size(); ++k)
+    origin.push_back(count + k);
+  std::vector<char> stays(static_cast<std::size_t>(first.added.size()), 1);
+  for (const int node : then.removed) {
+    const int from = origin.at(static_cast<std::size_t>(node));
+    if (from < count)
+      both.removed.push_back(from);
+    else
+      stays[static_cast<std::size_t>(from - count)] = 0;
+  }
+  std::sort(both.removed.begin(), both.removed.end());
+  for (int k = 0; k < first.added.size(); ++k)
+    if (stays[static_cast<std::size_t>(k)] != 0)
+      both.added.add(first.added, k);
+  for (int k = 0; k < then.added.size(); ++k)
+    both.added.add(then.added, k);
+  return both;
+}
+
 SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const SprinkleOptions& options,
                                     const NodeCloud& previous, const topology::Incision* before,
                                     const std::vector<bool>& retired) {

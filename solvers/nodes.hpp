@@ -135,6 +135,10 @@ struct SprinkleIncrement {
   SprinkleZone touched;     // expected number and density of the region that was looked at
 };
 
+/// One increment that does what `first`, of a cloud of `count` nodes, and `then` do one after the other. Its `touched`
+/// is that of the latter.
+SprinkleIncrement merged(const SprinkleIncrement& first, const SprinkleIncrement& then, int count);
+
 /// The fast variant of resprinkle for a cut that has grown: looks at what lies within two spacings of the sheets' new
 /// triangles alone. Nodes there that the new sheet crowds go, those farther away are left as they are; lip pairs stay
 /// where they are when the front moves on, a ring ahead moves with it, new pairs and nodes fill what has become

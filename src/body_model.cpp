@@ -228,12 +228,13 @@ bool can_follow(const Scenario& scenario, const BodyModel& model, const topology
 }
 
 std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyModel& model,
-                                         const topology::SurfaceMesh& way_ahead, std::unique_ptr<Recondensing> after) {
+                                         const topology::SurfaceMesh& way_ahead, int in_one,
+                                         std::unique_ptr<Recondensing> after) {
   return std::make_unique<Recondensing>(
       model.body->problem(),
       solvers::GrowthOptions{
           .method = method_of(scenario), .way = way_ahead, .contact = model.patch.nodes, .room = growth_room},
-      model.patch.nodes, std::move(after));
+      model.patch.nodes, in_one, std::move(after));
 }
 
 std::string hindrance_to_growth(const Scenario& scenario, bool severed) {

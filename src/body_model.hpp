@@ -75,10 +75,11 @@ inline constexpr int growth_room = 150;
 /// Whether the window of a body that follows its cut along that way is worth its while.
 bool can_follow(const Scenario& scenario, const BodyModel& model, const topology::SurfaceMesh& way_ahead);
 
-/// Begins to condense the model's body anew on a thread of its own, as assemble() would for that way ahead. `after`: as
-/// Recondensing.
+/// Begins to condense the model's body anew on a thread of its own, as assemble() would for that way ahead. `in_one`,
+/// `after`: as Recondensing.
 std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyModel& model,
-                                         const topology::SurfaceMesh& way_ahead, std::unique_ptr<Recondensing> after);
+                                         const topology::SurfaceMesh& way_ahead, int in_one,
+                                         std::unique_ptr<Recondensing> after);
 
 /// Why no body of this scenario can follow its cut; empty: one can.
 std::string hindrance_to_growth(const Scenario& scenario, bool severed);

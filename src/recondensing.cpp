@@ -15,6 +15,7 @@ struct Increment {
   solvers::Problem grown;
   topology::SurfaceMesh way_ahead;
   std::vector<int> candidates;
+  int steps = 1;
 };
 
 /// False: it cannot be made, or cannot follow.
@@ -35,9 +36,14 @@ struct Recondensing::State {
   mutable std::mutex mutex;
   std::condition_variable changed;
   std::deque<Increment> waiting;
-  bool busy = true, failed = false, stop = false;
+  int in_one = 1;
+  bool busy = true, failed = false, stop = false, taken = false;
   Recondensed made; // of the thread until it is not busy
   std::thread thread;
+
+  [[nodiscard]] bool has_work() const {
+    return !failed && !waiting.empty() && (taken || waiting.front().steps == in_one);
+  }
 
   void condense(const std::vector<int>& candidates) {
     if (!candidates.empty()) {
@@ -63,7 +69,7 @@ struct Recondensing::State {
       });
     bool condensed = false;
     while (!stop) {
-      if (!failed && !waiting.empty()) {
+      if (has_work()) {
         Increment next = std::move(waiting.front());
         waiting.pop_front();
         compute([&] {
@@ -87,7 +93,7 @@ struct Recondensing::State {
       }
       busy = false;
       changed.notify_all();
-      changed.wait(lock, [&] { return stop || (!failed && !waiting.empty()); });
+      changed.wait(lock, [&] { return stop || has_work(); });
       busy = true;
     }
     busy = false;
@@ -96,8 +102,9 @@ struct Recondensing::State {
 };
 
 Recondensing::Recondensing(solvers::Problem problem, solvers::GrowthOptions options, std::vector<int> candidates,
-                           std::unique_ptr<Recondensing> after)
+                           int in_one, std::unique_ptr<Recondensing> after)
     : state_(std::make_unique<State>()) {
+  state_->in_one = in_one;
   state_->thread = std::thread([&state = *state_, first = std::move(problem), how = std::move(options),
                                 nodes = std::move(candidates), before = std::move(after)]() mutable {
     before.reset();
@@ -116,7 +123,18 @@ void Recondensing::follow(solvers::SprinkleIncrement change, solvers::Problem gr
   const std::lock_guard lock(state_->mutex);
   if (state_->failed)
     return;
-  state_->waiting.push_back({std::move(change), std::move(grown), std::move(way_ahead), std::move(candidates)});
+  std::deque<Increment>& waiting = state_->waiting;
+  Increment next{std::move(change), std::move(grown), std::move(way_ahead), std::move(candidates)};
+  if (!waiting.empty() && waiting.back().steps < state_->in_one) {
+    const Increment& last = waiting.back();
+    const int before =
+        last.grown.nodes.size() - last.change.added.size() + static_cast<int>(last.change.removed.size());
+    next.change = solvers::merged(last.change, next.change, before);
+    next.steps += last.steps;
+    waiting.back() = std::move(next);
+  } else {
+    waiting.push_back(std::move(next));
+  }
   state_->changed.notify_all();
 }
 
@@ -129,12 +147,14 @@ void Recondensing::give_up() {
 
 bool Recondensing::ready() const {
   const std::lock_guard lock(state_->mutex);
-  return !state_->busy && (state_->failed || state_->waiting.empty());
+  return !state_->busy && !state_->has_work();
 }
 
 Recondensed Recondensing::take() {
   {
     std::unique_lock lock(state_->mutex);
+    state_->taken = true;
+    state_->changed.notify_all();
     state_->changed.wait(lock, [&] { return !state_->busy && (state_->failed || state_->waiting.empty()); });
     state_->stop = true;
     state_->changed.notify_all();

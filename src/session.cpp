@@ -213,7 +213,7 @@ StepResult Session::step(const StepSample& sample) {
     }
     if (tears())
       tear(sample, loading, result);
-    if (recondensing_on_ && sample.blade)
+    if (renews_windows() && sample.blade)
       watch_window(sample, last_blade, result);
     evaluate(result);
   } else if (blade_force_ != nullptr && sample.blade) {
@@ -244,6 +244,18 @@ void Session::prepare(const StepSample& sample) {
   build(model_);
   if (touch_ && !scenario_.tool->grasp && model_.patch.nodes.empty())
     condense(candidates(model_), model_);
+  if (!renews_windows() || scenario_.blade->advance.value_or(1) > 0) // in the loop it may be made beside the steps
+    return;
+  StepSample meeting = sample;
+  if (!meeting.blade)
+    if (const auto first = std::find_if(steps_.begin(), steps_.end(), [](const StepSample& s) { return !!s.blade; });
+        first != steps_.end())
+      meeting = *first;
+  if (!meeting.blade)
+    return;
+  meet_blade(meeting, std::nullopt);
+  if (recondensing_ != nullptr)
+    swap_body();
 }
 
 void Session::coarsen(double factor) {

@@ -83,7 +83,8 @@ class Session {
   StepResult step(const StepSample& sample);
 
   /// Builds the body and condenses it onto the tool's candidates before the first touch, so that the first step in
-  /// contact need not. `sample`: where the tool is. Does nothing when nothing ever touches or cuts.
+  /// contact need not; with set_recondensing() so that it can follow the first cut, where the scenario's blade begins
+  /// near it and every step follows it. `sample`: where the tool is. Does nothing when nothing ever touches or cuts.
   void prepare(const StepSample& sample);
 
   /// Poses that the blade has passed since the last step, in order, before the one of the next: its way leads through
@@ -147,7 +148,8 @@ class Session {
     return put_off_ > 0 || cuts_aside() || (proposes_aside() && blade_force_->lags());
   }
 
-  /// Whether a body is under way beside the steps; and whether it is there and has followed all that was cut meanwhile.
+  /// Whether a body is under way beside the steps; and whether it is there and has followed what was cut meanwhile, but
+  /// for the last few increments where every step has one: swap_body() has it follow those.
   [[nodiscard]] bool recondensing() const { return recondensing_ != nullptr || following_ || proposing_; }
   [[nodiscard]] bool recondensed() const;
   /// Takes it over, after waiting for it where need be; the next step solves with it. False: there is none, or it could
@@ -220,7 +222,15 @@ class Session {
   blade_ahead(const StepSample& sample, const std::optional<topology::BladePose>& last, double length) const;
   [[nodiscard]] solvers::BodyGrowth follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& next,
                                                BodyUpdate& report);
+  /// Whether a body that follows the blade's cut by updates is condensed anew beside the steps. Others are rebuilt.
+  [[nodiscard]] bool renews_windows() const {
+    return recondensing_on_ && scenario_.blade && blade_force_ == nullptr && !tears() && !follows_cuts_aside();
+  }
   void watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last, StepResult& result);
+  void meet_blade(const StepSample& sample, const std::optional<topology::BladePose>& last);
+  void begin_recondensing(const StepSample& sample, const std::optional<topology::BladePose>& last, double entry);
+  [[nodiscard]] topology::SurfaceMesh way_ahead_of(const StepSample& sample,
+                                                   const std::optional<topology::BladePose>& last, double length) const;
   [[nodiscard]] double way_into_body(const StepSample& sample) const;
   bool take_recondensed(BodyModel& into, solvers::ContactPatch& patch);
   void lead_recondensing(const StepSample& sample, const topology::RestMap& to_rest);

@@ -92,6 +92,8 @@ Session::blade_ahead(const StepSample& sample, const std::optional<topology::Bla
   const double fine = zone_.spacing.fine;
   const topology::BladePose& here = *sample.blade;
   std::vector<topology::BladePose> poses;
+  if (!incisions_->is_placed())
+    poses.push_back(here);
   const auto scripted = blade_pose(*scenario_.blade, sample.time);
   if (scripted && edge_travel(edge, *scripted, here) < on_path * fine) {
     // Poses of short steps lie closer than a window can tell apart, and each costs a strip.

@@ -10,6 +10,7 @@ namespace {
 constexpr double background_spacings = 5; // fine spacings ahead of the blade for which it is condensed beside the steps
 constexpr double drifted = 1e-8;          // residual of an updated body from which it is condensed anew
 constexpr double looked_after = 0.25;     // fine spacings that the blade goes before its way ahead is looked at again
+constexpr int followed_in_one = 8;        // increments, where every step has one
 
 /// Whether every corner of `way` is within `reach` m of one of `window`.
 bool covers(const topology::SurfaceMesh& window, const topology::SurfaceMesh& way, double reach) {
@@ -55,19 +56,12 @@ solvers::BodyGrowth Session::follow_cut(const std::function<topology::SurfaceMes
 }
 
 // What one that follows the blade's cut is condensed anew for: its window has not much left of what lies ahead, it is
-// running out of room, or rounding has added up. One that does not follow is made to as the blade comes near.
+// running out of room, or rounding has added up.
 void Session::watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last,
                            StepResult& result) {
-  if (recondensing_ != nullptr || model_.coarseness != coarseness_ || !result.cut || tears())
-    return;
-  if (follows_cuts_aside() || blade_force_ != nullptr) // rebuilt: they need no window
+  if (recondensing_ != nullptr || model_.coarseness != coarseness_ || !result.cut)
     return;
   const double fine = zone_.spacing.fine;
-  const auto to_rest = [this](const Vector3& x) { return rest_position(x); };
-  const auto way_of = [&](double length) {
-    return incisions_->way_through(blade_ahead(sample, last, length), to_rest);
-  };
-  double entry = 0; // m, from the blade to the body
   if (dynamic_cast<const solvers::Growable*>(model_.body.get()) != nullptr) {
     if (result.cut->update == SystemUpdate::none)
       return;
@@ -76,26 +70,42 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
         edge_travel(scenario_.blade->edge, *model_.window_seen, *sample.blade) < looked_after * fine)
       return;
     result.residual = residual(model_);
-    const topology::SurfaceMesh way = way_of(way_spacings * fine);
+    const topology::SurfaceMesh way = way_ahead_of(sample, last, way_spacings * fine);
     if (has_room && result.residual < drifted && covers(model_.window_way, way, fine)) {
       model_.window_seen = *sample.blade;
       return;
     }
-  } else {
-    entry = way_into_body(sample);
-    if (result.cut->triangles > 0 || std::string_view(model_.not_following) == too_much_of_body ||
-        entry > way_spacings * fine ||
-        !hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty())
-      return;
+    begin_recondensing(sample, last, 0);
+  } else if (result.cut->triangles == 0) {
+    meet_blade(sample, last);
   }
+}
+
+// A body that does not follow is made to as the blade comes near.
+void Session::meet_blade(const StepSample& sample, const std::optional<topology::BladePose>& last) {
+  const double entry = way_into_body(sample);
+  if (std::string_view(model_.not_following) != too_much_of_body && entry <= way_spacings * zone_.spacing.fine &&
+      hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty())
+    begin_recondensing(sample, last, entry);
+}
+
+topology::SurfaceMesh Session::way_ahead_of(const StepSample& sample, const std::optional<topology::BladePose>& last,
+                                            double length) const {
+  return incisions_->way_through(blade_ahead(sample, last, length),
+                                 [this](const Vector3& x) { return rest_position(x); });
+}
+
+void Session::begin_recondensing(const StepSample& sample, const std::optional<topology::BladePose>& last,
+                                 double entry) {
+  const double fine = zone_.spacing.fine;
   for (const double spacings : {background_spacings, way_spacings}) {
-    topology::SurfaceMesh way = way_of(entry + spacings * fine);
+    topology::SurfaceMesh way = way_ahead_of(sample, last, entry + spacings * fine);
     if (std::none_of(way.vertices.begin(), way.vertices.end(),
                      [&](const Vector3& x) { return organ_.domain->signed_distance(x) < 0; }))
       return;
     if (!can_follow(scenario_, model_, way))
       continue;
-    recondensing_ = recondense(scenario_, model_, way, std::move(given_up_));
+    recondensing_ = recondense(scenario_, model_, way, advance() == 0 ? followed_in_one : 1, std::move(given_up_));
     recondensing_way_ = std::move(way);
     return;
   }

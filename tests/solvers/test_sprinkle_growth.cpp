@@ -164,6 +164,42 @@ TEST_CASE("A cut grown by twenty increments keeps distant nodes and stays as ful
   }
 }
 
+TEST_CASE("Increments merged into one leave the nodes that they leave one after the other") {
+  const auto domain = growing_block();
+  SprinkleOptions options;
+  options.spacing.fine = options.spacing.coarse = 0.0075;
+  const NodeCloud uncut = sprinkle(*domain, options).nodes;
+  const auto after = [](const NodeCloud& nodes, const SprinkleIncrement& increment) {
+    NodeCloud next;
+    for (int i = 0; i < nodes.size(); ++i)
+      if (!std::binary_search(increment.removed.begin(), increment.removed.end(), i))
+        next.add(nodes, i);
+    for (int k = 0; k < increment.added.size(); ++k)
+      next.add(increment.added, k);
+    return next;
+  };
+  NodeCloud nodes = uncut;
+  std::shared_ptr<const topology::Incision> before;
+  SprinkleIncrement all;
+  bool takes_back = false; // a node that an earlier one of them has added
+  for (int step = 1; step <= 12; ++step) {
+    options.incision = edge_cut(domain, step);
+    const SprinkleIncrement increment = extend_sprinkling(*domain, options, nodes, before.get());
+    const int kept = uncut.size() - static_cast<int>(all.removed.size());
+    takes_back = takes_back || (!increment.removed.empty() && increment.removed.back() >= kept);
+    all = merged(all, increment, uncut.size());
+    nodes = after(nodes, increment);
+    before = options.incision;
+  }
+  CHECK(takes_back);
+  CHECK(std::is_sorted(all.removed.begin(), all.removed.end()));
+  const NodeCloud at_once = after(uncut, all);
+  CHECK(at_once.positions == nodes.positions);
+  CHECK(at_once.reaches == nodes.reaches);
+  CHECK(at_once.kinds == nodes.kinds);
+  CHECK(at_once.normals == nodes.normals);
+}
+
 TEST_CASE("Nothing happens where the cut has not grown, and bad increments are refused") {
   const auto domain = growing_block();
   SprinkleOptions options;

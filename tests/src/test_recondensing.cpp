@@ -87,8 +87,10 @@ TEST_CASE("A body that takes over from the background is the one built from scra
 
 TEST_CASE("A cut during condensing is repeated on the new body, and when a thread runs does not change a bit") {
   const bool early = GENERATE(false, true);
+  // In short steps the new body follows several of them in one, and the rest of them where it is taken over.
+  const std::string text = replaced(bar, "step = 0.125", GENERATE("step = 0.125", "step = 0.03125"));
   int taken = 0, taken_slowly = 0;
-  Session quick(scenario_of(bar)), slow(scenario_of(bar));
+  Session quick(scenario_of(text)), slow(scenario_of(text));
   quick.set_recondensing(true);
   slow.set_recondensing(true);
   const std::vector<VectorX> a = run(quick, early, std::chrono::milliseconds(0), taken);
@@ -129,4 +131,21 @@ TEST_CASE("In the loop a body from the background is taken over at the recorded 
   const LoopRecords records = run_twice(scenario_of(bar), events, 1000);
   CHECK(std::count_if(records.solves.begin(), records.solves.end(),
                       [](const SolveRecord& solve) { return !solve.update.empty(); }) >= 3);
+}
+
+TEST_CASE("A session that is made ready has a body that follows the first cut") {
+  const std::string text = replaced(bar, "step = 0.125", "step = 0.125\nadvance = 0");
+  Session ready(scenario_of(text)), other(scenario_of(text));
+  std::vector<SystemUpdate> first;
+  for (Session* session : {&ready, &other}) {
+    session->set_recondensing(session == &ready);
+    session->prepare(session->steps().front());
+    CHECK_FALSE(session->recondensing()); // it is there
+    first.push_back(SystemUpdate::none);
+    for (std::size_t i = 0; i < session->steps().size() && first.back() == SystemUpdate::none; ++i)
+      first.back() = session->step(session->steps()[i]).cut->update;
+  }
+  CHECK(first == std::vector{SystemUpdate::updated, SystemUpdate::rebuilt});
+  const solvers::Field now = ready.body()->solve(), scratch = rebuilt_from_scratch(ready)->solve();
+  CHECK((now.coefficients - scratch.coefficients).norm() < 2e-3 * scratch.coefficients.norm());
 }
