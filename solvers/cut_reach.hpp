@@ -163,7 +163,7 @@ inline constexpr double node_margin = 0.35;
 /// farther away.
 inline constexpr double exchange_reach = 3;
 
-/// How far a cut may go on, in spacings, until what was eliminated ahead of it has to be chosen anew.
+/// How far a cut may go on, in spacings, until what was eliminated ahead of it has to be chosen anew (`collocation`).
 inline constexpr double advance_before_new = 0.5;
 
 /// Whether an increment along `way` may change what lies within `half` m of x.

@@ -126,11 +126,8 @@ double Session::way_into_body(const StepSample& sample) const {
 void Session::lead_recondensing(const StepSample& sample, const topology::RestMap& to_rest) {
   if (recondensing_ == nullptr)
     return;
-  const double length = way_spacings * zone_.spacing.fine;
   if (followed_)
-    recondensing_->follow(*followed_, model_.body->problem(),
-                          incisions_->way_through(blade_ahead(sample, last_blade_, length), to_rest),
-                          model_.patch.nodes);
+    recondensing_->follow(*followed_, model_.body->problem(), way_of_blade(sample, to_rest), model_.patch.nodes);
   else
     drop_recondensing();
 }
