@@ -232,15 +232,13 @@ bool Reach::sees(const Vector3& x, double half) const {
 
 bool Reach::is_hidden(const Vector3& centre, const Vector3& half, const Eye& eye, bool by_new) const {
   thread_local std::vector<int> walls;
-  walls.clear();
-  known_.incision->walls_between(centre, half, eye.position, walls);
-  return by_new ? std::any_of(walls.begin(), walls.end(),
-                              [&](const int wall) {
-                                const auto [sheet, triangle] = known_.incision->triangle_of(wall);
-                                return sheet >= std::ssize(known_.triangles) ||
-                                       triangle >= known_.triangles[static_cast<std::size_t>(sheet)];
-                              })
-                : !walls.empty();
+  const std::size_t most = by_new ? std::numeric_limits<std::size_t>::max() : 0;
+  if (!known_.incision->walls_between(centre, half, eye.position, most, walls))
+    return true;
+  return std::any_of(walls.begin(), walls.end(), [&](const int wall) {
+    const auto [sheet, triangle] = known_.incision->triangle_of(wall);
+    return sheet >= std::ssize(known_.triangles) || triangle >= known_.triangles[static_cast<std::size_t>(sheet)];
+  });
 }
 
 bool Reach::passes(const std::vector<Vector3>& places, const std::vector<Eye>& eyes, bool by_new, double nearest,

@@ -29,6 +29,7 @@ constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nea
 // 2e-4 spacings below. That tells nothing across the plane, but scaled to a unit diagonal the moment matrix does not
 // show it.
 constexpr double flattest = 1e-6;
+constexpr std::size_t few_walls = 8;     // among so many the one that blocks a sight line is found one by one
 constexpr double largest_growth = 2.5; // of a sphere at a point, 1.25^4
 
 /// Everything about the support of one point, node by node, with room for whole registers.
@@ -227,15 +228,18 @@ void CutSight::look(std::span<const QuadraturePoint> points, std::span<const int
     if ((concern_[id] & touches_sheet) == 0)
       continue;
     const topology::Eye& eye = eyes_[id];
-    view.walls.clear();
-    incision.walls_between(centre, half, eye.at, view.walls);
+    const bool are_few = incision.walls_between(centre, half, eye.at, few_walls, view.walls);
     if (view.walls.empty())
       continue;
+    int wall = view.walls.front();
+    const auto is_blocked = [&](const Vector3& a, const Vector3& b) {
+      return are_few ? incision.blocks(a, b, view.walls) : incision.blocks(a, b, wall);
+    };
     for (std::uint32_t bits = reached[k] & ~view.on_sheet; bits != 0; bits &= bits - 1) {
       const int q = std::countr_zero(bits);
       const std::uint32_t bit = std::uint32_t{1} << q;
       const Vector3& x = points[q].position;
-      if (!incision.blocks(x, eye.at, view.walls))
+      if (!is_blocked(x, eye.at))
         continue;
       if ((lifted & bit) == 0) {
         double smallest_radius = std::numeric_limits<double>::infinity();
@@ -247,7 +251,7 @@ void CutSight::look(std::span<const QuadraturePoint> points, std::span<const int
       }
       // As a rule one of the same walls stands between the lifted eyes, too.
       const topology::Eye& own = view.points[q].eye;
-      if (incision.blocks(own.lifted, eye.lifted, view.walls) || incision.hides_blocked(own, eye)) {
+      if (is_blocked(own.lifted, eye.lifted) || incision.hides_blocked(own, eye)) {
         view.hidden[k] |= bit;
         view.altered |= bit;
       }

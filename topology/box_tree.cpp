@@ -83,10 +83,13 @@ int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<std:
   for (int d = 0; d < 3; ++d) {
     node.boxes.centre[d].setZero();
     node.boxes.half[d].setZero();
-    node.across[d].setZero();
+    for (Slabs& slabs : node.slabs)
+      slabs.across[d].setZero();
   }
-  node.height.setZero();
-  node.thickness.setConstant(std::numeric_limits<float>::infinity());
+  for (Slabs& slabs : node.slabs) {
+    slabs.height.setZero();
+    slabs.thickness.setConstant(std::numeric_limits<float>::infinity());
+  }
   node.first.fill(0);
   node.count.fill(0);
   node.children = parts;
@@ -100,7 +103,7 @@ int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<std:
       node.boxes.centre[d][p] = static_cast<float>(0.5 * (lower[d] + upper[d]) - origin_[d]);
       node.boxes.half[d][p] = static_cast<float>(0.5 * (upper[d] - lower[d])) + rounding_;
     }
-    add_slab(triangles, cut[p], cut[p + 1], p, node);
+    add_slabs(triangles, cut[p], cut[p + 1], p, node);
     const bool leaf = cut[p + 1] - cut[p] <= leaf_size;
     node.first[p] = leaf ? cut[p] : build(boxes, triangles, centres, cut[p], cut[p + 1]);
     node.count[p] = leaf ? cut[p + 1] - cut[p] : 0;
@@ -109,9 +112,9 @@ int BoxTree::build(const std::vector<BoundingBox>& boxes, const std::vector<std:
   return self;
 }
 
-/// Slab about the triangles at order_[first, last).
-void BoxTree::add_slab(const std::vector<std::array<Vector3, 3>>& triangles, int first, int last, int child,
-                       Node& node) const {
+/// Slabs about the triangles at order_[first, last).
+void BoxTree::add_slabs(const std::vector<std::array<Vector3, 3>>& triangles, int first, int last, int child,
+                        Node& node) const {
   if (triangles.empty())
     return;
   const auto area = [&](int place) -> Vector3 {
@@ -126,19 +129,41 @@ void BoxTree::add_slab(const std::vector<std::array<Vector3, 3>>& triangles, int
   }
   if (!(sum.norm() > 0))
     return;
-  const Eigen::Vector3f across = sum.normalized().cast<float>();
-  const Vector3 exact = across.cast<double>(); // heights are those along the direction that is kept
-  double lower = std::numeric_limits<double>::infinity(), upper = -lower;
-  for (int i = first; i < last; ++i)
-    for (const Vector3& corner : triangles[order_[i]]) {
-      const double height = exact.dot(corner - origin_);
-      lower = std::min(lower, height);
-      upper = std::max(upper, height);
-    }
-  for (int d = 0; d < 3; ++d)
-    node.across[d][child] = across[d];
-  node.height[child] = static_cast<float>(0.5 * (lower + upper));
-  node.thickness[child] = static_cast<float>(0.5 * (upper - lower) + 2 * margin_) + rounding_;
+  // In the plane across the normal: where the corners spread least, a principal direction of theirs.
+  const Vector3 normal = sum.normalized(), u = normal.unitOrthogonal(), v = normal.cross(u);
+  const double corners = 3.0 * (last - first);
+  double u_mean = 0, v_mean = 0, uu = 0, vv = 0, uv = 0;
+  const auto for_corners = [&](const auto& visit) {
+    for (int i = first; i < last; ++i)
+      for (const Vector3& corner : triangles[order_[i]])
+        visit(corner - origin_);
+  };
+  for_corners([&](const Vector3& x) {
+    u_mean += u.dot(x) / corners;
+    v_mean += v.dot(x) / corners;
+  });
+  for_corners([&](const Vector3& x) {
+    const double from_u = u.dot(x) - u_mean, from_v = v.dot(x) - v_mean;
+    uu += from_u * from_u;
+    vv += from_v * from_v;
+    uv += from_u * from_v;
+  });
+  const double least = 0.5 * std::atan2(-2 * uv, vv - uu); // angle from u
+  const auto set = [&](const Vector3& direction, Slabs& slabs) {
+    const Eigen::Vector3f across = direction.cast<float>();
+    const Vector3 exact = across.cast<double>(); // heights are those along the direction that is kept
+    double lower = std::numeric_limits<double>::infinity(), upper = -lower;
+    for_corners([&](const Vector3& x) {
+      lower = std::min(lower, exact.dot(x));
+      upper = std::max(upper, exact.dot(x));
+    });
+    for (int d = 0; d < 3; ++d)
+      slabs.across[d][child] = across[d];
+    slabs.height[child] = static_cast<float>(0.5 * (lower + upper));
+    slabs.thickness[child] = static_cast<float>(0.5 * (upper - lower) + 2 * margin_) + rounding_;
+  };
+  set(normal, node.slabs[0]);
+  set(std::cos(least) * u + std::sin(least) * v, node.slabs[1]);
 }
 
 bool BoxTree::any_within(const Vector3& x, double radius) const {

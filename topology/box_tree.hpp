@@ -1,6 +1,7 @@
 // A tree of boxes, four children a node, over the boxes of any primitives: segments against boxes and nearest-first
-// search. Over triangles every box holds a slab as well, along their mean normal: segments beside a sheet that is
-// nearly plane end there, however it is turned. Single precision with an allowance for rounding, so that no query ever
+// search. Over triangles every box holds two slabs as well, one along their mean normal and one across them where they
+// are narrowest: segments beside a sheet that is nearly plane, and beside narrow strips of it, end there, however it is
+// turned. Single precision with an allowance for rounding, so that no query ever
 // misses a box; the exact tests are the caller's. Queries do not allocate. Used by the incision alone.
 #pragma once
 
@@ -29,9 +30,10 @@ class BoxTree {
   template <class Hit>
   [[nodiscard]] bool any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const;
 
-  /// Calls visit(place) for every primitive whose box may meet a segment from a point of the box centre +- half to y.
-  template <class Visit>
-  void for_all_between(const Vector3& centre, const Vector3& half, const Vector3& y, const Visit& visit) const;
+  /// Calls hit(place) for every primitive whose box may meet a segment from a point of the box centre +- half to y,
+  /// until it returns true; whether it did.
+  template <class Hit>
+  [[nodiscard]] bool any_between(const Vector3& centre, const Vector3& half, const Vector3& y, const Hit& hit) const;
 
   /// Visits primitives in about the order of bound(boxes), lower bounds of the cost of anything in each of four boxes,
   /// and skips the boxes whose bound is above the best cost so far.
@@ -58,10 +60,27 @@ class BoxTree {
   [[nodiscard]] const Vector3& origin() const { return origin_; }
 
  private:
+  /// Of four boxes.
+  struct Slabs {
+    std::array<Four, 3> across; // unit normal of each
+    Four height, thickness;     // m, of its middle plane over origin_, half its thickness; infinite: no slab
+    [[nodiscard]] Four along(const Eigen::Vector3f& x) const {
+      return across[0] * x[0] + across[1] * x[1] + across[2] * x[2];
+    }
+    /// How far the segments m +- e are from them at least.
+    [[nodiscard]] Four apart(const Eigen::Vector3f& m, const Eigen::Vector3f& e) const {
+      return (along(m) - height).abs() - along(e).abs() - thickness;
+    }
+    /// The same of the hull of the box c +- h and a point.
+    [[nodiscard]] Four apart(const Eigen::Vector3f& c, const Eigen::Vector3f& h, const Eigen::Vector3f& point) const {
+      const Four at_point = along(point) - height, at_centre = along(c) - height;
+      const Four spread = across[0].abs() * h[0] + across[1].abs() * h[1] + across[2].abs() * h[2];
+      return at_point.min(at_centre - spread).max(-at_point.max(at_centre + spread)) - thickness;
+    }
+  };
   struct Node {
     Boxes boxes;
-    std::array<Four, 3> across; // unit normal of each slab
-    Four height, thickness;     // m, of its middle plane over origin_, half its thickness; infinite: no slab
+    std::array<Slabs, 2> slabs; // along the mean normal, and in its plane
     std::array<int, 4> first;   // leaf: its first place; inner node: its index
     std::array<int, 4> count;   // primitives of a leaf, 0 for an inner node
     int children;
@@ -75,7 +94,8 @@ class BoxTree {
   bool any_met(const Apart& apart_from, const Hit& hit) const;
   int build(const std::vector<BoundingBox>& boxes, const std::vector<std::array<Vector3, 3>>& triangles,
             const std::vector<Vector3>& centres, int first, int last);
-  void add_slab(const std::vector<std::array<Vector3, 3>>& triangles, int first, int last, int child, Node& node) const;
+  void add_slabs(const std::vector<std::array<Vector3, 3>>& triangles, int first, int last, int child,
+                 Node& node) const;
   int halve(const std::vector<Vector3>& centres, int first, int last);
 
   std::vector<Node> nodes_;
@@ -120,9 +140,7 @@ bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit)
   const auto apart_from = [&](const Node& node) -> Four {
     const auto& [centre, half] = node.boxes;
     const Four x = centre[0] - m[0], y = centre[1] - m[1], z = centre[2] - m[2];
-    const auto& n = node.across;
-    Four apart = (n[0] * m[0] + n[1] * m[1] + n[2] * m[2] - node.height).abs() -
-                 (n[0] * e[0] + n[1] * e[1] + n[2] * e[2]).abs() - node.thickness - 2 * margin;
+    Four apart = node.slabs[0].apart(m, e).max(node.slabs[1].apart(m, e)) - 2 * margin;
     apart = apart.max((x.abs() - half[0] - (reach[0] + margin)).max(y.abs() - half[1] - (reach[1] + margin)));
     apart = apart.max(z.abs() - half[2] - (reach[2] + margin));
     apart = apart.max((y * e[2] - z * e[1]).abs() - half[1] * reach[2] - half[2] * reach[1] - cross_margin);
@@ -133,11 +151,11 @@ bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit)
   return any_met(apart_from, hit);
 }
 
-template <class Visit>
-void BoxTree::for_all_between(const Vector3& centre, const Vector3& half, const Vector3& y, const Visit& visit) const {
+template <class Hit>
+bool BoxTree::any_between(const Vector3& centre, const Vector3& half, const Vector3& y, const Hit& hit) const {
   const Vector3 lower = y.cwiseMin(centre - half), upper = y.cwiseMax(centre + half);
   if (empty() || (lower.array() > bounds_.upper.array()).any() || (upper.array() < bounds_.lower.array()).any())
-    return;
+    return false;
   // Separating axes of a box and the hull of the box of points (centre c, half extent h) and y: as of a segment, whose
   // projections are longer by those of the box of points; along the cross products the whole hull projects as that box.
   const Eigen::Vector3f c = (centre - origin_).cast<float>(), h = half.cast<float>(), end = (y - origin_).cast<float>();
@@ -147,11 +165,7 @@ void BoxTree::for_all_between(const Vector3& centre, const Vector3& half, const 
   const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
   const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
   const auto apart_from = [&](const Node& node) -> Four {
-    const auto& n = node.across;
-    const Four at_end = n[0] * end[0] + n[1] * end[1] + n[2] * end[2] - node.height;
-    const Four at_centre = n[0] * c[0] + n[1] * c[1] + n[2] * c[2] - node.height;
-    const Four spread = n[0].abs() * h[0] + n[1].abs() * h[1] + n[2].abs() * h[2];
-    Four apart = at_end.min(at_centre - spread).max(-at_end.max(at_centre + spread)) - node.thickness - 2 * margin;
+    Four apart = node.slabs[0].apart(c, h, end).max(node.slabs[1].apart(c, h, end)) - 2 * margin;
     const auto& [middle, extent] = node.boxes;
     apart = apart.max((middle[0] - m[0]).abs() - extent[0] - (reach[0] + margin));
     apart = apart.max((middle[1] - m[1]).abs() - extent[1] - (reach[1] + margin));
@@ -163,10 +177,7 @@ void BoxTree::for_all_between(const Vector3& centre, const Vector3& half, const 
     apart = apart.max((u * e[1] - v * e[0]).abs() - a * turned[1] - b * turned[0] - cross_margin);
     return apart;
   };
-  any_met(apart_from, [&](int place) {
-    visit(place);
-    return false;
-  });
+  return any_met(apart_from, hit);
 }
 
 template <class Bound, class Visit>

@@ -165,8 +165,19 @@ struct Incision::Data {
   }
 
   [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b) const {
+    int wall = -1;
+    return blocks(a, b, wall);
+  }
+  [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b, int& wall) const {
     const Vector3 p = a - tree.origin(), q = b - tree.origin();
-    return tree.any_on_segment(a, b, [&](int place) { return walls[place].meets(p, q, flat); });
+    if (wall >= 0 && walls[wall].meets(p, q, flat))
+      return true;
+    return tree.any_on_segment(a, b, [&](int place) {
+      if (!walls[place].meets(p, q, flat))
+        return false;
+      wall = place;
+      return true;
+    });
   }
 
   /// Whether x sees the point f of the front, apart from the last thousandth of the way, where the border itself is.
@@ -241,13 +252,18 @@ bool Incision::blocks(const Vector3& a, const Vector3& b) const {
   return data_->blocks(a, b);
 }
 
-void Incision::walls_between(const Vector3& centre, const Vector3& half, const Vector3& y,
+bool Incision::walls_between(const Vector3& centre, const Vector3& half, const Vector3& y, std::size_t most,
                              std::vector<int>& walls) const {
   const Data& data = *data_;
   const Vector3 from = centre - data.tree.origin(), to = y - data.tree.origin();
-  data.tree.for_all_between(centre, half, y, [&](int place) {
-    if (!data.walls[place].is_beside(from, half, to, data.flat))
-      walls.push_back(place);
+  walls.clear();
+  return !data.tree.any_between(centre, half, y, [&](int place) {
+    if (data.walls[place].is_beside(from, half, to, data.flat))
+      return false;
+    if (walls.size() == most)
+      return true;
+    walls.push_back(place);
+    return false;
   });
 }
 
@@ -264,6 +280,10 @@ bool Incision::blocks(const Vector3& a, const Vector3& b, std::span<int> walls) 
       return true;
     }
   return false;
+}
+
+bool Incision::blocks(const Vector3& a, const Vector3& b, int& wall) const {
+  return data_->blocks(a, b, wall);
 }
 
 bool Incision::near(const Vector3& x, double radius) const {

@@ -74,9 +74,11 @@ class Incision {
   /// Whether the closed segment from a to b meets a sheet (touching counts).
   [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b) const;
 
-  /// Appends to `walls` the triangles that may meet a segment from some point of the box centre +- half, m, to y, as
-  /// numbers for the next query. When there are none no such segment is blocked.
-  void walls_between(const Vector3& centre, const Vector3& half, const Vector3& y, std::vector<int>& walls) const;
+  /// The triangles that may meet a segment from some point of the box centre +- half, m, to y, as numbers for the next
+  /// query. When there are none no such segment is blocked. False where there are more than `most`, of which `walls` has
+  /// as many then.
+  bool walls_between(const Vector3& centre, const Vector3& half, const Vector3& y, std::size_t most,
+                     std::vector<int>& walls) const;
 
   /// Sheet and triangle that such a number stands for.
   [[nodiscard]] std::pair<int, int> triangle_of(int wall) const;
@@ -84,6 +86,9 @@ class Incision {
   /// What blocks(a, b) says, for a in a box whose walls before b are given; changes their order, the one that blocks
   /// comes first.
   [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b, std::span<int> walls) const;
+
+  /// What blocks(a, b) says, sooner where the triangle `wall` is the one that blocks; sets it to the one that does.
+  [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b, int& wall) const;
 
   /// False when no sheet comes nearer to x than `radius` m: then no sight line inside that ball is blocked. May be true
   /// without need. A few nanoseconds far from the sheets.
