@@ -163,7 +163,9 @@ void BoxTree::add_slabs(const std::vector<std::array<Vector3, 3>>& triangles, in
     slabs.thickness[child] = static_cast<float>(0.5 * (upper - lower) + 2 * margin_) + rounding_;
   };
   set(normal, node.slabs[0]);
-  set(std::cos(least) * u + std::sin(least) * v, node.slabs[1]);
+  const Vector3 narrowest = std::cos(least) * u + std::sin(least) * v;
+  set(narrowest, node.slabs[1]);
+  set(normal.cross(narrowest), node.slabs[2]);
 }
 
 bool BoxTree::any_within(const Vector3& x, double radius) const {

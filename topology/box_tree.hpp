@@ -1,7 +1,7 @@
 // A tree of boxes, four children a node, over the boxes of any primitives: segments against boxes and nearest-first
-// search. Over triangles every box holds two slabs as well, one along their mean normal and one across them where they
-// are narrowest: segments beside a sheet that is nearly plane, and beside narrow strips of it, end there, however it is
-// turned. Single precision with an allowance for rounding, so that no query ever
+// search. Over triangles every box holds three slabs as well, along their mean normal and two directions across it, one
+// of them where they are narrowest: segments beside a sheet that is nearly plane, and beside narrow strips of it, end
+// there, however it is turned. Single precision with an allowance for rounding, so that no query ever
 // misses a box; the exact tests are the caller's. Queries do not allocate. Used by the incision alone.
 #pragma once
 
@@ -26,7 +26,8 @@ class BoxTree {
   [[nodiscard]] bool empty() const { return order_.empty(); }
   [[nodiscard]] const BoundingBox& bounds() const { return bounds_; }
 
-  /// Calls hit(place) for every primitive whose box may meet the segment a b until it returns true; whether it did.
+  /// Of triangles: calls hit(place) for every one whose slabs may meet the segment a b until it returns true; whether
+  /// it did.
   template <class Hit>
   [[nodiscard]] bool any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const;
 
@@ -67,11 +68,7 @@ class BoxTree {
     [[nodiscard]] Four along(const Eigen::Vector3f& x) const {
       return across[0] * x[0] + across[1] * x[1] + across[2] * x[2];
     }
-    /// How far the segments m +- e are from them at least.
-    [[nodiscard]] Four apart(const Eigen::Vector3f& m, const Eigen::Vector3f& e) const {
-      return (along(m) - height).abs() - along(e).abs() - thickness;
-    }
-    /// The same of the hull of the box c +- h and a point.
+    /// How far the hull of the box c +- h and a point is from them at least.
     [[nodiscard]] Four apart(const Eigen::Vector3f& c, const Eigen::Vector3f& h, const Eigen::Vector3f& point) const {
       const Four at_point = along(point) - height, at_centre = along(c) - height;
       const Four spread = across[0].abs() * h[0] + across[1].abs() * h[1] + across[2].abs() * h[2];
@@ -80,7 +77,7 @@ class BoxTree {
   };
   struct Node {
     Boxes boxes;
-    std::array<Slabs, 2> slabs; // along the mean normal, and in its plane
+    std::array<Slabs, 3> slabs; // along the mean normal, and in its plane; at right angles to each other
     std::array<int, 4> first;   // leaf: its first place; inner node: its index
     std::array<int, 4> count;   // primitives of a leaf, 0 for an inner node
     int children;
@@ -132,20 +129,20 @@ bool BoxTree::any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit)
   if (empty() || (a.cwiseMin(b).array() > bounds_.upper.array()).any() ||
       (a.cwiseMax(b).array() < bounds_.lower.array()).any())
     return false;
-  // Separating axes of a segment (middle m, half vector e) and a box: three of the box, three cross products.
+  // Separating axes of a segment (middle m, half vector e) and the box that the slabs are: its three, and three cross
+  // products.
   const Eigen::Vector3f m = (0.5 * (a + b) - origin_).cast<float>(), e = (0.5 * (b - a)).cast<float>();
-  const Eigen::Vector3f reach = e.cwiseAbs();
-  const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
-  const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
+  const float longest = e.cwiseAbs().maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
+  const float margin = 2 * (rounding_ + 3e-7F * size), cross_margin = 8.0F * margin * longest;
   const auto apart_from = [&](const Node& node) -> Four {
-    const auto& [centre, half] = node.boxes;
-    const Four x = centre[0] - m[0], y = centre[1] - m[1], z = centre[2] - m[2];
-    Four apart = node.slabs[0].apart(m, e).max(node.slabs[1].apart(m, e)) - 2 * margin;
-    apart = apart.max((x.abs() - half[0] - (reach[0] + margin)).max(y.abs() - half[1] - (reach[1] + margin)));
-    apart = apart.max(z.abs() - half[2] - (reach[2] + margin));
-    apart = apart.max((y * e[2] - z * e[1]).abs() - half[1] * reach[2] - half[2] * reach[1] - cross_margin);
-    apart = apart.max((z * e[0] - x * e[2]).abs() - half[2] * reach[0] - half[0] * reach[2] - cross_margin);
-    apart = apart.max((x * e[1] - y * e[0]).abs() - half[0] * reach[1] - half[1] * reach[0] - cross_margin);
+    const auto& [p, q, r] = node.slabs;
+    const Four x = p.along(m) - p.height, y = q.along(m) - q.height, z = r.along(m) - r.height;
+    const Four u = p.along(e), v = q.along(e), w = r.along(e), u_long = u.abs(), v_long = v.abs(), w_long = w.abs();
+    Four apart = (x.abs() - u_long - p.thickness).max(y.abs() - v_long - q.thickness);
+    apart = apart.max(z.abs() - w_long - r.thickness) - margin;
+    apart = apart.max((y * w - z * v).abs() - q.thickness * w_long - r.thickness * v_long - cross_margin);
+    apart = apart.max((z * u - x * w).abs() - r.thickness * u_long - p.thickness * w_long - cross_margin);
+    apart = apart.max((x * v - y * u).abs() - p.thickness * v_long - q.thickness * u_long - cross_margin);
     return apart;
   };
   return any_met(apart_from, hit);
@@ -165,7 +162,8 @@ bool BoxTree::any_between(const Vector3& centre, const Vector3& half, const Vect
   const float longest = reach.maxCoeff(), size = m.cwiseAbs().maxCoeff() + longest;
   const float margin = rounding_ + 3e-7F * size, cross_margin = 8.0F * margin * longest;
   const auto apart_from = [&](const Node& node) -> Four {
-    Four apart = node.slabs[0].apart(c, h, end).max(node.slabs[1].apart(c, h, end)) - 2 * margin;
+    Four apart = node.slabs[0].apart(c, h, end).max(node.slabs[1].apart(c, h, end));
+    apart = apart.max(node.slabs[2].apart(c, h, end)) - 2 * margin;
     const auto& [middle, extent] = node.boxes;
     apart = apart.max((middle[0] - m[0]).abs() - extent[0] - (reach[0] + margin));
     apart = apart.max((middle[1] - m[1]).abs() - extent[1] - (reach[1] + margin));
