@@ -12,6 +12,7 @@
 #include <functional>
 #include <numeric>
 #include <random>
+#include <span>
 
 using namespace spherecut;
 using namespace spherecut::topology;
@@ -59,10 +60,10 @@ std::shared_ptr<const Domain> unit_box() {
   return make_box_domain(Vector3(0, 0, 0), Vector3(1, 1, 1), 0.25);
 }
 
-SurfaceMesh wavy(Random& random) {
+SurfaceMesh wavy(Random& random, int along = 12, int across = 9) {
   const double p = uniform(random, 0, 6), q = uniform(random, 0, 6);
   const Eigen::Quaterniond turn = Eigen::Quaterniond::UnitRandom();
-  return tests::grid_sheet(12, 9, [&](double s, double t) {
+  return tests::grid_sheet(along, across, [&](double s, double t) {
     return Vector3(turn * Vector3(0.8 * s - 0.4, 0.6 * t - 0.3, 0.08 * std::sin(5 * s + p) * std::cos(4 * t + q)) +
                    Vector3(0.5, 0.5, 0.5));
   });
@@ -97,9 +98,11 @@ TEST_CASE("Sight lines are blocked where a search through all triangles says so"
   Random random(1);
   const auto box = unit_box();
   int blocked = 0, open = 0;
-  for (int trial = 0; trial < 4; ++trial) {
-    const Incision incision({wavy(random), wavy(random)}, box);
-    for (int i = 0; i < 3000; ++i) {
+  for (int trial = 0; trial < 8; ++trial) {
+    // Narrow strips, too, as small steps of a blade leave.
+    const Incision incision({wavy(random), trial % 2 == 0 ? wavy(random) : wavy(random, 150, 2)}, box);
+    int wall = -1; // the last one that blocked
+    for (int i = 0; i < 2000; ++i) {
       const Vector3 a = in_box(random, Vector3(0, 0, 0), Vector3(1, 1, 1));
       const double length = i % 3 == 0 ? 1 : 0.15;
       const Vector3 b = a + length * in_box(random, Vector3(-1, -1, -1), Vector3(1, 1, 1));
@@ -113,6 +116,9 @@ TEST_CASE("Sight lines are blocked where a search through all triangles says so"
       (expected == 1 ? blocked : open) += 1;
       REQUIRE(incision.blocks(a, b) == (expected == 1));
       REQUIRE(incision.blocks(b, a) == (expected == 1));
+      REQUIRE(incision.blocks(a, b, wall) == (expected == 1));
+      if (expected == 1)
+        REQUIRE(incision.blocks(a, b, std::span(&wall, 1)));
     }
   }
   CHECK(blocked > 1000);
@@ -122,19 +128,23 @@ TEST_CASE("Sight lines are blocked where a search through all triangles says so"
 TEST_CASE("From a box of points the walls before a point block as the whole sheets do", "[incision]") {
   Random random(31);
   const auto box = unit_box();
-  int blocked = 0, free = 0, clear = 0;
+  int blocked = 0, free = 0, clear = 0, many = 0;
   for (int scene = 0; scene < 10; ++scene) {
-    const Incision incision({wavy(random), wavy(random)}, box);
-    std::vector<int> walls;
+    const Incision incision({wavy(random), scene % 2 == 0 ? wavy(random) : wavy(random, 150, 2)}, box);
+    constexpr std::size_t most = 8;
+    std::vector<int> walls, few;
     for (int trial = 0; trial < 300; ++trial) {
       const Vector3 centre = in_box(random, Vector3::Constant(-0.5), Vector3::Constant(1.5));
       const Vector3 half = in_box(random, Vector3::Zero(), Vector3::Constant(trial % 2 == 0 ? 0.2 : 0.02));
       Vector3 y = centre + in_box(random, Vector3::Constant(-0.6), Vector3::Constant(0.6));
       if (const auto face = incision.closest(y, 1); face && trial % 3 == 0) // as a node of a lip, on either face
         y = face->point + (trial % 2 == 0 ? 1e-5 : -1e-5) * face->normal;
-      walls.clear();
-      incision.walls_between(centre, half, y, walls);
+      REQUIRE(incision.walls_between(centre, half, y, 1000, walls));
       clear += walls.empty() ? 1 : 0;
+      REQUIRE(incision.walls_between(centre, half, y, most, few) == (walls.size() <= most));
+      REQUIRE(few.size() == std::min(most, walls.size()));
+      REQUIRE(incision.walls_between(centre, half, y, 0, few) == walls.empty());
+      many += walls.size() > most ? 1 : 0;
       for (int k = 0; k < 24; ++k) {
         Vector3 x = in_box(random, centre - half, centre + half);
         if (k < 8) // a corner
@@ -148,6 +158,7 @@ TEST_CASE("From a box of points the walls before a point block as the whole shee
   CHECK(blocked > 3000);
   CHECK(free > 3000);
   CHECK(clear > 300);
+  CHECK(many > 100);
 }
 
 TEST_CASE("No sight line slips between triangles through an edge or a vertex they share", "[incision]") {
