@@ -29,7 +29,7 @@ constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nea
 // 2e-4 spacings below. That tells nothing across the plane, but scaled to a unit diagonal the moment matrix does not
 // show it.
 constexpr double flattest = 1e-6;
-constexpr std::size_t few_walls = 8;     // among so many the one that blocks a sight line is found one by one
+constexpr std::size_t few_walls = 8;   // among so many the one that blocks a sight line is found one by one
 constexpr double largest_growth = 2.5; // of a sphere at a point, 1.25^4
 
 /// Everything about the support of one point, node by node, with room for whole registers.
@@ -251,7 +251,8 @@ void CutSight::look(std::span<const QuadraturePoint> points, std::span<const int
       }
       // As a rule one of the same walls stands between the lifted eyes, too.
       const topology::Eye& own = view.points[q].eye;
-      if (is_blocked(own.lifted, eye.lifted) || incision.hides_blocked(own, eye)) {
+      const bool is_told = !are_few && (own.on_face() || eye.on_face()); // by the whole sheets
+      if (is_blocked(own.lifted, eye.lifted) || (!is_told && incision.hides_blocked(own, eye))) {
         view.hidden[k] |= bit;
         view.altered |= bit;
       }

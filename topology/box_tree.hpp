@@ -1,8 +1,8 @@
 // A tree of boxes, four children a node, over the boxes of any primitives: segments against boxes and nearest-first
 // search. Over triangles every box holds three slabs as well, along their mean normal and two directions across it, one
-// of them where they are narrowest: segments beside a sheet that is nearly plane, and beside narrow strips of it, end
-// there, however it is turned. Single precision with an allowance for rounding, so that no query ever
-// misses a box; the exact tests are the caller's. Queries do not allocate. Used by the incision alone.
+// of them where their corners spread least: segments beside a sheet that is nearly plane, and beside narrow strips of
+// it, end there, however it is turned. Single precision with an allowance for rounding, so that no query ever misses
+// a primitive; the exact tests are the caller's. Queries do not allocate. Used by the incision alone.
 #pragma once
 
 #include "topology/types.hpp"
@@ -18,7 +18,7 @@ class BoxTree {
   BoxTree() = default;
   /// One box per primitive, m, all finite.
   explicit BoxTree(const std::vector<BoundingBox>& boxes);
-  /// Of triangles, whose boxes are `margin` m larger than they are.
+  /// Of triangles: queries come to those within `margin` m, too.
   BoxTree(const std::vector<std::array<Vector3, 3>>& triangles, double margin);
 
   /// The primitive at each place of the tree: primitives that lie close together have places close together.
@@ -26,13 +26,13 @@ class BoxTree {
   [[nodiscard]] bool empty() const { return order_.empty(); }
   [[nodiscard]] const BoundingBox& bounds() const { return bounds_; }
 
-  /// Of triangles: calls hit(place) for every one whose slabs may meet the segment a b until it returns true; whether
-  /// it did.
+  /// Calls hit(place) for every triangle that the segment a b may meet until it returns true; whether it did. A tree of
+  /// boxes alone has every one of them on the way.
   template <class Hit>
   [[nodiscard]] bool any_on_segment(const Vector3& a, const Vector3& b, const Hit& hit) const;
 
-  /// Calls hit(place) for every primitive whose box may meet a segment from a point of the box centre +- half to y,
-  /// until it returns true; whether it did.
+  /// Calls hit(place) for every primitive that a segment from a point of the box centre +- half to y may meet, until it
+  /// returns true; whether it did.
   template <class Hit>
   [[nodiscard]] bool any_between(const Vector3& centre, const Vector3& half, const Vector3& y, const Hit& hit) const;
 
@@ -64,7 +64,7 @@ class BoxTree {
   /// Of four boxes.
   struct Slabs {
     std::array<Four, 3> across; // unit normal of each
-    Four height, thickness;     // m, of its middle plane over origin_, half its thickness; infinite: no slab
+    Four height, thickness;     // m, of the middle plane over origin_, half of its own; infinite: no slab
     [[nodiscard]] Four along(const Eigen::Vector3f& x) const {
       return across[0] * x[0] + across[1] * x[1] + across[2] * x[2];
     }
@@ -77,7 +77,7 @@ class BoxTree {
   };
   struct Node {
     Boxes boxes;
-    std::array<Slabs, 3> slabs; // along the mean normal, and in its plane; at right angles to each other
+    std::array<Slabs, 3> slabs; // along the mean normal, and across it (about; nothing depends on right angles)
     std::array<int, 4> first;   // leaf: its first place; inner node: its index
     std::array<int, 4> count;   // primitives of a leaf, 0 for an inner node
     int children;
