@@ -114,7 +114,8 @@ constexpr std::array keys = {
     ScenarioKey{"nodes", table, "", "", "Sprinkling of the organ with nodes; left out: all defaults."},
     ScenarioKey{
         "nodes.fine_spacing", number, "m", "",
-        "Node spacing at the contact and the cuts; left out: tip radius / 3, or cut.front_spacing without a tool.",
+        "Node spacing at the contact, the fronts of the cuts and along the blade's way; left out: tip radius / 3, or "
+        "cut.front_spacing without a tool.",
         above(0, 1)},
     ScenarioKey{"nodes.coarse_spacing", number, "m", "",
                 "Largest node spacing, far from contact and cuts; left out: 1/10 of the largest extent, at least fine.",
@@ -303,8 +304,9 @@ constexpr std::array keys = {
         "refuse, hold, drop"},
     ScenarioKey{
         "cut.front_spacing", number, "m", "",
-        "Node spacing at the cuts and along the way of the blade, where it is finer than nodes.fine_spacing; left "
-        "out: that, or without it and without a tool a sixth of the root of the smallest precut's area, for a "
+        "Node spacing at the fronts of the cuts (a precut that parts the organ has none) and along the way of the "
+        "blade, where it is finer than nodes.fine_spacing; left out: that, or without it and without a tool a sixth of "
+        "the root of the smallest precut's area, for a "
         "blade a twelfth of its edge.",
         above(0, 1)},
 
