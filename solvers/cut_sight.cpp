@@ -29,6 +29,10 @@ constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nea
 // 2e-4 spacings below. That tells nothing across the plane, but scaled to a unit diagonal the moment matrix does not
 // show it.
 constexpr double flattest = 1e-6;
+// Largest sum of the gradients' lengths of an enriched support times the distance from the front. It is 1 to 16 where
+// nodes lie around the point (one in 100 000 above 16); hundreds where as many as the basis has functions lie on one
+// face and the others are about to leave: off a corner of the rim the field then goes astray by millimetres.
+constexpr double steepest = 40;
 constexpr std::size_t few_walls = 8;   // among so many the one that blocks a sight line is found one by one
 constexpr double largest_growth = 2.5; // of a sphere at a point, 1.25^4
 
@@ -429,6 +433,13 @@ bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& 
   resize(out, n);
   if (!(out.moment_condition <= worst_condition))
     return false;
+  if (enriched) {
+    double gradients = 0;
+    for (int k = 0; k < n; ++k)
+      gradients += out.gradient(k).norm();
+    if (gradients * front->distance > steepest)
+      return false;
+  }
   out.nodes.assign(support.ids, support.ids + n);
   return true;
 }

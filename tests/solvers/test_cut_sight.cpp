@@ -2,6 +2,7 @@
 
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/cut_block.hpp"
+#include "tests/support/sheets.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Geometry>
@@ -105,6 +106,44 @@ TEST_CASE("Near the front the enriched basis reproduces the crack field", "[cut_
   CHECK(tried > 200);
   CHECK(worst < 1e-9);
   CHECK(worst_gradient < 1e-6);
+}
+
+TEST_CASE("Off the rim of a slanted cut no enriched support runs wild", "[cut_sight]") {
+  // At a sharp corner of a lip a point sees the nodes of its own face and, at the end of their reach, a few others: as
+  // many as the enriched basis has functions, and yet next to nothing across the face.
+  const auto domain = topology::make_box_domain({0, -0.03, 0}, {0.04, 0, 0.03}, 0.004);
+  int looked_at = 0;
+  for (int stage = 0; stage < 6; ++stage) {
+    SprinkleOptions options;
+    options.spacing.fine = options.spacing.coarse = 0.004;
+    options.random_seed = static_cast<std::uint64_t>(stage) + 1;
+    const double front = -0.027 + 0.001 * stage;
+    options.incision = std::make_shared<topology::Incision>(
+        std::vector<topology::SurfaceMesh>{
+            tests::grid_sheet(4, 4,
+                              [&](double s, double t) {
+                                return Vector3(0.012 + 0.03 * s, -0.034 + t * (front + 0.034), 0.015 + 0.03 * s);
+                              })},
+        domain);
+    const NodeCloud nodes = sprinkle(*domain, options).nodes;
+    const Sight sight{.incision = options.incision, .rule = SightRule::enriched, .reach = 2.5};
+    const Spheres spheres(nodes.positions, nodes.spacings, 1.75, Basis::linear, 1e7, sight);
+    std::mt19937_64 random(static_cast<std::uint64_t>(stage));
+    ShapeFunctions shape;
+    for (int i = 0; i < nodes.size(); ++i)
+      for (int k = 0; k < 8 && nodes.kinds[i] == NodeKind::lip; ++k) {
+        const Vector3 x = nodes.positions[i] + (k == 0 ? Vector3(Vector3::Zero()) : random_point(random, 0.001));
+        if (domain->signed_distance(x) > 0 || !evaluate(spheres, x, shape))
+          continue;
+        ++looked_at;
+        double values = 0;
+        for (const double value : shape.value)
+          values += std::abs(value);
+        INFO("stage " << stage << ", node " << i << " at " << nodes.positions[i].transpose());
+        CHECK(values < 10);
+      }
+  }
+  CHECK(looked_at > 500);
 }
 
 TEST_CASE("First derivatives around a cut agree with finite differences of the values", "[cut_sight]") {
