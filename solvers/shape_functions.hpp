@@ -68,9 +68,9 @@ struct ShapeFunctions {
 };
 
 /// Values and exact first derivatives at x. False when the support of x is not sound (fewer nodes than basis functions,
-/// or a moment matrix worse conditioned than the spheres allow), even after trying radii grown by 1.25 up to four times
-/// at this point. The support is in ascending order of nodes. Where the enriched basis has no sound support the linear
-/// one takes its place.
+/// a moment matrix worse conditioned than the spheres allow, or an enriched basis that extrapolates), even after trying
+/// radii grown by 1.25 up to four times at this point. The support is in ascending order of nodes. Where the enriched
+/// basis has no sound support the linear one takes its place.
 bool evaluate(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
 
 /// The same at many points; out[i] belongs to points[i]. False when any support is not sound; the first such point is

@@ -75,8 +75,8 @@ class Incision {
   [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b) const;
 
   /// The triangles that may meet a segment from some point of the box centre +- half, m, to y, as numbers for the next
-  /// query. When there are none no such segment is blocked. False where there are more than `most`, of which `walls` has
-  /// as many then.
+  /// query. When there are none no such segment is blocked. False where there are more than `most`, of which `walls`
+  /// has as many then.
   bool walls_between(const Vector3& centre, const Vector3& half, const Vector3& y, std::size_t most,
                      std::vector<int>& walls) const;
 
