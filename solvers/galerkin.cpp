@@ -488,8 +488,10 @@ std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const Discret
 
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
   require_domain(problem);
-  if (options.sight == SightRule::appended && (problem.incision != nullptr || options.cut_ahead))
-    return std::make_unique<AppendedBody>(std::move(problem), options);
+  if (options.sight == SightRule::appended && (problem.incision != nullptr || options.cut_ahead)) {
+    std::shared_ptr<const UncutBody> uncut;
+    return make_appended(std::move(problem), options, uncut);
+  }
   return std::make_unique<Galerkin>(std::move(problem), options);
 }
 

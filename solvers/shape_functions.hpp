@@ -70,7 +70,7 @@ struct ShapeFunctions {
   std::vector<double> dxx, dyy, dzz, dxy, dxz, dyz; // 1/m2, filled by evaluate_second alone
   double moment_condition = 0;                      // 1-norm condition of the scaled moment matrix
   double growth = 1;                                // of all radii, for this point alone
-  std::vector<VectorTerm> vectors{};                // of a body with a cut that appends (Discretisation::shape_at alone)
+  std::vector<VectorTerm> vectors{}; // of a body with a cut that appends (Discretisation::shape_at alone)
   [[nodiscard]] int size() const { return static_cast<int>(nodes.size()); }
   [[nodiscard]] Vector3 gradient(int k) const { return {dx[k], dy[k], dz[k]}; }
 };

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <fmt/format.h>
 #include <utility>
 
@@ -21,22 +20,7 @@ UncutOptions uncut_options(const Problem& problem, const DiscretisationOptions& 
   with_cut.cut_ahead = true;
   uncut.support_radius = galerkin_support_radius(problem, with_cut);
   uncut.estimate_condition = options.estimate_condition;
-  if (const char* e = std::getenv("SC_CS"))
-    uncut.cell_size = std::atof(e);
-  if (const char* e = std::getenv("SC_RHO"))
-    uncut.support_radius = std::atof(e);
   return uncut;
-}
-
-CutSpaceOptions tuned() {
-  CutSpaceOptions o;
-  if (const char* e = std::getenv("SC_STEP"))
-    o.step_reach = std::atof(e);
-  if (const char* e = std::getenv("SC_RF"))
-    o.front.radius = std::atof(e);
-  if (const char* e = std::getenv("SC_G"))
-    o.front.gather = std::atof(e);
-  return o;
 }
 
 BoundingBox everywhere(const Problem& problem) {
@@ -86,22 +70,35 @@ int base_nodes(const NodeCloud& nodes) {
     ++base;
   for (int i = base; i < nodes.size(); ++i)
     if (nodes.kinds[i] != NodeKind::lip)
-      throw InputError(fmt::format("node {} stands behind lip node {}: where a cut only appends, lip nodes come last", i,
-                                   base));
+      throw InputError(
+          fmt::format("node {} stands behind lip node {}: where a cut only appends, lip nodes come last", i, base));
   return base;
 }
 
-AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options)
-    : AppendedBody(problem, options,
-                   std::make_shared<const UncutBody>(problem, base_nodes(problem.nodes), uncut_options(problem, options))) {}
+std::unique_ptr<Discretisation> make_appended(Problem problem, const DiscretisationOptions& options,
+                                              std::shared_ptr<const UncutBody>& uncut) {
+  require_domain(problem);
+  check_problem(problem);
+  const int base = base_nodes(problem.nodes);
+  if (uncut == nullptr || !uncut->fits(problem, base))
+    uncut = std::make_shared<const UncutBody>(problem, base, uncut_options(problem, options));
+  return std::make_unique<AppendedBody>(std::move(problem), options, uncut);
+}
 
-AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options, std::shared_ptr<const UncutBody> uncut)
+AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options)
+    : AppendedBody(
+          problem, options,
+          std::make_shared<const UncutBody>(problem, base_nodes(problem.nodes), uncut_options(problem, options))) {}
+
+AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options,
+                           std::shared_ptr<const UncutBody> uncut)
     : problem_(std::move(problem)), options_(options), report_(uncut->report()), uncut_(std::move(uncut)) {
   check_problem(problem_);
   if (base_nodes(problem_.nodes) != uncut_->size())
-    throw InputError(fmt::format("{} nodes with spheres on an uncut body of {}", base_nodes(problem_.nodes), uncut_->size()));
+    throw InputError(
+        fmt::format("{} nodes with spheres on an uncut body of {}", base_nodes(problem_.nodes), uncut_->size()));
   space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
-                                      problem_.material, tuned());
+                                      problem_.material, CutSpaceOptions{});
   system_ = std::make_unique<CutSystem>(*uncut_, *space_);
   follow(everywhere(problem_));
 }
@@ -125,8 +122,8 @@ void AppendedBody::follow(const BoundingBox& region) {
     report_.assembly_seconds = watch.seconds();
 }
 
-BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown, const std::function<topology::SurfaceMesh()>&,
-                              bool) {
+BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown,
+                              const std::function<topology::SurfaceMesh()>&, bool) {
   const Stopwatch watch;
   if (!change.removed.empty() || base_nodes(grown.nodes) != uncut_->size())
     return {"nodes have been exchanged", {}};
@@ -141,7 +138,7 @@ BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown, co
     // As it was: the functions do not depend on the way that led to a cut.
     problem_ = std::move(before);
     space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
-                                        problem_.material, tuned());
+                                        problem_.material, CutSpaceOptions{});
     system_ = std::make_unique<CutSystem>(*uncut_, *space_);
     follow(everywhere(problem_));
     throw;
@@ -231,7 +228,8 @@ void AppendedBody::assemble_loads() {
           continue;
         const CutPart part = space_->cut().part(part_id(box, k));
         const double volume = part.share * boxes.boxes()[box].volume;
-        const Vector3 force = loads.body_force ? Vector3(volume * loads.body_force(part.centroid)) : Vector3(Vector3::Zero());
+        const Vector3 force =
+            loads.body_force ? Vector3(volume * loads.body_force(part.centroid)) : Vector3(Vector3::Zero());
         for (std::size_t n = 0; n < cell.nodes.size(); ++n) {
           const Vector3 gradient = cell.gradient_at(n, lane);
           const double value = cell.value_at(n, lane) + gradient.dot(part.centroid - boxes.boxes()[box].middle);
@@ -242,30 +240,36 @@ void AppendedBody::assemble_loads() {
     }
     for (int k = 0; k < std::ssize(space_->functions()); ++k) {
       const CutFunction& function = space_->functions()[k];
-      for (const int box : space_->boxes_of(function))
-        for (int p = 0; p < space_->cut().part_count(box); ++p) {
-          const PartId id = part_id(box, p);
-          if (is_dropped(id))
-            continue;
-          const CutPart part = space_->cut().part(id);
-          const double volume = part.share * boxes.boxes()[box].volume;
-          const Vector3 force = loads.body_force ? Vector3(volume * loads.body_force(part.centroid)) : Vector3(Vector3::Zero());
-          auto to = loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(k));
-          if (function.is_front) {
-            FrontTerm term;
-            if (!space_->term_at(k, id, term))
+      auto to = loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(k));
+      const auto volume_of = [&](PartId id) { return space_->cut().part(id).share * boxes.boxes()[box_of(id)].volume; };
+      const auto weight_of = [&](PartId id) -> Vector3 {
+        return loads.body_force ? Vector3(volume_of(id) * loads.body_force(space_->cut().part(id).centroid))
+                                : Vector3(Vector3::Zero());
+      };
+      if (function.is_front) {
+        std::vector<PartId> parts;
+        std::vector<FrontTerm> front;
+        for (const int cell : space_->cells_of(function)) {
+          space_->terms_in(k, cell, parts, front);
+          for (std::size_t e = 0; e < parts.size(); ++e) {
+            if (is_dropped(parts[e]))
               continue;
-            to += term.value.transpose() * force;
+            to += front[e].value.transpose() * weight_of(parts[e]);
             for (int m = 0; m < 3; ++m)
-              to[m] += volume * initial.cwiseProduct(term.gradient[m]).sum();
-          } else if (ScalarTerm term; space_->term_at(k, id, term)) {
-            // Of a twin the value is that at the middle of the box.
-            const double value = function.twin.is_step
-                                     ? term.value
-                                     : term.value + term.gradient.dot(part.centroid - boxes.boxes()[box].middle);
-            to += value * force + volume * initial * term.gradient;
+              to[m] += volume_of(parts[e]) * initial.cwiseProduct(front[e].gradient[m]).sum();
           }
         }
+        continue;
+      }
+      for (const PartId id : system_->parts_of(k)) {
+        ScalarTerm term;
+        if (is_dropped(id) || !space_->term_at(k, id, term))
+          continue;
+        // Of a twin with an indicator the value is that at the middle of the box.
+        const Vector3 off = space_->cut().part(id).centroid - boxes.boxes()[box_of(id)].middle;
+        const double value = function.twin.is_step ? term.value : term.value + term.gradient.dot(off);
+        to += value * weight_of(id) + volume_of(id) * initial * term.gradient;
+      }
     }
   }
   if (loads.traction)
@@ -304,7 +308,8 @@ std::vector<Vector3> AppendedBody::constraint_points() const {
   std::vector<Vector3> points;
   std::size_t base = 0;
   for (const Prescribed& entry : problem_.prescribed)
-    points.push_back(entry.node < uncut_->size() ? uncut_->held()[base++].centroid : problem_.nodes.positions[entry.node]);
+    points.push_back(entry.node < uncut_->size() ? uncut_->held()[base++].centroid
+                                                 : problem_.nodes.positions[entry.node]);
   return points;
 }
 
@@ -385,7 +390,8 @@ Field AppendedBody::solved(const CutVectors& loads, const VectorX& prescribed,
   VectorX coefficients = VectorX::Zero(coefficient_count());
   const auto rest = [&] { // what is not in balance yet
     CutVectors rows = system_->elastic_forces(coefficients.head(base), coefficients.tail(coefficients.size() - base));
-    system_->subtract_holding(coefficients.head(base), coefficients.tail(coefficients.size() - base), held, field, rows);
+    system_->subtract_holding(coefficients.head(base), coefficients.tail(coefficients.size() - base), held, field,
+                              rows);
     return CutVectors{loads.base - rows.base, loads.cut - rows.cut, loads.multipliers};
   };
   // A second solution takes back what the large penalties have rounded off.
@@ -519,7 +525,8 @@ std::vector<Vector3> AppendedBody::constraint_forces(const Field& field) const {
       forces.emplace_back(Vector3::Zero());
       continue;
     }
-    const Vector3 gap = field.prescribed.segment<3>(3 * k) - CutSystem::value(system_->held()[base++], parts.base, parts.cut);
+    const Vector3 gap =
+        field.prescribed.segment<3>(3 * k) - CutSystem::value(system_->held()[base++], parts.base, parts.cut);
     forces.emplace_back(constraint_stiffness(problem_, entry.node) * held_part(entry, gap));
   }
   return forces;
@@ -538,8 +545,9 @@ double AppendedBody::residual(const Field& field, const std::vector<int>& loaded
   CutVectors rows = system_->elastic_forces(parts.base, parts.cut);
   system_->subtract_holding(parts.base, parts.cut, base_prescribed(field.prescribed),
                             field.load_factor != 0 ? problem_.prescribed_field : nullptr, rows);
-  const double unbalanced = std::max((rows.base - applied.base).lpNorm<Eigen::Infinity>(),
-                                     (rows.cut - applied.cut).size() > 0 ? (rows.cut - applied.cut).lpNorm<Eigen::Infinity>() : 0);
+  const double unbalanced =
+      std::max((rows.base - applied.base).lpNorm<Eigen::Infinity>(),
+               (rows.cut - applied.cut).size() > 0 ? (rows.cut - applied.cut).lpNorm<Eigen::Infinity>() : 0);
   double largest = applied.base.lpNorm<Eigen::Infinity>();
   for (const Vector3& force : constraint_forces(field))
     largest = std::max(largest, force.lpNorm<Eigen::Infinity>());

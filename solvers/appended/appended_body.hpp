@@ -1,5 +1,5 @@
-// Method galerkin on a body whose cut only appends: the uncut body keeps its shape functions and its factor for good, and
-// a cut adds unknowns to it. Nodes of kind lip have no spheres: they are places on the faces of the cut, where lips
+// Method galerkin on a body whose cut only appends: the uncut body keeps its shape functions and its factor for good,
+// and a cut adds unknowns to it. Nodes of kind lip have no spheres: they are places on the faces of the cut, where lips
 // touch and openings are told. They come after all other nodes.
 #pragma once
 
@@ -20,14 +20,15 @@ class AppendedBody final : public Discretisation, public Growable {
   /// On an uncut body that is there already.
   AppendedBody(Problem problem, const DiscretisationOptions& options, std::shared_ptr<const UncutBody> uncut);
 
-  BodyGrowth grow(const SprinkleIncrement& change, Problem grown, const std::function<topology::SurfaceMesh()>& way_ahead,
-                  bool only_update) override;
+  BodyGrowth grow(const SprinkleIncrement& change, Problem grown,
+                  const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) override;
 
   [[nodiscard]] Method method() const override { return Method::galerkin; }
   [[nodiscard]] const Problem& problem() const override { return problem_; }
   [[nodiscard]] const AssemblyReport& report() const override { return report_; }
   [[nodiscard]] const std::shared_ptr<const UncutBody>& uncut() const { return uncut_; }
   [[nodiscard]] const CutSpace& space() const { return *space_; }
+  [[nodiscard]] int sphere_count() const override { return uncut_->size(); }
   [[nodiscard]] int coefficient_count() const override {
     return 3 * (uncut_->size() + static_cast<int>(space_->functions().size()));
   }
@@ -93,5 +94,10 @@ class AppendedBody final : public Discretisation, public Growable {
   mutable std::unordered_map<int, Contact> contacts_;
   mutable std::vector<CutFunctional> nodal_; // values at the nodes; empty: not asked for yet
 };
+
+/// A body of method galerkin with rule `appended`, on `uncut` where that fits its nodes (else, or where it is null, on
+/// a new one, which it becomes). Throws as discretise().
+std::unique_ptr<Discretisation> make_appended(Problem problem, const DiscretisationOptions& options,
+                                              std::shared_ptr<const UncutBody>& uncut);
 
 } // namespace spherecut::solvers

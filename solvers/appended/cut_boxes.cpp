@@ -48,7 +48,8 @@ std::vector<CutPart> CutBoxes::divide_by_samples(const SmallBox& box, const topo
     for (int b = 0; b < samples_along; ++b)
       for (int c = 0; c < samples_along; ++c) {
         const Vector3 x = box.centre - box.half + half.cwiseProduct(Vector3(2 * a + 1, 2 * b + 1, 2 * c + 1));
-        const auto [fraction, shift] = box.whole ? std::pair(1.0, Vector3(Vector3::Zero())) : part_inside(domain_, x, half);
+        const auto [fraction, shift] =
+            box.whole ? std::pair(1.0, Vector3(Vector3::Zero())) : part_inside(domain_, x, half);
         if (!(fraction > 0))
           continue;
         const auto plane = incision.closest(x, half.norm());
@@ -114,18 +115,18 @@ std::vector<CutPart> CutBoxes::divide(int index, const topology::Incision& incis
 std::vector<int> CutBoxes::update(const topology::Incision& incision, const BoundingBox& region) {
   std::vector<int> concerned, fresh;
   boxes_.within(region, concerned);
-  std::unordered_map<int, Divided> before;
+  std::unordered_map<int, std::unique_ptr<Divided>> before;
   for (const int box : concerned) {
-    if (const auto old = divided_.find(box); old != divided_.end()) {
-      before.insert(divided_.extract(old));
+    if (divided_[box] != nullptr) {
+      before[box] = std::move(divided_[box]);
       fresh.push_back(box);
     }
     std::vector<CutPart> parts = divide(box, incision);
     if (parts.size() > 1 || parts.front().share != 1 || parts.front().centroid != boxes_.boxes()[box].middle) {
       if (fresh.empty() || fresh.back() != box)
         fresh.push_back(box);
-      Divided& divided = divided_[box];
-      divided.parts = std::move(parts);
+      divided_[box] = std::make_unique<Divided>();
+      divided_[box]->parts = std::move(parts);
     }
   }
   // Links of what has been divided anew, and of what lies beside it.
@@ -138,14 +139,14 @@ std::vector<int> CutBoxes::update(const topology::Incision& incision, const Boun
   relinked.erase(std::unique(relinked.begin(), relinked.end()), relinked.end());
   std::vector<int> changed;
   for (const int box : relinked) {
-    const auto found = divided_.find(box);
     const auto old = before.find(box);
-    if (found == divided_.end()) {
+    if (divided_[box] == nullptr) {
       changed.push_back(box);
       continue;
     }
-    Divided& divided = found->second;
-    const Divided was = old != before.end() ? old->second : divided;
+    Divided& divided = *divided_[box];
+    const bool is_new = old == before.end() && std::binary_search(fresh.begin(), fresh.end(), box);
+    const Divided was = old != before.end() ? *old->second : divided;
     const SmallBox& at = boxes_.boxes()[box];
     const auto front = incision.front_frame(at.centre, at.half.norm());
     divided.joined = front && ((front->point - at.centre).cwiseAbs().array() <= at.half.array()).all();
@@ -162,7 +163,7 @@ std::vector<int> CutBoxes::update(const topology::Incision& incision, const Boun
           if (first ? sees(incision, divided.parts[k], other) : sees(incision, other, divided.parts[k]))
             divided.links[n] |= std::uint64_t{1} << (most_parts * k + j);
         }
-    if (old == before.end() || !(divided == was))
+    if (is_new || !(divided == was))
       changed.push_back(box);
   }
   return changed;
@@ -223,8 +224,8 @@ PartId CutBoxes::part_at(const Vector3& x, const topology::Incision& incision) c
 CutBoxes::Components CutBoxes::components() const {
   Components result;
   result.of_box.assign(boxes_.size(), -1);
-  for (const auto& [box, divided] : divided_)
-    for (int k = 1; k < std::ssize(divided.parts); ++k)
+  for (int box = 0; box < boxes_.size(); ++box)
+    for (int k = 1; k < part_count(box); ++k)
       result.other[part_id(box, k)] = -1;
   std::vector<PartId> pending;
   const auto number = [&](PartId id) -> int& {

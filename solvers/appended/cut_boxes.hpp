@@ -4,6 +4,7 @@
 #include "solvers/appended/small_boxes.hpp"
 #include "topology/incision.hpp"
 
+#include <memory>
 #include <unordered_map>
 
 namespace spherecut::solvers {
@@ -27,22 +28,24 @@ inline constexpr int most_parts = 8;
 
 class CutBoxes {
  public:
-  CutBoxes(const SmallBoxes& boxes, const topology::Domain& domain) : boxes_(boxes), domain_(domain) {}
+  CutBoxes(const SmallBoxes& boxes, const topology::Domain& domain)
+      : boxes_(boxes), domain_(domain), divided_(boxes.size()) {}
 
   /// Divides the boxes that meet the region anew. Returns the boxes whose parts or their connections are others than
   /// before, ascending.
   std::vector<int> update(const topology::Incision& incision, const BoundingBox& region);
 
   [[nodiscard]] int part_count(int box) const {
-    const auto found = divided_.find(box);
-    return found == divided_.end() ? 1 : static_cast<int>(found->second.parts.size());
+    return divided_[box] == nullptr ? 1 : static_cast<int>(divided_[box]->parts.size());
   }
   [[nodiscard]] CutPart part(PartId id) const {
-    const auto found = divided_.find(box_of(id));
-    return found == divided_.end() ? CutPart{1, boxes_.boxes()[box_of(id)].middle, boxes_.boxes()[box_of(id)].middle}
-                                   : found->second.parts[id % most_parts];
+    const int box = box_of(id);
+    if (divided_[box] != nullptr)
+      return divided_[box]->parts[id % most_parts];
+    const Vector3& middle = boxes_.boxes()[box].middle;
+    return {1, middle, middle};
   }
-  [[nodiscard]] bool is_divided(int box) const { return divided_.contains(box); }
+  [[nodiscard]] bool is_divided(int box) const { return divided_[box] != nullptr; }
   /// Calls visit(part) for the parts that hang together with this one across a face of its box, or around a front
   /// within it.
   template <class Visit>
@@ -75,35 +78,35 @@ class CutBoxes {
 
   const SmallBoxes& boxes_;
   const topology::Domain& domain_;
-  std::unordered_map<int, Divided> divided_;
+  std::vector<std::unique_ptr<Divided>> divided_; // by box; null: one part
 };
 
 template <class Visit>
 void CutBoxes::for_each_linked(PartId id, Visit&& visit) const {
   const int box = box_of(id), k = id % most_parts;
   const std::span<const int> neighbours = boxes_.neighbours(box);
-  const auto own = divided_.find(box);
-  if (own != divided_.end()) {
-    if (own->second.joined)
-      for (int other = 0; other < std::ssize(own->second.parts); ++other)
+  const Divided* const own = divided_[box].get();
+  if (own != nullptr) {
+    if (own->joined)
+      for (int other = 0; other < std::ssize(own->parts); ++other)
         if (other != k)
           visit(part_id(box, other));
     for (std::size_t n = 0; n < neighbours.size(); ++n)
-      for (std::uint64_t bits = own->second.links[n] >> most_parts * k & 0xff, j = 0; bits != 0; bits >>= 1, ++j)
+      for (std::uint64_t bits = own->links[n] >> most_parts * k & 0xff, j = 0; bits != 0; bits >>= 1, ++j)
         if ((bits & 1) != 0)
           visit(part_id(neighbours[n], static_cast<int>(j)));
     return;
   }
   for (const int neighbour : neighbours) {
-    const auto other = divided_.find(neighbour);
-    if (other == divided_.end()) {
+    const Divided* const other = divided_[neighbour].get();
+    if (other == nullptr) {
       visit(part_id(neighbour, 0));
       continue;
     }
     const std::span<const int> back = boxes_.neighbours(neighbour);
     const auto slot = std::lower_bound(back.begin(), back.end(), box) - back.begin();
-    for (int j = 0; j < std::ssize(other->second.parts); ++j)
-      if ((other->second.links[slot] >> most_parts * j & 1) != 0)
+    for (int j = 0; j < std::ssize(other->parts); ++j)
+      if ((other->links[slot] >> most_parts * j & 1) != 0)
         visit(part_id(neighbour, j));
   }
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
+#include <numbers>
 #include <set>
 
 namespace spherecut::solvers {
@@ -19,22 +19,24 @@ constexpr double nearest_sample = 0.05; // half diagonals: samples count as this
 CutSpace::CutSpace(const SmallBoxes& boxes, const topology::Domain& domain, const NodeCloud& nodes,
                    const Spheres& spheres, const Material& material, CutSpaceOptions options)
     : boxes_(boxes), nodes_(nodes), spheres_(spheres), material_(material), options_(options), cut_(boxes, domain),
-      twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()), group_weights_(nodes.positions.size()) {}
-
-double CutSpace::front_reach() const {
+      twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()), group_weights_(nodes.positions.size()),
+      places_(most_parts * static_cast<std::size_t>(boxes.size())),
+      local_(most_parts * static_cast<std::size_t>(boxes.size()), -1), reach_(nodes.positions.size()) {
   const double widest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
   const double largest = *std::max_element(spheres_.radii().begin(), spheres_.radii().end());
-  return options_.front.radius * widest + largest + 2 * widest;
+  front_reach_ = options_.front.radius * widest + largest + 2 * widest;
 }
 
-std::vector<int> CutSpace::boxes_in_reach(int node) const {
+const std::vector<int>& CutSpace::boxes_in_reach(int node) const {
+  std::vector<int>& near = reach_[node];
+  if (!near.empty())
+    return near;
   const Vector3& x = spheres_.centres()[node];
   const double radius = spheres_.radii()[node];
-  std::vector<int> near;
   boxes_.within({x.array() - radius, x.array() + radius}, near);
   std::erase_if(near, [&](int box) {
     const SmallBox& at = boxes_.boxes()[box];
-    return (x - at.centre).cwiseAbs().cwiseMax(at.half).operator-(at.half).squaredNorm() >= radius * radius;
+    return ((x - at.centre).cwiseAbs() - at.half).cwiseMax(0).squaredNorm() >= radius * radius;
   });
   return near;
 }
@@ -48,7 +50,8 @@ double CutSpace::step(const FrontPlace* place, const Vector3& x, double length, 
   }
   const double a = place->ahead, b = place->above, r = std::hypot(a, b), side = b >= 0 ? 1 : -1;
   // r - a without cancellation ahead of the front.
-  const double squared = (a > 0 ? b * b / (r + a + 1e-300) : r - a) / (2 * length), t = std::sqrt(std::max(0.0, squared));
+  const double squared = (a > 0 ? b * b / (r + a + 1e-300) : r - a) / (2 * length),
+               t = std::sqrt(std::max(0.0, squared));
   if (t >= 1)
     return side;
   if (t > 0 && r > 0) {
@@ -58,13 +61,13 @@ double CutSpace::step(const FrontPlace* place, const Vector3& x, double length, 
   return side * t * (15 - 10 * squared + 3 * squared * squared) / 8;
 }
 
-const FrontPlace* CutSpace::place_of(PartId part) const {
-  auto known = places_.find(part);
-  if (known == places_.end()) {
+PlacedFields& CutSpace::place_of(PartId part) const {
+  std::unique_ptr<PlacedFields>& known = places_[part];
+  if (known == nullptr) {
     const CutPart at = cut_.part(part);
     const SmallBox& box = boxes_.boxes()[box_of(part)];
     const double radius = box.half.norm();
-    std::optional<FrontPlace> place = front_place(*incision_, at.centroid, front_reach());
+    std::optional<FrontPlace> place = front_place(*incision_, at.centroid, front_reach_);
     if (place && place->distance < near_front_boxes * radius) {
       // What is integrated goes with 1 / r: the place stands where r is its harmonic mean over the part.
       double sum = 0;
@@ -93,22 +96,25 @@ const FrontPlace* CutSpace::place_of(PartId part) const {
         place->above *= factor;
       }
     }
-    known = places_.emplace(part, place).first;
+    known = std::make_unique<PlacedFields>();
+    known->place = place;
+    if (place)
+      known->tip = tip_fields(material_, *place);
+    placed_.push_back(part);
   }
-  return known->second ? &*known->second : nullptr;
+  return *known;
 }
 
 // Components of the parts in reach of a sphere: its node's own one, and a twin for each of the others. Where all hang
 // together although a sheet divides some, the sphere has a step.
 void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
-  const std::vector<int> reach = boxes_in_reach(node);
+  const std::vector<int>& reach = boxes_in_reach(node);
   if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
     return;
   std::vector<PartId> parts;
-  std::unordered_map<PartId, int> place;
   for (const int box : reach)
     for (int k = 0; k < cut_.part_count(box); ++k) {
-      place[part_id(box, k)] = static_cast<int>(parts.size());
+      local_[part_id(box, k)] = static_cast<int>(parts.size());
       parts.push_back(part_id(box, k));
     }
   std::vector<int> component(parts.size(), -1);
@@ -123,18 +129,20 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
       const int at = pending.back();
       pending.pop_back();
       cut_.for_each_linked(parts[at], [&](PartId next) {
-        const auto known = place.find(next);
-        if (known != place.end() && component[known->second] < 0) {
-          component[known->second] = count;
-          pending.push_back(known->second);
+        const int place = local_[next];
+        if (place >= 0 && component[place] < 0) {
+          component[place] = count;
+          pending.push_back(place);
         }
       });
     }
     ++count;
   }
   const Vector3& x = spheres_.centres()[node];
-  const auto own_place = place.find(cut_.part_at(x, *incision_));
-  const int own = own_place == place.end() ? component.front() : component[own_place->second];
+  const int own_place = local_[cut_.part_at(x, *incision_)];
+  const int own = own_place < 0 ? component.front() : component[own_place];
+  for (const PartId part : parts)
+    local_[part] = -1;
   // A part in which the sphere has no weight asks for nothing.
   const auto weighs = [&](PartId part) {
     const int box = box_of(part);
@@ -164,8 +172,8 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
     return;
   // The front ends in the sphere, or passes beside it.
   const double radius = spheres_.radii()[node];
-  const auto sheet = incision_->closest(x, radius);
-  if (!sheet)
+  const auto nearest = incision_->front_frame(x, 2 * radius);
+  if (!nearest || curved_[nearest->segment] == 0 || !incision_->closest(x, radius))
     return;
   CutFunction function;
   Twin& twin = function.twin;
@@ -173,10 +181,41 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
   twin.is_step = true;
   twin.hidden = std::move(parts);
   twin.step_length = options_.step_reach * nodes_.spacings[node];
-  const auto at = front_place(*incision_, x, front_reach());
+  const auto at = front_place(*incision_, x, front_reach_);
   Vector3 gradient;
   twin.step_at_node = step(at ? &*at : nullptr, x, twin.step_length, gradient);
   found.push_back(std::move(function));
+}
+
+void CutSpace::find_curved_front() {
+  const double least = std::cos(options_.step_turn * std::numbers::pi / 180);
+  const std::vector<topology::FrontSegment>& front = incision_->front();
+  std::vector<Vector3> middle, ahead;
+  std::vector<char> turns;
+  for (int s = 0; s < std::ssize(front); ++s) {
+    middle.emplace_back(0.5 * (front[s].from + front[s].to));
+    ahead.push_back(incision_->front_frame_at(s, 0.5).ahead);
+  }
+  for (std::size_t s = 0; s < front.size(); ++s) {
+    double radius = 0;
+    for (const int node : spheres_.candidates(middle[s]))
+      if ((spheres_.centres()[node] - middle[s]).norm() < spheres_.radii()[node])
+        radius = std::max(radius, spheres_.radii()[node]);
+    char turn = 0;
+    for (std::size_t other = 0; other < front.size() && turn == 0; ++other)
+      turn = (middle[other] - middle[s]).squaredNorm() < radius * radius && ahead[other].dot(ahead[s]) < least;
+    turns.push_back(turn);
+  }
+  curved_.assign(front.size(), 0);
+  for (const std::vector<int>& run : front_runs(*incision_)) {
+    double length = 0, turning = 0;
+    for (const int s : run) {
+      length += (front[s].to - front[s].from).norm();
+      turning += turns[s] != 0 ? (front[s].to - front[s].from).norm() : 0;
+    }
+    for (const int s : run)
+      curved_[s] = turning > 0.5 * length ? 1 : 0;
+  }
 }
 
 CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> incision, const BoundingBox& region) {
@@ -186,36 +225,39 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   std::vector<char> changed(boxes_.size(), 0);
   for (const int box : divided)
     changed[box] = 1;
-  for (auto known = places_.begin(); known != places_.end();) {
-    const int box = box_of(known->first);
-    if (changed[box] != 0 || known->first % most_parts >= cut_.part_count(box)) {
-      known = places_.erase(known);
-      continue;
-    }
-    ++known;
-  }
-  // The nearest place of the front changes where the front did.
-  std::vector<PartId> kept_places;
-  kept_places.reserve(places_.size());
-  for (const auto& [part, place] : places_)
-    kept_places.push_back(part);
-  std::sort(kept_places.begin(), kept_places.end());
-  for (const PartId part : kept_places) {
-    const std::optional<FrontPlace> before = places_.at(part);
-    // Far from what has changed the front is where it was.
-    const Vector3& x = boxes_.boxes()[box_of(part)].centre;
+  // The nearest place of the front changes where the front did. Far from what has changed it is where it was.
+  const auto is_far = [&](const Vector3& x, double radius, const PlacedFields& before) {
     const double away = (x - region.lower.cwiseMax(x.cwiseMin(region.upper))).norm();
-    if (before && away > before->distance + boxes_.boxes()[box_of(part)].half.norm())
+    return away > (before.place ? before.place->distance : front_reach_) + radius;
+  };
+  const auto is_other = [](const std::optional<FrontPlace>& before, const std::optional<FrontPlace>& now) {
+    return now.has_value() != before.has_value() ||
+           (now && (now->ahead != before->ahead || now->above != before->above ||
+                    now->grad_ahead != before->grad_ahead || now->grad_above != before->grad_above));
+  };
+  std::vector<PartId> before_parts = std::move(placed_);
+  placed_.clear();
+  std::sort(before_parts.begin(), before_parts.end());
+  for (const PartId part : before_parts) {
+    const int box = box_of(part);
+    std::unique_ptr<PlacedFields> before = std::move(places_[part]);
+    if (changed[box] == 1 || part % most_parts >= cut_.part_count(box))
       continue;
-    places_.erase(part);
-    const FrontPlace* now = place_of(part);
-    if ((now != nullptr) != before.has_value() ||
-        (now != nullptr && (now->ahead != before->ahead || now->above != before->above ||
-                            now->grad_ahead != before->grad_ahead || now->grad_above != before->grad_above)))
-      changed[box_of(part)] = 2;
+    if (is_far(boxes_.boxes()[box].centre, boxes_.boxes()[box].half.norm(), *before)) {
+      places_[part] = std::move(before);
+      placed_.push_back(part);
+    } else if (is_other(before->place, place_of(part).place)) {
+      changed[box] = 2;
+    }
   }
+  std::vector<char> cell_changed(boxes_.cells().size(), 0);
+  for (int box = 0; box < boxes_.size(); ++box)
+    if (changed[box] != 0)
+      cell_changed[boxes_.cell_of(box)] = 1;
 
   // Twins of spheres in reach of what has changed are found anew.
+  const std::vector<char> was_curved = std::move(curved_);
+  find_curved_front();
   std::set<int> concerned;
   for (int box = 0; box < boxes_.size(); ++box)
     if (changed[box] == 1) {
@@ -227,6 +269,14 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
                  at.centre + at.half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1))))
           concerned.insert(node);
     }
+  const auto any = [](const std::vector<char>& flags) {
+    return std::any_of(flags.begin(), flags.end(), [](char is) { return is != 0; });
+  };
+  if (any(was_curved) || any(curved_)) // a step comes or goes with its run
+    for (int box = 0; box < boxes_.size(); ++box)
+      if (cut_.is_divided(box))
+        for (const int node : boxes_.cells()[boxes_.cell_of(box)].nodes)
+          concerned.insert(node);
   std::vector<CutFunction> wanted;
   for (const int node : concerned)
     add_twins(node, wanted);
@@ -241,8 +291,8 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
     if (old.is_front) {
       for (std::size_t g = 0; g < groups.size() && !stays; ++g)
         if (group_taken[g] == 0 && groups[g] == old.group) {
-          const std::vector<int> boxes = boxes_of(old);
-          stays = std::none_of(boxes.begin(), boxes.end(), [&](int box) { return changed[box] != 0; });
+          const std::vector<int> cells = cells_of(old);
+          stays = std::none_of(cells.begin(), cells.end(), [&](int cell) { return cell_changed[cell] != 0; });
           if (stays)
             group_taken[g] = 1;
         }
@@ -262,9 +312,9 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
         }
       } else {
         for (std::size_t w = 0; w < wanted.size() && !stays; ++w)
-          if (twin_taken[w] == 0 && wanted[w].twin.node == old.twin.node && wanted[w].twin.is_step == old.twin.is_step &&
-              wanted[w].twin.step_at_node == old.twin.step_at_node && wanted[w].twin.hidden == old.twin.hidden &&
-              !is_touched) {
+          if (twin_taken[w] == 0 && wanted[w].twin.node == old.twin.node &&
+              wanted[w].twin.is_step == old.twin.is_step && wanted[w].twin.step_at_node == old.twin.step_at_node &&
+              wanted[w].twin.hidden == old.twin.hidden && !is_touched) {
             stays = true;
             twin_taken[w] = 1;
           }
@@ -310,20 +360,21 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   return change;
 }
 
-std::vector<int> CutSpace::boxes_of(const CutFunction& function) const {
-  std::vector<int> boxes;
+std::vector<int> CutSpace::cells_of(const CutFunction& function) const {
   if (!function.is_front) {
-    for (const PartId part : function.twin.hidden)
-      boxes.push_back(box_of(part));
-  } else {
-    for (const int node : function.group.nodes) {
-      const std::vector<int> reach = boxes_in_reach(node);
-      boxes.insert(boxes.end(), reach.begin(), reach.end());
-    }
-    std::sort(boxes.begin(), boxes.end());
+    const std::span<const int> cells = boxes_.cells_of_node(function.twin.node);
+    return {cells.begin(), cells.end()};
   }
-  boxes.erase(std::unique(boxes.begin(), boxes.end()), boxes.end());
-  return boxes;
+  std::vector<int> cells;
+  std::vector<char> taken(boxes_.cells().size(), 0);
+  for (const int node : function.group.nodes)
+    for (const int cell : boxes_.cells_of_node(node))
+      if (taken[cell] == 0) {
+        taken[cell] = 1;
+        cells.push_back(cell);
+      }
+  std::sort(cells.begin(), cells.end());
+  return cells;
 }
 
 bool CutSpace::term_at(int k, PartId part, ScalarTerm& term) const {
@@ -345,19 +396,37 @@ bool CutSpace::term_at(int k, PartId part, ScalarTerm& term) const {
   const Vector3 x = cut_.part(part).centroid;
   const double value = middle + gradient.dot(x - boxes_.boxes()[box].middle);
   Vector3 slope;
-  const double jump = 0.5 * (step(place_of(part), x, twin.step_length, slope) - twin.step_at_node);
+  const std::optional<FrontPlace>& place_here = place_of(part).place;
+  const double jump = 0.5 * (step(place_here ? &*place_here : nullptr, x, twin.step_length, slope) - twin.step_at_node);
   term = {k, value * jump, jump * gradient + 0.5 * value * slope};
   return jump != 0 || !slope.isZero(0);
 }
 
-bool CutSpace::term_at(int k, PartId part, FrontTerm& term) const {
+// A group whose blended hats are `value`, with their gradient, at a place.
+FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, PlacedFields& placed) const {
+  const FrontStation& station = functions_[k].group.station;
+  if (placed.station != station.point) {
+    placed.fields = front_fields(material_, station, *placed.place, placed.tip);
+    placed.station = station.point;
+  }
+  const FrontFields& fields = placed.fields;
+  FrontTerm term{k, value * fields.value, {}};
+  for (int mode = 0; mode < 3; ++mode)
+    term.gradient[mode] = value * fields.gradient[mode] + fields.value.col(mode) * gradient.transpose();
+  return term;
+}
+
+void CutSpace::terms_in(int k, int cell_index, std::vector<PartId>& parts, std::vector<FrontTerm>& terms) const {
+  constexpr int lanes = BoxShapes::lanes;
   const FrontGroup& group = functions_[k].group;
-  const int box = box_of(part), lane = boxes_.lane_of(box);
-  const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
-  double middle = 0;
-  Vector3 gradient = Vector3::Zero();
-  // Both lists ascend.
-  std::size_t c = 0;
+  const BoxShapes& cell = boxes_.cells()[cell_index];
+  parts.clear();
+  terms.clear();
+  std::array<double, lanes> middle{};
+  std::array<Vector3, lanes> gradient;
+  gradient.fill(Vector3::Zero());
+  bool any = false;
+  std::size_t c = 0; // both lists ascend
   for (std::size_t n = 0; n < group.nodes.size(); ++n) {
     while (c < cell.nodes.size() && cell.nodes[c] < group.nodes[n])
       ++c;
@@ -365,21 +434,27 @@ bool CutSpace::term_at(int k, PartId part, FrontTerm& term) const {
       break;
     if (cell.nodes[c] != group.nodes[n])
       continue;
-    middle += group.weights[n] * cell.value_at(c, lane);
-    gradient += group.weights[n] * cell.gradient_at(c, lane);
+    any = true;
+    for (int lane = 0; lane < cell.boxes; ++lane) {
+      middle[lane] += group.weights[n] * cell.value_at(c, lane);
+      gradient[lane] += group.weights[n] * cell.gradient_at(c, lane);
+    }
   }
-  if (middle == 0 && gradient.isZero(0))
-    return false;
-  const FrontPlace* place = place_of(part);
-  if (place == nullptr)
-    return false;
-  const double value = middle + gradient.dot(cut_.part(part).centroid - boxes_.boxes()[box].middle);
-  const FrontFields fields = front_fields(material_, group.station, *place);
-  term.function = k;
-  term.value = value * fields.value;
-  for (int mode = 0; mode < 3; ++mode)
-    term.gradient[mode] = value * fields.gradient[mode] + fields.value.col(mode) * gradient.transpose();
-  return true;
+  for (int lane = 0; any && lane < cell.boxes; ++lane) {
+    if (middle[lane] == 0 && gradient[lane].isZero(0))
+      continue;
+    const int box = cell.first_box + lane;
+    for (int p = 0; p < cut_.part_count(box); ++p) {
+      const PartId part = part_id(box, p);
+      PlacedFields& placed = place_of(part);
+      if (!placed.place)
+        continue;
+      terms.push_back(
+          front_term(k, middle[lane] + gradient[lane].dot(cut_.part(part).centroid - boxes_.boxes()[box].middle),
+                     gradient[lane], placed));
+      parts.push_back(part);
+    }
+  }
 }
 
 void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const {
@@ -390,7 +465,7 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
   bool placed = false;
   const auto place_here = [&]() -> const FrontPlace* {
     if (!placed) {
-      place = front_place(*incision_, x, front_reach());
+      place = front_place(*incision_, x, front_reach_);
       placed = true;
     }
     return place ? &*place : nullptr;
@@ -418,13 +493,10 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
   }
   if (of_group.empty() || place_here() == nullptr)
     return;
-  for (const auto& [k, sum] : of_group) {
-    const FrontFields fields = front_fields(material_, functions_[k].group.station, *place);
-    FrontTerm term{k, sum.first * fields.value, {}};
-    for (int mode = 0; mode < 3; ++mode)
-      term.gradient[mode] = sum.first * fields.gradient[mode] + fields.value.col(mode) * sum.second.transpose();
-    terms.front.push_back(term);
-  }
+  PlacedFields here{place, tip_fields(material_, *place), {}, {}};
+  here.station.setConstant(std::numeric_limits<double>::quiet_NaN());
+  for (const auto& [k, sum] : of_group)
+    terms.front.push_back(front_term(k, sum.first, sum.second, here));
 }
 
 } // namespace spherecut::solvers

@@ -5,13 +5,18 @@
 #include "solvers/appended/cut_boxes.hpp"
 #include "solvers/appended/front_functions.hpp"
 
+#include <limits>
+#include <memory>
+
 namespace spherecut::solvers {
 
 struct CutSpaceOptions {
   FrontOptions front;
-  /// Spheres that a front ends in have twins too, with a step that closes at the front over this many spacings; 0: only
-  /// spheres that the cut parts completely have twins.
+  /// Spheres that a curved front ends in have twins too, with a step that closes at the front over `step_reach`
+  /// spacings (0: none has). A run of the front is curved where it turns by more than `step_turn` within a sphere over
+  /// most of its length; on straight ones, corners included, the front functions do as well with half as many.
   double step_reach = 1;
+  double step_turn = 20; // degrees
 };
 
 /// A second vector unknown of a sphere: h_J psi. Where the cut parts the sphere, psi is 1 in one component of what is
@@ -56,6 +61,15 @@ struct CutTerms {
   }
 };
 
+/// Place of a part with respect to the front, and the near-tip fields there.
+struct PlacedFields {
+  std::optional<FrontPlace> place;
+  TipFields tip;
+  // The fields as the station had them that was asked for last: its rings follow one another.
+  Vector3 station = Vector3::Constant(std::numeric_limits<double>::quiet_NaN());
+  FrontFields fields;
+};
+
 class CutSpace {
  public:
   /// Base nodes and their spheres; all outlive this.
@@ -73,21 +87,24 @@ class CutSpace {
   [[nodiscard]] const std::vector<CutFunction>& functions() const { return functions_; }
   [[nodiscard]] const CutBoxes& cut() const { return cut_; }
   [[nodiscard]] const topology::Incision* incision() const { return incision_.get(); }
-  /// Boxes in which a function may differ from zero, ascending.
-  [[nodiscard]] std::vector<int> boxes_of(const CutFunction& function) const;
+  /// Cells in which a function may differ from zero, ascending.
+  [[nodiscard]] std::vector<int> cells_of(const CutFunction& function) const;
   /// Terms of the k-th function at a part of a box, with the box's linear shape functions. False: it vanishes there.
   bool term_at(int k, PartId part, ScalarTerm& term) const;
-  bool term_at(int k, PartId part, FrontTerm& term) const;
+  /// Terms of a front group at all parts of a cell where it does not vanish, with the parts, ascending.
+  void terms_in(int k, int cell, std::vector<PartId>& parts, std::vector<FrontTerm>& terms) const;
   /// All that do not vanish at x, in a part, with shape functions evaluated at x.
   void terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const;
 
  private:
-  [[nodiscard]] std::vector<int> boxes_in_reach(int node) const;
+  /// Boxes that the sphere of a node may reach, ascending; kept.
+  [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
   void add_twins(int node, std::vector<CutFunction>& found) const;
+  void find_curved_front();
+  [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedFields& placed) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
   /// Place of a part with respect to the front, kept until the front about it changes.
-  [[nodiscard]] const FrontPlace* place_of(PartId part) const;
-  [[nodiscard]] double front_reach() const;
+  [[nodiscard]] PlacedFields& place_of(PartId part) const;
 
   const SmallBoxes& boxes_;
   const NodeCloud& nodes_;
@@ -99,8 +116,13 @@ class CutSpace {
   std::vector<CutFunction> functions_;
   std::vector<std::vector<int>> twins_of_, groups_of_; // places in functions_ by node
   std::vector<std::vector<double>> group_weights_;
-  std::vector<Vector3> origins_; // of the runs of the front
-  mutable std::unordered_map<PartId, std::optional<FrontPlace>> places_;
+  std::vector<Vector3> origins_;                              // of the runs of the front
+  mutable std::vector<std::unique_ptr<PlacedFields>> places_; // by part; null: not asked for yet
+  mutable std::vector<PartId> placed_;                        // those that are there
+  mutable std::vector<int> local_;                            // of a part among those of a sphere, -1 between calls
+  mutable std::vector<std::vector<int>> reach_;               // by node, found as they are asked for
+  std::vector<char> curved_;                                  // by segment of the front: its run is curved
+  double front_reach_ = 0; // m, from a front to the farthest place that its functions come to
   int next_id_ = 0;
 };
 

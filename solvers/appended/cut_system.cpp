@@ -17,20 +17,6 @@ namespace spherecut::solvers {
 
 namespace {
 
-Matrix3 stress_of(const Material& material, const Matrix3& gradient) {
-  Matrix3 stress = material.shear_modulus() * (gradient + gradient.transpose());
-  stress.diagonal().array() += material.lame_lambda() * gradient.trace();
-  return stress;
-}
-
-/// lambda a b^T + mu b a^T + mu (a . b) 1.
-Matrix3 pair_block(const Material& material, const Vector3& a, const Vector3& b) {
-  const double mu = material.shear_modulus();
-  Matrix3 block = material.lame_lambda() * a * b.transpose() + mu * b * a.transpose();
-  block.diagonal().array() += mu * a.dot(b);
-  return block;
-}
-
 Matrix3 held_components(const Prescribed& entry) {
   Vector3 held;
   for (int c = 0; c < 3; ++c)
@@ -56,43 +42,27 @@ int factor_lower(MatrixX& matrix) {
 
 void CutSystem::evaluate(int function, FunctionData& data) const {
   const CutFunction& own = space_.functions()[function];
-  const SmallBoxes& boxes = uncut_.boxes();
-  for (const int box : space_.boxes_of(own))
-    for (int k = 0; k < space_.cut().part_count(box); ++k) {
-      const PartId part = part_id(box, k);
-      if (own.is_front) {
-        FrontTerm term;
-        if (!space_.term_at(function, part, term))
-          continue;
-        data.front.push_back(term.gradient);
-      } else {
-        ScalarTerm term;
-        if (!space_.term_at(function, part, term))
-          continue;
-        data.scalar.push_back(term.gradient);
+  data.id = own.id;
+  data.is_front = own.is_front;
+  if (!own.is_front) {
+    for (const PartId part : own.twin.hidden)
+      if (ScalarTerm term; space_.term_at(function, part, term)) {
+        data.gradients.insert(data.gradients.end(), term.gradient.data(), term.gradient.data() + 3);
+        data.parts.push_back(part);
       }
-      data.parts.push_back(part);
-      data.weights.push_back(space_.cut().part(part).share * boxes.boxes()[box].volume);
-    }
-}
-
-Matrix3 CutSystem::elastic_block(const FunctionData& a, std::size_t at_a, const FunctionData& b,
-                                 std::size_t at_b) const {
-  const Material& material = uncut_.problem().material;
-  Matrix3 block;
-  if (!a.is_front() && !b.is_front())
-    return pair_block(material, a.scalar[at_a], b.scalar[at_b]);
-  if (!b.is_front())
-    return elastic_block(b, at_b, a, at_a).transpose();
-  for (int n = 0; n < 3; ++n) {
-    const Matrix3 stress = stress_of(material, b.front[at_b][n]);
-    if (!a.is_front())
-      block.col(n) = stress * a.scalar[at_a];
-    else
-      for (int m = 0; m < 3; ++m)
-        block(m, n) = stress.cwiseProduct(a.front[at_a][m]).sum();
+    return;
   }
-  return block;
+  std::vector<PartId> parts;
+  std::vector<FrontTerm> terms;
+  for (const int cell : space_.cells_of(own)) {
+    space_.terms_in(function, cell, parts, terms);
+    data.parts.insert(data.parts.end(), parts.begin(), parts.end());
+    for (const FrontTerm& term : terms)
+      for (const Matrix3& gradient : term.gradient)
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j)
+            data.gradients.push_back(gradient(i, j));
+  }
 }
 
 CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points) const {
@@ -136,12 +106,14 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
     ++unchanged;
   std::vector<FunctionData> data;
   data.reserve(count);
-  MatrixX half(3 * uncut_.size(), 3 * count), elastic = MatrixX::Zero(3 * count, 3 * count), penalty = elastic,
-                                              schur = elastic;
+  MatrixX elastic = MatrixX::Zero(3 * count, 3 * count), penalty = elastic, schur = elastic;
+  if (half_.cols() < 3 * count)
+    half_.conservativeResize(3 * uncut_.size(), 3 * count + half_.cols() / 2);
   for (Eigen::Index k = 0; k < kept; ++k) {
     const Eigen::Index from = change.kept[k];
     data.push_back(std::move(data_[from]));
-    half.middleCols<3>(3 * k) = half_.middleCols<3>(3 * from);
+    if (from != k) // from ascends
+      half_.middleCols<3>(3 * k) = half_.middleCols<3>(3 * from);
     for (Eigen::Index l = 0; l < kept; ++l) {
       const Eigen::Index other = change.kept[l];
       elastic.block<3, 3>(3 * l, 3 * k) = elastic_.block<3, 3>(3 * other, 3 * from);
@@ -150,19 +122,23 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
     }
   }
   data_ = std::move(data);
-  half_ = std::move(half);
   elastic_ = std::move(elastic);
   penalty_ = std::move(penalty);
   schur_ = std::move(schur);
   const int first_new = static_cast<int>(kept);
   for (Eigen::Index k = kept; k < count; ++k)
     evaluate(static_cast<int>(k), data_.emplace_back());
-  at_part_.clear();
-  for (int k = 0; k < count; ++k)
-    for (int entry = 0; entry < std::ssize(data_[k].parts); ++entry)
-      at_part_[data_[k].parts[entry]].emplace_back(k, entry);
+  in_cell_.assign(uncut_.boxes().cells().size(), {});
+  for (int k = 0; k < count; ++k) {
+    int last = -1;
+    for (const PartId part : data_[k].parts)
+      if (const int cell = uncut_.boxes().cell_of(box_of(part)); cell != last) {
+        in_cell_[cell].push_back(k);
+        last = cell;
+      }
+  }
   add_elastic(first_new);
-  add_held(first_new);
+  add_held(first_new, change);
 
   // W of the new columns.
   const Eigen::Index fresh = 3 * (count - kept);
@@ -171,14 +147,15 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
     for (Eigen::Index k = kept; k < count; ++k) {
       const FunctionData& own = data_[k];
       for (std::size_t n = 0; n < own.nodes.size(); ++n)
-        columns.block<3, 3>(3 * static_cast<Eigen::Index>(uncut_.rank()[own.nodes[n]]), 3 * (k - kept)) += own.blocks[n];
+        columns.block<3, 3>(3 * static_cast<Eigen::Index>(uncut_.rank()[own.nodes[n]]), 3 * (k - kept)) +=
+            own.blocks[n];
       for (const auto& [node, block] : own.penalty)
         columns.block<3, 3>(3 * static_cast<Eigen::Index>(uncut_.rank()[node]), 3 * (k - kept)) += block;
     }
-    half_.rightCols(fresh) = uncut_.factor().forward(columns);
+    const MatrixX newest = uncut_.factor().forward_sparse(columns);
+    half_.middleCols(3 * kept, fresh) = newest;
     MatrixX corner = elastic_.rightCols(fresh) + penalty_.rightCols(fresh);
-    const MatrixX newest = half_.rightCols(fresh);
-    add_product(-1, half_, true, newest, corner);
+    add_transposed_product(-1, half_.data(), static_cast<int>(half_.rows()), newest, corner);
     schur_.rightCols(fresh) = corner;
     schur_.bottomLeftCorner(fresh, 3 * kept) = corner.topRows(3 * kept).transpose();
   }
@@ -189,90 +166,269 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
   solve_multipliers();
 }
 
+/// Products over the parts of one cell, as many together as there are lanes.
+struct CutSystem::CellProducts {
+  static constexpr int lanes = BoxShapes::lanes;
+  std::vector<PartId> parts;
+  std::vector<int> twins, groups, new_twins, new_groups; // functions here, ascending
+  std::vector<std::size_t> next;                         // entry of every twin, then of every group
+  MatrixX gradient;                                      // row: base function or twin; column 3 l + axis
+  MatrixX flat;                                          // the same of one axis
+  MatrixX pull;                                          // w g of new twins: row l, column 3 t + axis
+  MatrixX of_groups, stress; // row 3 t + m: gradients, column 9 l + 3 i + j; row 3 l + j: w sigma_ij of new ones
+  MatrixX stress_columns;    // row 9 l + 3 i + j, column 3 t + m
+  MatrixX with_groups, group_pairs, group_twin;
+  std::array<MatrixX, 3> with_twins; // by axis of the gradient
+};
+
 void CutSystem::add_elastic(int first_new) {
   const SmallBoxes& boxes = uncut_.boxes();
-  const Material& material = uncut_.problem().material;
+  std::map<int, std::vector<int>> fresh; // new functions by cell
   for (int k = first_new; k < functions(); ++k) {
     FunctionData& own = data_[k];
-    // Cells it lives in, and their nodes.
-    std::vector<int> cells;
-    for (const PartId part : own.parts)
-      if (const int cell = boxes.cell_of(box_of(part)); cells.empty() || cells.back() != cell)
-        cells.push_back(cell);
-    std::sort(cells.begin(), cells.end());
-    cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
-    for (const int cell : cells)
+    int last = -1;
+    for (const PartId part : own.parts) {
+      const int cell = boxes.cell_of(box_of(part));
+      if (cell == last)
+        continue;
+      last = cell;
+      fresh[cell].push_back(k);
       own.nodes.insert(own.nodes.end(), boxes.cells()[cell].nodes.begin(), boxes.cells()[cell].nodes.end());
+    }
     std::sort(own.nodes.begin(), own.nodes.end());
     own.nodes.erase(std::unique(own.nodes.begin(), own.nodes.end()), own.nodes.end());
     own.blocks.assign(own.nodes.size(), Matrix3::Zero());
-    // Gradients of the base are constant over a box: what the parts ask of them adds up first.
-    std::size_t entry = 0;
-    while (entry < own.parts.size()) {
-      const int cell_index = boxes.cell_of(box_of(own.parts[entry]));
-      const BoxShapes& cell = boxes.cells()[cell_index];
-      std::array<Vector3, BoxShapes::lanes> pull;
-      std::array<std::array<Matrix3, 3>, BoxShapes::lanes> stress;
-      pull.fill(Vector3::Zero());
-      if (own.is_front())
-        for (auto& of_lane : stress)
-          of_lane.fill(Matrix3::Zero());
-      for (; entry < own.parts.size() && boxes.cell_of(box_of(own.parts[entry])) == cell_index; ++entry) {
-        const int lane = boxes.lane_of(box_of(own.parts[entry]));
-        if (own.is_front())
-          for (int m = 0; m < 3; ++m)
-            stress[lane][m] += own.weights[entry] * stress_of(material, own.front[entry][m]);
-        else
-          pull[lane] += own.weights[entry] * own.scalar[entry];
+  }
+  CellProducts work;
+  for (const auto& [cell, functions] : fresh)
+    add_cell(cell, functions, work);
+}
+
+// Products of the new functions with everything in a cell. With g the gradient of a base function or twin, and of a new
+// function the stress w sigma_m of its modes or w g of a twin,
+//
+//   base or twin with group:  block(c, m) = sum of (w sigma_m g)_c,
+//   base or twin with twin:   products G = sum of g (w g')^T, then lambda G + mu G^T + mu tr G,
+//   group with group:         sum of grad_m : w sigma_n.
+void CutSystem::add_cell(int cell_index, std::span<const int> fresh, CellProducts& work) {
+  constexpr int lanes = CellProducts::lanes;
+  const SmallBoxes& boxes = uncut_.boxes();
+  const BoxShapes& cell = boxes.cells()[cell_index];
+  const Material& material = uncut_.problem().material;
+  const double lambda = material.lame_lambda(), mu = material.shear_modulus();
+  auto& [parts, twins, groups, new_twins, new_groups, next, gradient, flat, pull, of_groups, stress, stress_columns,
+         with_groups, group_pairs, group_twin, with_twins] = work;
+  for (auto* list : {&parts, &twins, &groups, &new_twins, &new_groups})
+    list->clear();
+  for (int box = cell.first_box; box < cell.first_box + cell.boxes; ++box)
+    for (int k = 0; k < space_.cut().part_count(box); ++k)
+      parts.push_back(part_id(box, k));
+  for (const int k : in_cell_[cell_index])
+    (data_[k].is_front ? groups : twins).push_back(k);
+  for (const int k : fresh)
+    (data_[k].is_front ? new_groups : new_twins).push_back(k);
+  const auto base = std::ssize(cell.nodes), twin_count = std::ssize(twins), group_count = std::ssize(groups),
+             fresh_twins = std::ssize(new_twins), fresh_groups = std::ssize(new_groups), rows = base + twin_count;
+  with_groups.setZero(rows, 9 * fresh_groups);
+  group_pairs.setZero(3 * group_count, 3 * fresh_groups);
+  group_twin.setZero(fresh_twins, 9 * group_count);
+  if (fresh_twins > 0)
+    for (MatrixX& products : with_twins)
+      products.setZero(rows, 3 * fresh_twins);
+  next.clear();
+  for (const auto* list : {&twins, &groups})
+    for (const int k : *list)
+      next.push_back(static_cast<std::size_t>(
+          std::lower_bound(data_[k].parts.begin(), data_[k].parts.end(), parts.front()) - data_[k].parts.begin()));
+  // Most cells have neither twins nor divided boxes: the gradients are then those of the cell as they lie there.
+  const bool is_plain = twin_count == 0 && std::ssize(parts) == cell.boxes;
+  for (std::size_t first = 0; first < parts.size(); first += lanes) {
+    const int count = static_cast<int>(std::min<std::size_t>(lanes, parts.size() - first));
+    std::array<double, lanes> weight{};
+    for (int l = 0; l < count; ++l)
+      weight[l] = space_.cut().part(parts[first + l]).share * boxes.boxes()[box_of(parts[first + l])].volume;
+    const auto for_entries = [&](int k, std::size_t& at, auto&& visit) {
+      const FunctionData& of = data_[k];
+      for (int l = 0; l < count && at < of.parts.size(); ++l)
+        if (of.parts[at] == parts[first + l])
+          visit(l, of.gradients.data() + of.stride() * at++);
+    };
+    if (!is_plain) {
+      gradient.setZero(rows, 3 * lanes);
+      for (int l = 0; l < count; ++l)
+        for (int a = 0; a < 3; ++a)
+          std::copy_n(cell.gradients.data() + (3 * boxes.lane_of(box_of(parts[first + l])) + a) * base, base,
+                      gradient.data() + (3 * l + a) * rows);
+      for (Eigen::Index t = 0; t < twin_count; ++t)
+        for_entries(twins[t], next[t], [&](int l, const double* g) {
+          for (int a = 0; a < 3; ++a)
+            gradient(base + t, 3 * l + a) = g[a];
+        });
+    }
+    if (fresh_twins > 0) {
+      pull.resize(lanes, 3 * fresh_twins);
+      for (Eigen::Index t = 0; t < fresh_twins; ++t) {
+        const auto row = base + (std::lower_bound(twins.begin(), twins.end(), new_twins[t]) - twins.begin());
+        for (int l = 0; l < lanes; ++l)
+          for (int a = 0; a < 3; ++a)
+            pull(l, 3 * t + a) = weight[l] * gradient(row, 3 * l + a);
       }
-      auto place = own.nodes.begin();
-      for (std::size_t n = 0; n < cell.nodes.size(); ++n) {
-        place = std::lower_bound(place, own.nodes.end(), cell.nodes[n]);
-        Matrix3& block = own.blocks[place - own.nodes.begin()];
-        if (own.is_front()) {
-          for (int lane = 0; lane < cell.boxes; ++lane) {
-            const Vector3 gradient = cell.gradient_at(n, lane);
-            for (int m = 0; m < 3; ++m)
-              block.col(m) += stress[lane][m] * gradient;
-          }
-        } else {
-          Matrix3 products = Matrix3::Zero();
-          for (int lane = 0; lane < cell.boxes; ++lane)
-            products += cell.gradient_at(n, lane) * pull[lane].transpose();
-          block += material.lame_lambda() * products + material.shear_modulus() * products.transpose();
-          block.diagonal().array() += material.shear_modulus() * products.trace();
-        }
+      flat.resize(rows, lanes);
+      for (int a = 0; a < 3; ++a) {
+        for (int l = 0; l < lanes; ++l)
+          flat.col(l) = gradient.col(3 * l + a);
+        add_product(1, flat, false, pull, with_twins[a]);
       }
     }
-    // Among the appended functions.
-    for (std::size_t at = 0; at < own.parts.size(); ++at)
-      for (const auto& [other, there] : at_part_.at(own.parts[at])) {
-        if (other > k)
-          continue;
-        const Matrix3 block = own.weights[at] * elastic_block(data_[other], there, own, at);
-        elastic_.block<3, 3>(3 * static_cast<Eigen::Index>(other), 3 * static_cast<Eigen::Index>(k)) += block;
-        if (other != k)
-          elastic_.block<3, 3>(3 * static_cast<Eigen::Index>(k), 3 * static_cast<Eigen::Index>(other)) +=
-              block.transpose();
+    if (group_count == 0)
+      continue;
+    of_groups.setZero(3 * group_count, 9 * lanes);
+    stress.setZero(3 * lanes, 9 * fresh_groups);
+    stress_columns.setZero(9 * lanes, 3 * fresh_groups);
+    for (Eigen::Index t = 0; t < group_count; ++t) {
+      const auto at = std::lower_bound(new_groups.begin(), new_groups.end(), groups[t]);
+      const Eigen::Index own = at != new_groups.end() && *at == groups[t] ? at - new_groups.begin() : -1;
+      for_entries(groups[t], next[twin_count + t], [&](int l, const double* g) {
+        for (int m = 0; m < 3; ++m, g += 9) {
+          for (int e = 0; e < 9; ++e)
+            of_groups(3 * t + m, 9 * l + e) = g[e];
+          if (own < 0)
+            continue;
+          const double dilatation = lambda * (g[0] + g[4] + g[8]);
+          for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+              const double sigma = weight[l] * (mu * (g[3 * i + j] + g[3 * j + i]) + (i == j ? dilatation : 0));
+              stress(3 * l + j, 9 * own + 3 * m + i) = sigma; // columns 3 m + c: component c of mode m
+              stress_columns(9 * l + 3 * i + j, 3 * own + m) = sigma;
+            }
+        }
+      });
+    }
+    if (is_plain)
+      add_product(static_cast<int>(rows), static_cast<int>(9 * fresh_groups), 3 * cell.boxes, cell.gradients.data(),
+                  static_cast<int>(base), stress.data(), 3 * lanes, with_groups.data(), static_cast<int>(rows));
+    else
+      add_product(1, gradient, false, stress, with_groups);
+    add_product(1, of_groups, false, stress_columns, group_pairs);
+    // Kept groups with new twins: the twins' w g against the stress of the groups.
+    for (Eigen::Index t = 0; t < group_count && fresh_twins > 0; ++t)
+      for (int l = 0; l < count; ++l)
+        for (int m = 0; m < 3; ++m) {
+          const auto at = [&](int i, int j) { return of_groups(3 * t + m, 9 * l + 3 * i + j); };
+          const double dilatation = lambda * (at(0, 0) + at(1, 1) + at(2, 2));
+          for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) {
+              const double sigma = mu * (at(i, j) + at(j, i)) + (i == j ? dilatation : 0);
+              for (Eigen::Index n = 0; n < fresh_twins; ++n)
+                group_twin(n, 9 * t + 3 * m + i) += sigma * pull(l, 3 * n + j);
+            }
+        }
+  }
+  distribute(cell_index, work);
+}
+
+// The sums of a cell go to where they belong.
+void CutSystem::distribute(int cell_index, const CellProducts& work) {
+  const BoxShapes& cell = uncut_.boxes().cells()[cell_index];
+  const Material& material = uncut_.problem().material;
+  const double lambda = material.lame_lambda(), mu = material.shear_modulus();
+  const auto base = std::ssize(cell.nodes);
+  const auto twin_block = [&](Eigen::Index row, Eigen::Index twin) {
+    Matrix3 products;
+    for (int a = 0; a < 3; ++a)
+      products.row(a) = work.with_twins[a].block<1, 3>(row, 3 * twin);
+    Matrix3 block = lambda * products + mu * products.transpose();
+    block.diagonal().array() += mu * products.trace();
+    return block;
+  };
+  const auto add_pair = [&](int other, int k, const Matrix3& block) {
+    elastic_.block<3, 3>(3 * static_cast<Eigen::Index>(other), 3 * static_cast<Eigen::Index>(k)) += block;
+    if (other != k)
+      elastic_.block<3, 3>(3 * static_cast<Eigen::Index>(k), 3 * static_cast<Eigen::Index>(other)) += block.transpose();
+  };
+  for (Eigen::Index t = 0; t < std::ssize(work.new_groups); ++t) {
+    const int k = work.new_groups[t];
+    FunctionData& own = data_[k];
+    const auto block_of = [&](Eigen::Index row) {
+      Matrix3 block;
+      for (int m = 0; m < 3; ++m)
+        for (int c = 0; c < 3; ++c)
+          block(c, m) = work.with_groups(row, 9 * t + 3 * m + c);
+      return block;
+    };
+    std::size_t place = 0; // both lists ascend
+    for (Eigen::Index n = 0; n < base; ++n) {
+      while (own.nodes[place] != cell.nodes[n])
+        ++place;
+      own.blocks[place] += block_of(n);
+    }
+    for (Eigen::Index other = 0; other < std::ssize(work.twins); ++other)
+      if (work.twins[other] < k)
+        add_pair(work.twins[other], k, block_of(base + other));
+    // Of a pair of new functions the later one counts; those that were there come first.
+    for (Eigen::Index other = 0; other < std::ssize(work.groups); ++other)
+      if (work.groups[other] <= k)
+        add_pair(work.groups[other], k, work.group_pairs.block<3, 3>(3 * other, 3 * t));
+  }
+  for (Eigen::Index t = 0; t < std::ssize(work.new_twins); ++t) {
+    const int k = work.new_twins[t];
+    FunctionData& own = data_[k];
+    std::size_t place = 0;
+    for (Eigen::Index n = 0; n < base; ++n) {
+      while (own.nodes[place] != cell.nodes[n])
+        ++place;
+      own.blocks[place] += twin_block(n, t);
+    }
+    for (Eigen::Index other = 0; other < std::ssize(work.twins); ++other)
+      if (work.twins[other] <= k)
+        add_pair(work.twins[other], k, twin_block(base + other, t));
+    for (Eigen::Index other = 0; other < std::ssize(work.groups); ++other)
+      if (work.groups[other] < k) {
+        Matrix3 block; // rows: modes of the group
+        for (int m = 0; m < 3; ++m)
+          for (int c = 0; c < 3; ++c)
+            block(m, c) = work.group_twin(t, 9 * other + 3 * m + c);
+        add_pair(work.groups[other], k, block);
       }
   }
 }
 
-void CutSystem::add_held(int first_new) {
+void CutSystem::add_held(int first_new, const CutSpace::Change& change) {
   const Problem& problem = uncut_.problem();
   held_.resize(uncut_.held().size());
-  std::vector<char> carries(uncut_.size(), 0); // some function
-  for (const CutFunction& function : space_.functions())
-    if (function.is_front)
-      for (const int node : function.group.nodes)
-        carries[node] = 1;
-    else
-      carries[function.twin.node] = 1;
-  held_touched_.assign(held_.size(), 0);
+  std::vector<char> carries(uncut_.size(), 0), news(uncut_.size(), 0); // some function; one that is new or has gone
+  const auto mark = [](const std::vector<int>& nodes, std::vector<char>& at) {
+    for (const int node : nodes)
+      at[node] = 1;
+  };
+  std::vector<int> place_now(carriers_.size(), -1); // of functions before
+  for (std::size_t k = 0; k < change.kept.size(); ++k)
+    place_now[change.kept[k]] = static_cast<int>(k);
+  for (std::size_t k = 0; k < carriers_.size(); ++k)
+    if (place_now[k] < 0)
+      mark(carriers_[k], news);
+  carriers_.clear();
+  for (int k = 0; k < functions(); ++k) {
+    const CutFunction& function = space_.functions()[k];
+    carriers_.push_back(function.is_front ? function.group.nodes : std::vector<int>{function.twin.node});
+    mark(carriers_.back(), carries);
+    if (k >= first_new)
+      mark(carriers_.back(), news);
+  }
+  held_touched_.resize(held_.size(), 0);
   for (std::size_t p = 0; p < held_.size(); ++p) {
     const DisplacementMean& mean = uncut_.held()[p];
-    held_touched_[p] = std::any_of(mean.nodes.begin(), mean.nodes.end(), [&](int node) { return carries[node] != 0; });
+    const char touched =
+        std::any_of(mean.nodes.begin(), mean.nodes.end(), [&](int node) { return carries[node] != 0; });
+    const bool is_news = touched != held_touched_[p] ||
+                         std::any_of(mean.nodes.begin(), mean.nodes.end(), [&](int node) { return news[node] != 0; });
+    held_touched_[p] = touched;
     CutFunctional& held = held_[p];
+    if (touched != 0 && !is_news) { // the same functions under new numbers
+      for (auto& [function, matrix] : held.cut)
+        function = place_now[function];
+      continue;
+    }
     if (held_touched_[p] == 0) {
       held.cut.clear();
       if (held.base.empty())
@@ -396,11 +552,11 @@ void CutSystem::factor(Eigen::Index unchanged) {
     }
     if (const int column = factor_lower(corner); column >= 0) {
       const CutFunction& function = space_.functions()[unchanged + column / 3];
-      const Vector3 x = function.is_front ? function.group.station.point
-                                          : uncut_.nodes().positions[function.twin.node];
-      throw NumericalError(fmt::format("what the cut appends is not positive definite (unknown {} of {}, about ({:.4g}, "
-                                       "{:.4g}, {:.4g}) m): a severed piece is not held, or a function repeats another",
-                                       first + column, count, x.x(), x.y(), x.z()));
+      const Vector3 x = function.is_front ? function.group.station.point : uncut_.nodes().positions[function.twin.node];
+      throw NumericalError(
+          fmt::format("what the cut appends is not positive definite (unknown {} of {}, about ({:.4g}, "
+                      "{:.4g}, {:.4g}) m): a severed piece is not held, or a function repeats another",
+                      first + column, count, x.x(), x.y(), x.z()));
     }
     lower.bottomRightCorner(rest, rest) = corner;
   }
@@ -425,14 +581,14 @@ void CutSystem::solve_multipliers() {
       cut.block<3, 3>(3 * static_cast<Eigen::Index>(function), 3 * a) += matrix.transpose();
     left.diagonal().segment<3>(3 * a).setConstant(1 / parted.stiffness);
   }
-  parted_half_ = uncut_.factor().forward(base);
-  add_product(-1, half_, true, parted_half_, cut);
+  parted_half_ = uncut_.factor().forward_sparse(base);
+  add_transposed_product(-1, half_.data(), static_cast<int>(half_.rows()), parted_half_, cut);
   triangular_solve(false, lower_.data(), static_cast<int>(lower_.rows()), cut);
   parted_schur_ = cut;
   left += gram(parted_half_) + gram(parted_schur_);
   if (factor_lower(left) >= 0)
-    throw NumericalError(fmt::format("the parted shares of the held surface contradict one another ({} of them)",
-                                     parted_.size()));
+    throw NumericalError(
+        fmt::format("the parted shares of the held surface contradict one another ({} of them)", parted_.size()));
   parted_lower_ = std::move(left);
 }
 
@@ -452,7 +608,7 @@ void CutSystem::add_force(const CutFunctional& on, const Vector3& force, Eigen::
 
 CutVectors CutSystem::solve(const CutVectors& loads) const {
   CutVectors half{uncut_.factor().forward(uncut_.ordered(loads.base)), loads.cut, loads.multipliers};
-  add_product(-1, half_, true, half.base, half.cut);
+  add_transposed_product(-1, half_.data(), static_cast<int>(half_.rows()), half.base, half.cut);
   triangular_solve(false, lower_.data(), static_cast<int>(lower_.rows()), half.cut);
   if (!parted_.empty()) {
     // q = -M^-1 (g - Wd^T y - X^T z)
@@ -465,15 +621,15 @@ CutVectors CutSystem::solve(const CutVectors& loads) const {
     add_product(-1, parted_half_, false, half.multipliers, half.base);
   }
   triangular_solve(true, lower_.data(), static_cast<int>(lower_.rows()), half.cut);
-  add_product(-1, half_, false, half.cut, half.base);
+  half.base -= half_.leftCols(half.cut.rows()) * half.cut;
   uncut_.factor().backward(0, half.base);
   half.base = uncut_.unordered(half.base);
   return half;
 }
 
 CutVectors CutSystem::half_solutions(const CutVectors& loads) const {
-  CutVectors half{uncut_.factor().forward(uncut_.ordered(loads.base)), loads.cut, loads.multipliers};
-  add_product(-1, half_, true, half.base, half.cut);
+  CutVectors half{uncut_.factor().forward_sparse(uncut_.ordered(loads.base)), loads.cut, loads.multipliers};
+  add_transposed_product(-1, half_.data(), static_cast<int>(half_.rows()), half.base, half.cut);
   triangular_solve(false, lower_.data(), static_cast<int>(lower_.rows()), half.cut);
   if (!parted_.empty()) {
     add_product(-1, parted_half_, true, half.base, half.multipliers);

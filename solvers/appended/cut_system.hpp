@@ -18,8 +18,8 @@
 
 namespace spherecut::solvers {
 
-/// A linear functional of the displacement, one value an axis: sum of weight_j alpha_j + sum of M_k c_k over nodes j and
-/// appended functions k.
+/// A linear functional of the displacement, one value an axis: sum of weight_j alpha_j + sum of M_k c_k over nodes j
+/// and appended functions k.
 struct CutFunctional {
   std::vector<std::pair<int, double>> base; // by node, ascending
   std::vector<std::pair<int, Matrix3>> cut; // by place of the function, ascending
@@ -33,10 +33,11 @@ struct CutVectors {
 
 class CutSystem {
  public:
-  CutSystem(const UncutBody& uncut, const CutSpace& space) : uncut_(uncut), space_(space) {}
+  CutSystem(const UncutBody& uncut, const CutSpace& space)
+      : uncut_(uncut), space_(space), half_(3 * uncut.size(), 0), parted_half_(3 * uncut.size(), 0) {}
 
-  /// Follows the space. `loose`: lists of twins, each of those that carry one piece that nothing holds; six soft springs
-  /// hold its rigid motions. They stay without load under loads in balance.
+  /// Follows the space. `loose`: lists of twins, each of those that carry one piece that nothing holds; six soft
+  /// springs hold its rigid motions. They stay without load under loads in balance.
   void update(const CutSpace::Change& change, const std::vector<std::vector<int>>& loose = {});
 
   /// Zero loads of so many cases.
@@ -64,20 +65,22 @@ class CutSystem {
   void subtract_holding(const VectorX& base, const VectorX& cut, const VectorX& prescribed,
                         const std::function<Vector3(const Vector3&)>& field, CutVectors& rows) const;
 
+  /// Parts in which the k-th function does not vanish, ascending.
+  [[nodiscard]] const std::vector<PartId>& parts_of(int k) const { return data_[k].parts; }
   [[nodiscard]] int functions() const { return static_cast<int>(data_.size()); }
   [[nodiscard]] long stored() const { return static_cast<long>(half_.size() + schur_.size()); }
 
  private:
   /// Of one appended function.
   struct FunctionData {
-    std::vector<PartId> parts;
-    std::vector<double> weights;                        // m3, of the parts
-    std::vector<Vector3> scalar;                        // gradients at the parts: of a twin
-    std::vector<std::array<Matrix3, 3>> front;          // or of a front group
-    std::vector<int> nodes;                             // base nodes that it couples with
-    std::vector<Matrix3> blocks;                        // elastic, rows: components of the base
-    std::vector<std::pair<int, Matrix3>> penalty;       // by node: what held means add
-    [[nodiscard]] bool is_front() const { return !front.empty(); }
+    int id = -1;
+    bool is_front = false;
+    std::vector<PartId> parts;                    // ascending
+    std::vector<double> gradients;                // per part: 3 of a twin; 27 of a front group, [mode][i][j] du_i/dx_j
+    std::vector<int> nodes;                       // base nodes that it couples with, ascending
+    std::vector<Matrix3> blocks;                  // elastic, rows: components of the base
+    std::vector<std::pair<int, Matrix3>> penalty; // by node: what held means add
+    [[nodiscard]] int stride() const { return is_front ? 27 : 3; }
   };
   /// A difference of means over two parts of one held share.
   struct PartedShare {
@@ -88,26 +91,28 @@ class CutSystem {
   };
   void evaluate(int function, FunctionData& data) const;
   void add_elastic(int first_new);
-  void add_held(int first_new);
+  void add_held(int first_new, const CutSpace::Change& change);
   void part_held_shares();
   void add_springs(const std::vector<std::vector<int>>& loose);
   void factor(Eigen::Index unchanged);
   void solve_multipliers();
-  [[nodiscard]] Matrix3 elastic_block(const FunctionData& a, std::size_t at_a, const FunctionData& b,
-                                      std::size_t at_b) const;
+  struct CellProducts;
+  void add_cell(int cell, std::span<const int> fresh, CellProducts& work);
+  void distribute(int cell, const CellProducts& work);
 
   const UncutBody& uncut_;
   const CutSpace& space_;
   std::vector<FunctionData> data_;
-  std::unordered_map<PartId, std::vector<std::pair<int, int>>> at_part_; // functions and their entries there
+  std::vector<std::vector<int>> in_cell_; // functions by cell, ascending
   std::vector<CutFunctional> held_;
-  std::vector<char> held_touched_;
+  std::vector<char> held_touched_;         // some function reaches into the share
+  std::vector<std::vector<int>> carriers_; // nodes of every function
   std::vector<PartedShare> parted_;
-  MatrixX elastic_;       // of Kee, without penalties
-  MatrixX penalty_;       // of Kee
-  MatrixX springs_;       // rows of Kee, a column a spring of stiffness 1 N/m
-  MatrixX half_;          // W, base rows in elimination order
-  MatrixX schur_;         // S, then its lower Cholesky factor in `lower_`
+  MatrixX elastic_; // of Kee, without penalties
+  MatrixX penalty_; // of Kee
+  MatrixX springs_; // rows of Kee, a column a spring of stiffness 1 N/m
+  MatrixX half_;    // W, base rows in elimination order; with room for more columns
+  MatrixX schur_;   // S, then its lower Cholesky factor in `lower_`
   MatrixX lower_;
   MatrixX parted_half_, parted_schur_, parted_lower_; // L^-1 d, L_S^-1 of what is appended, factor of what is left
 };

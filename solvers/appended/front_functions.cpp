@@ -62,6 +62,13 @@ std::vector<FrontRun> runs_of(const topology::Incision& incision) {
 
 } // namespace
 
+std::vector<std::vector<int>> front_runs(const topology::Incision& incision) {
+  std::vector<std::vector<int>> segments;
+  for (FrontRun& run : runs_of(incision))
+    segments.push_back(std::move(run.segments));
+  return segments;
+}
+
 std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach) {
   const auto frame = incision.front_frame(x, reach);
   if (!frame)
@@ -85,7 +92,8 @@ std::optional<FrontPlace> front_place(const topology::Incision& incision, const 
   const double length = std::sqrt(std::max(0.0, frame->distance * frame->distance - place.above * place.above));
   place.ahead = behind * length;
   place.grad_above = normal;
-  place.grad_ahead = along.norm() > 1e-9 * frame->distance && length > 0 ? Vector3(behind * along.normalized()) : frame->ahead;
+  place.grad_ahead =
+      along.norm() > 1e-9 * frame->distance && length > 0 ? Vector3(behind * along.normalized()) : frame->ahead;
   return place;
 }
 
@@ -204,18 +212,29 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
   return groups;
 }
 
-FrontFields front_fields(const Material& material, const FrontStation& station, const FrontPlace& place) {
-  // The field of a point on the front has no gradient.
-  const double least = 1e-9 * station.spacing;
+TipFields tip_fields(const Material& material, const FrontPlace& place) {
+  // A point on the front has no gradient.
+  constexpr double least = 1e-12; // m
   const double ahead = std::abs(place.ahead) + std::abs(place.above) < least ? least : place.ahead;
-  FrontFields fields;
+  TipFields fields;
   for (int mode = 0; mode < 3; ++mode) {
-    // Axes of the field: ahead, normal, along; its gradient has no part along the front.
-    const TipField field = tip_field(material, front_intensity(material, station) * Vector3::Unit(mode), ahead, place.above);
-    fields.value.col(mode) = station.axes * field.displacement;
-    fields.gradient[mode] = (station.axes * field.gradient.col(0)) * place.grad_ahead.transpose() +
-                            (station.axes * field.gradient.col(1)) * place.grad_above.transpose();
+    const TipField field = tip_field(material, Vector3::Unit(mode), ahead, place.above);
+    fields.value.col(mode) = field.displacement;
+    fields.by_ahead.col(mode) = field.gradient.col(0);
+    fields.by_above.col(mode) = field.gradient.col(1);
   }
+  return fields;
+}
+
+FrontFields front_fields(const Material& material, const FrontStation& station, const FrontPlace& place,
+                         const TipFields& tip) {
+  const Matrix3 axes = front_intensity(material, station) * station.axes;
+  FrontFields fields;
+  fields.value = axes * tip.value;
+  const Matrix3 ahead = axes * tip.by_ahead, above = axes * tip.by_above;
+  for (int mode = 0; mode < 3; ++mode)
+    fields.gradient[mode] =
+        ahead.col(mode) * place.grad_ahead.transpose() + above.col(mode) * place.grad_above.transpose();
   return fields;
 }
 

@@ -50,6 +50,17 @@ SmallBoxes::SmallBoxes(const topology::Domain& domain, const NodeCloud& nodes, c
   evaluate(spheres);
   sort_into_bins(domain.bounds());
   find_neighbours();
+  node_cell_start_.assign(spheres.size() + 1, 0);
+  for (const BoxShapes& cell : cells_)
+    for (const int node : cell.nodes)
+      ++node_cell_start_[node + 1];
+  for (int i = 0; i < spheres.size(); ++i)
+    node_cell_start_[i + 1] += node_cell_start_[i];
+  node_cells_.resize(node_cell_start_.back());
+  std::vector<int> next(node_cell_start_.begin(), node_cell_start_.end() - 1);
+  for (int c = 0; c < std::ssize(cells_); ++c)
+    for (const int node : cells_[c].nodes)
+      node_cells_[next[node]++] = c;
 }
 
 void SmallBoxes::add_cell(const topology::Domain& domain, const BackgroundBox& cell) {
@@ -106,10 +117,11 @@ void SmallBoxes::evaluate(const Spheres& spheres) {
           const auto place =
               std::lower_bound(cell.nodes.begin(), cell.nodes.end(), at[lane].nodes[k]) - cell.nodes.begin();
           cell.value[place * BoxShapes::lanes + lane] = at[lane].value[k];
-          double* gradient = cell.gradients.data() + 3 * BoxShapes::lanes * place + lane;
+          const auto count = std::ssize(cell.nodes);
+          double* gradient = cell.gradients.data() + 3 * count * lane + place;
           gradient[0] = at[lane].dx[k];
-          gradient[BoxShapes::lanes] = at[lane].dy[k];
-          gradient[2 * BoxShapes::lanes] = at[lane].dz[k];
+          gradient[count] = at[lane].dy[k];
+          gradient[2 * count] = at[lane].dz[k];
         }
     }
   });
@@ -133,7 +145,8 @@ void SmallBoxes::sort_into_bins(const BoundingBox& bounds) {
   }
   const auto for_bins = [&](const SmallBox& box, auto&& visit) {
     const Vector3 margin = 1e-9 * box.half;
-    const std::array<int, 3> low = bin_of(box.centre - box.half + margin), high = bin_of(box.centre + box.half - margin);
+    const std::array<int, 3> low = bin_of(box.centre - box.half + margin),
+                             high = bin_of(box.centre + box.half - margin);
     for (int a = low[0]; a <= high[0]; ++a)
       for (int b = low[1]; b <= high[1]; ++b)
         for (int c = low[2]; c <= high[2]; ++c)

@@ -23,11 +23,11 @@ struct BoxShapes {
   int first_box = 0, boxes = 0;
   std::vector<int> nodes;        // that support some box, ascending
   std::vector<double> value;     // [node][lane]; zero in the lanes that are left
-  std::vector<double> gradients; // [node][axis][lane], 1/m
+  std::vector<double> gradients; // [lane][axis][node], 1/m
   [[nodiscard]] double value_at(std::size_t k, int lane) const { return value[k * lanes + lane]; }
   [[nodiscard]] Vector3 gradient_at(std::size_t k, int lane) const {
-    const double* at = gradients.data() + 3 * lanes * k + lane;
-    return {at[0], at[lanes], at[2 * lanes]};
+    const double* at = gradients.data() + 3 * nodes.size() * lane + k;
+    return {at[0], at[nodes.size()], at[2 * nodes.size()]};
   }
 };
 
@@ -41,6 +41,10 @@ class SmallBoxes {
   [[nodiscard]] int size() const { return static_cast<int>(boxes_.size()); }
   [[nodiscard]] int cell_of(int box) const { return cell_of_[box]; }
   [[nodiscard]] int lane_of(int box) const { return box - cells_[cell_of_[box]].first_box; }
+  /// Cells that a node supports, ascending.
+  [[nodiscard]] std::span<const int> cells_of_node(int node) const {
+    return std::span(node_cells_).subspan(node_cell_start_[node], node_cell_start_[node + 1] - node_cell_start_[node]);
+  }
   /// Boxes that share a piece of a face with this one, ascending.
   [[nodiscard]] std::span<const int> neighbours(int box) const {
     return std::span(neighbours_).subspan(neighbour_start_[box], neighbour_start_[box + 1] - neighbour_start_[box]);
@@ -63,6 +67,7 @@ class SmallBoxes {
   std::vector<BoxShapes> cells_;
   std::vector<int> cell_of_, order_;
   std::vector<int> neighbour_start_, neighbours_;
+  std::vector<int> node_cell_start_, node_cells_;
   Vector3 bin_origin_ = Vector3::Zero(), bin_size_ = Vector3::Ones(); // m
   std::array<int, 3> bins_{1, 1, 1};
   std::vector<int> bin_start_, bin_boxes_;

@@ -53,6 +53,29 @@ UncutBody::UncutBody(Problem problem, int base, const UncutOptions& options)
   }
 }
 
+bool UncutBody::fits(const Problem& problem, int base) const {
+  if (base != size() || problem.domain != problem_.domain ||
+      problem.material.young_modulus != problem_.material.young_modulus ||
+      problem.material.poisson_ratio != problem_.material.poisson_ratio ||
+      (problem.prescribed_region != nullptr) != (problem_.prescribed_region != nullptr))
+    return false;
+  const NodeCloud &own = problem_.nodes, &other = problem.nodes;
+  for (int i = 0; i < base; ++i)
+    if (own.positions[i] != other.positions[i] || own.spacings[i] != other.spacings[i] ||
+        own.reaches[i] != other.reaches[i] || own.kinds[i] != other.kinds[i])
+      return false;
+  std::size_t held = 0;
+  for (const Prescribed& entry : problem.prescribed) {
+    if (entry.node >= base)
+      continue;
+    if (held == problem_.prescribed.size() || problem_.prescribed[held].node != entry.node ||
+        problem_.prescribed[held].components != entry.components)
+      return false;
+    ++held;
+  }
+  return held == problem_.prescribed.size();
+}
+
 void UncutBody::assemble() {
   const SurfacePatches patches(*problem_.domain, problem_.nodes);
   std::vector<int> held_nodes;
@@ -77,17 +100,18 @@ void UncutBody::assemble() {
     const BoxShapes& cell = boxes_.cells()[c];
     shapes.points = cell.boxes;
     shapes.nodes = cell.nodes;
-    shapes.gradients = cell.gradients;
+    shapes.gradients.resize(cell.gradients.size());
     shapes.reached.assign(cell.nodes.size(), 0);
     std::array<double, BoxShapes::lanes> root{};
     for (int lane = 0; lane < cell.boxes; ++lane)
       root[lane] = std::sqrt(boxes_.boxes()[cell.first_box + lane].volume);
     for (std::size_t k = 0; k < cell.nodes.size(); ++k)
-      for (int lane = 0; lane < cell.boxes; ++lane) {
-        if (!cell.gradient_at(k, lane).isZero(0))
+      for (int lane = 0; lane < BoxShapes::lanes; ++lane) {
+        if (lane < cell.boxes && !cell.gradient_at(k, lane).isZero(0))
           shapes.reached[k] |= std::uint32_t{1} << lane;
+        const Vector3 gradient = cell.gradient_at(k, lane);
         for (int axis = 0; axis < 3; ++axis)
-          shapes.gradients[(3 * k + axis) * BoxShapes::lanes + lane] *= root[lane];
+          shapes.gradients[(3 * k + axis) * BoxShapes::lanes + lane] = root[lane] * gradient[axis];
       }
     if (!cluster.has_room_for(shapes))
       flush();

@@ -1,4 +1,5 @@
-// The uncut body of method galerkin: nodes, spheres, small boxes, stiffness and its factor. A cut changes nothing of it.
+// The uncut body of method galerkin: nodes, spheres, small boxes, stiffness and its factor. A cut changes nothing of
+// it.
 #pragma once
 
 #include "solvers/appended/small_boxes.hpp"
@@ -11,7 +12,7 @@ namespace spherecut::solvers {
 
 struct UncutOptions {
   double support_radius = 1.75; // rho, radius over galerkin_lengths
-  double cell_size = 1;         // edge of a background cell in spacings; a small box has half of it
+  double cell_size = 0.625;     // edge of a background cell in spacings; a small box has half of it
   bool estimate_condition = true;
 };
 
@@ -21,6 +22,8 @@ class UncutBody {
   /// asked for. Of the prescribed entries those of the first nodes hold the surface. Throws as discretise().
   UncutBody(Problem problem, int base, const UncutOptions& options);
 
+  /// Whether it is the uncut body of this problem: equal nodes, material and held nodes.
+  [[nodiscard]] bool fits(const Problem& problem, int base) const;
   [[nodiscard]] const Problem& problem() const { return problem_; }
   [[nodiscard]] const NodeCloud& nodes() const { return problem_.nodes; }
   [[nodiscard]] int size() const { return problem_.nodes.size(); }
