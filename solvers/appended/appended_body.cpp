@@ -200,7 +200,6 @@ void AppendedBody::assemble_loads() {
   const topology::Incision* incision = problem_.incision.get();
   ShapeFunctions shape;
   CutTerms terms;
-  const auto is_dropped = [&](PartId part) { return !dropped_.empty() && dropped_[components_.of(part)] != 0; };
   const auto add = [&](const Vector3& x, const Vector3& force) {
     const PartId part = incision != nullptr ? space_->cut().part_at(x, *incision) : 0;
     if (incision != nullptr && is_dropped(part))
@@ -285,8 +284,16 @@ void AppendedBody::assemble_loads() {
 
 // ---- places
 
+CutFunctional AppendedBody::mean_over(std::vector<QuadraturePoint> points) const {
+  if (!dropped_.empty())
+    std::erase_if(points, [&](const QuadraturePoint& point) {
+      return is_dropped(space_->cut().part_at(point.position, *problem_.incision));
+    });
+  return system_->mean_over(points);
+}
+
 CutFunctional AppendedBody::value_at(const Vector3& x) const {
-  return system_->mean_over({{x, 1}});
+  return mean_over({{x, 1}});
 }
 
 const AppendedBody::Contact& AppendedBody::contact(int node) const {
@@ -296,7 +303,7 @@ const AppendedBody::Contact& AppendedBody::contact(int node) const {
   if (patches_ == nullptr)
     patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
   const DisplacementMean mean = patches_->mean(node, uncut_->spheres(), problem_.prescribed_region);
-  return contacts_.emplace(node, Contact{system_->mean_over(mean.share), mean.centroid}).first->second;
+  return contacts_.emplace(node, Contact{mean_over(mean.share), mean.centroid}).first->second;
 }
 
 Vector3 AppendedBody::contact_point(int node) const {
@@ -324,7 +331,13 @@ void AppendedBody::shape_at(const Vector3& x, ShapeFunctions& shape) const {
   if (space_->functions().empty())
     return;
   thread_local CutTerms terms;
-  space_->terms_at(x, space_->cut().part_at(x, *problem_.incision), shape, terms);
+  const PartId part = space_->cut().part_at(x, *problem_.incision);
+  if (is_dropped(part)) { // nothing moves it
+    for (auto* of : {&shape.value, &shape.dx, &shape.dy, &shape.dz})
+      std::fill(of->begin(), of->end(), 0.0);
+    return;
+  }
+  space_->terms_at(x, part, shape, terms);
   for (const ScalarTerm& term : terms.scalar) {
     shape.nodes.push_back(uncut_->size() + term.function);
     shape.value.push_back(term.value);

@@ -71,6 +71,9 @@ class AppendedBody final : public Discretisation, public Growable {
   void assemble_loads();
   [[nodiscard]] const Contact& contact(int node) const;
   [[nodiscard]] CutFunctional value_at(const Vector3& x) const;
+  /// Mean over the points that have not left the computation: nothing moves the others.
+  [[nodiscard]] CutFunctional mean_over(std::vector<QuadraturePoint> points) const;
+  [[nodiscard]] bool is_dropped(PartId part) const { return !dropped_.empty() && dropped_[components_.of(part)] != 0; }
   [[nodiscard]] CutVectors split(const VectorX& coefficients) const;
   [[nodiscard]] std::vector<Field> fields_of(const CutVectors& solutions) const;
   [[nodiscard]] CutVectors unit_forces(const std::vector<int>& nodes) const;

@@ -405,9 +405,10 @@ bool CutSpace::term_at(int k, PartId part, ScalarTerm& term) const {
 // A group whose blended hats are `value`, with their gradient, at a place.
 FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, PlacedFields& placed) const {
   const FrontStation& station = functions_[k].group.station;
-  if (placed.station != station.point) {
+  if (placed.station.spacing != station.spacing || placed.station.point != station.point ||
+      placed.station.axes != station.axes) {
     placed.fields = front_fields(material_, station, *placed.place, placed.tip);
-    placed.station = station.point;
+    placed.station = station;
   }
   const FrontFields& fields = placed.fields;
   FrontTerm term{k, value * fields.value, {}};
@@ -494,7 +495,6 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
   if (of_group.empty() || place_here() == nullptr)
     return;
   PlacedFields here{place, tip_fields(material_, *place), {}, {}};
-  here.station.setConstant(std::numeric_limits<double>::quiet_NaN());
   for (const auto& [k, sum] : of_group)
     terms.front.push_back(front_term(k, sum.first, sum.second, here));
 }

@@ -5,7 +5,6 @@
 #include "solvers/appended/cut_boxes.hpp"
 #include "solvers/appended/front_functions.hpp"
 
-#include <limits>
 #include <memory>
 
 namespace spherecut::solvers {
@@ -66,7 +65,7 @@ struct PlacedFields {
   std::optional<FrontPlace> place;
   TipFields tip;
   // The fields as the station had them that was asked for last: its rings follow one another.
-  Vector3 station = Vector3::Constant(std::numeric_limits<double>::quiet_NaN());
+  FrontStation station; // of no spacing: none yet
   FrontFields fields;
 };
 

@@ -183,7 +183,8 @@ struct CutSystem::CellProducts {
 
 void CutSystem::add_elastic(int first_new) {
   const SmallBoxes& boxes = uncut_.boxes();
-  std::map<int, std::vector<int>> fresh; // new functions by cell
+  std::map<int, std::vector<int>> fresh;     // new functions by cell
+  std::vector<int> taken(uncut_.size(), -1); // by the function that couples with it, the last to do so
   for (int k = first_new; k < functions(); ++k) {
     FunctionData& own = data_[k];
     int last = -1;
@@ -193,10 +194,13 @@ void CutSystem::add_elastic(int first_new) {
         continue;
       last = cell;
       fresh[cell].push_back(k);
-      own.nodes.insert(own.nodes.end(), boxes.cells()[cell].nodes.begin(), boxes.cells()[cell].nodes.end());
+      for (const int node : boxes.cells()[cell].nodes)
+        if (taken[node] != k) {
+          taken[node] = k;
+          own.nodes.push_back(node);
+        }
     }
     std::sort(own.nodes.begin(), own.nodes.end());
-    own.nodes.erase(std::unique(own.nodes.begin(), own.nodes.end()), own.nodes.end());
     own.blocks.assign(own.nodes.size(), Matrix3::Zero());
   }
   CellProducts work;
