@@ -294,6 +294,9 @@ CellBalance cell_balance_of(const Discretisation& body) {
 }
 
 std::unique_ptr<Discretisation> make_collocation(Problem problem, const DiscretisationOptions& options) {
+  if (options.sight == SightRule::appended)
+    throw InputError(
+        "sight rule 'appended' is one of method galerkin; collocation has visibility, diffraction and enriched");
   require_domain(problem);
   return std::make_unique<Collocation>(std::move(problem), options);
 }

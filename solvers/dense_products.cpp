@@ -47,6 +47,13 @@ MatrixX gram_of_rows(const MatrixX& a) {
   return gram(a, true);
 }
 
+void add_product(int rows, int columns, int inner, const double* a, int lda, const double* b, int ldb, double* c,
+                 int ldc) {
+  const double one = 1;
+  if (rows > 0 && columns > 0 && inner > 0)
+    dgemm_("N", "N", &rows, &columns, &inner, &one, a, &lda, b, &ldb, &one, c, &ldc);
+}
+
 void add_product(double factor, const MatrixX& a, bool transposed, const MatrixX& b, MatrixX& c) {
   const int m = static_cast<int>(c.rows()), n = static_cast<int>(c.cols()), k = static_cast<int>(b.rows()),
             lda = static_cast<int>(a.rows());

@@ -11,6 +11,9 @@ namespace spherecut::solvers {
 [[nodiscard]] MatrixX gram_of_rows(const MatrixX& a);
 /// C += factor A B, or factor A^T B. The shapes must fit.
 void add_product(double factor, const MatrixX& a, bool transposed, const MatrixX& b, MatrixX& c);
+/// C += A B of matrices given by their first entries and leading dimensions: `rows` x `inner` and `inner` x `columns`.
+void add_product(int rows, int columns, int inner, const double* a, int lda, const double* b, int ldb, double* c,
+                 int ldc);
 /// C += factor A^T B, A with leading dimension `lda`, of as many rows as B and columns as C has rows.
 void add_transposed_product(double factor, const double* a, int lda, const MatrixX& b, MatrixX& c);
 /// Columns of B become L^-1 B, or L^-T B, of a lower triangle with leading dimension `lda`.

@@ -45,7 +45,7 @@ void Discretisation::require_loads(const std::vector<int>& nodes, const std::vec
 }
 
 void Discretisation::require_own(const Field& field) const {
-  if (const Eigen::Index count = 3 * Eigen::Index{problem().nodes.size()}; field.coefficients.size() != count)
+  if (const Eigen::Index count = coefficient_count(); field.coefficients.size() != count)
     throw InputError(fmt::format("a field of {} coefficients on a body of {}: it is another body's",
                                  field.coefficients.size(), count));
 }

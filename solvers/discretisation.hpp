@@ -198,8 +198,13 @@ class Discretisation {
   /// Everything at a point of the body. Throws InputError when no support covers x.
   [[nodiscard]] virtual PointState at(const Vector3& x, const Field& field) const = 0;
 
-  /// Shape functions at a point of the body by node: the displacement there is the sum of value_j times coefficient_j
-  /// of a field. Throws InputError when no support covers x, or where the method has no spheres.
+  /// How many nodes have spheres: the first of them, all but where a cut only appends (SightRule::appended).
+  [[nodiscard]] virtual int sphere_count() const { return problem().nodes.size(); }
+  /// Number of coefficients of a field: 3 a node with a sphere, then 3 for every function that a cut has appended.
+  [[nodiscard]] virtual int coefficient_count() const { return 3 * sphere_count(); }
+  /// Shape functions at a point of the body by node or appended function: the displacement there is the sum of value_j
+  /// times coefficient_j of a field, and of the vector terms. Throws InputError when no support covers x, or where the
+  /// method has no spheres.
   virtual void shape_at(const Vector3& x, ShapeFunctions& shape) const;
   /// Radius of a node's sphere, m.
   [[nodiscard]] virtual double sphere_radius(int node) const;

@@ -250,6 +250,12 @@ PointState state_from(const Problem& problem, const ShapeFunctions& shape, const
     if (field.pressure.size() > 0)
       pressure += shape.value[k] * field.pressure[j];
   }
+  for (const VectorTerm& term : shape.vectors) {
+    const Vector3 coefficients = field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(term.group));
+    state.displacement += term.value * coefficients;
+    for (int m = 0; m < 3; ++m)
+      state.gradient += coefficients[m] * term.gradient[m];
+  }
   state.strain = 0.5 * (state.gradient + state.gradient.transpose());
   // The initial strain acts with the loads. A pressure unknown holds the volumetric part, -lambda tr(strain - initial).
   const Matrix3& initial = problem.loads.initial_strain;

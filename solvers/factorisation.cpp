@@ -237,6 +237,9 @@ class CholeskyFactorisation final : public OrderedCholesky {
     return block;
   }
   MatrixX compliance(const SparseMatrix& columns) const override { return sparse_compliance(supernodes(), columns); }
+  MatrixX forward_sparse(const MatrixX& right_hand_sides) const override {
+    return sparse_forward(supernodes(), right_hand_sides);
+  }
   MatrixX solve_transposed(const MatrixX& right_hand_sides) const override { return solve(right_hand_sides); }
   long nonzeros() const override { return nonzeros_; }
 

@@ -28,6 +28,8 @@ class OrderedCholesky : public Factorisation {
  public:
   /// L^-1 B.
   [[nodiscard]] virtual MatrixX forward(const MatrixX& right_hand_sides) const = 0;
+  /// The same of columns most of whose entries are zero.
+  [[nodiscard]] virtual MatrixX forward_sparse(const MatrixX& right_hand_sides) const = 0;
   /// Solutions X of L^T X = B of which the last `known` rows are there already: the others of `x` are those of B, and
   /// become those of X.
   virtual void backward(int known, MatrixX& x) const = 0;

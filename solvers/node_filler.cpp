@@ -82,6 +82,31 @@ void check_options(const SprinkleOptions& options) {
     refuse("maximum_nodes", options.maximum_nodes, "at least 4");
 }
 
+NodeCloud lip_places(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud* previous,
+                     const BoundingBox* region) {
+  const SpacingField& spacing = options.spacing;
+  const topology::SurfaceMesh local = region == nullptr ? topology::SurfaceMesh{} : part_of(domain.surface(), *region);
+  const topology::SurfaceMesh& surface = region == nullptr ? domain.surface() : local;
+  const SharpFeatures features = find_sharp_features(surface, options.sharp_edge_degrees);
+  const SheetLayout layout = lay_out_sheets(domain, features, spacing, *options.incision, surface, region);
+  NodeCloud known;
+  Surroundings there;
+  if (previous != nullptr)
+    for (int j = 0; j < previous->size(); ++j)
+      if (previous->kinds[j] == NodeKind::lip)
+        there.lips.push_back(known.add(*previous, j));
+  const NodeGrid nothing(spacing.finest(), spacing.slope);
+  there.taken = &nothing;
+  there.previous = previous != nullptr ? &known : nullptr;
+  there.region = region;
+  SprinkleOptions pairs = options;
+  pairs.ring_ahead = false;
+  NodeCloud places;
+  for (const CutNode& node : choose_cut_nodes(domain, pairs, features, surface, layout, there))
+    places.add(node.position, node.spacing, node.kind, node.normal);
+  return places;
+}
+
 Filler::Filler(const topology::Domain& domain, const SprinkleOptions& options, const BoundingBox* region)
     : domain_(domain), options_(options), spacing_(options.spacing), incision_(options.incision.get()), region_(region),
       local_surface_(region == nullptr ? topology::SurfaceMesh{} : part_of(domain.surface(), *region)),

@@ -17,6 +17,11 @@ constexpr double sweep_fraction = 0.5;  // size of the samples that find such pl
 /// Throws InputError naming the option that is out of range.
 void check_options(const SprinkleOptions& options);
 
+/// Lip nodes of options.incision in pairs, beside the lip nodes of `previous` (may be null), in a region (null:
+/// everywhere). They keep clear of one another alone.
+NodeCloud lip_places(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud* previous,
+                     const BoundingBox* region);
+
 class Filler {
  public:
   /// With a region (m) only places inside it get new nodes; options and domain must outlive the filler.

@@ -144,6 +144,10 @@ SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const Sprink
   const BoundingBox region = changed_region(before, *options.incision, domain, options.spacing);
   if ((region.lower.array() > region.upper.array()).any())
     return increment;
+  if (options.lips_apart) {
+    increment.added = lip_places(domain, options, &previous, &region);
+    return increment;
+  }
   const double margin = context_reach * coarsest_in(region, options.spacing);
   const BoundingBox context{region.lower.array() - margin, region.upper.array() + margin};
   SprinkleOptions local = options;

@@ -207,10 +207,12 @@ SpacingField spacing_for_count(const topology::Domain& domain, const SpacingFiel
                                  shape.fine, shape.coarse, volume));
   SpacingField scaled = shape;
   const SharpFeatures features = find_sharp_features(domain.surface(), options.sharp_edge_degrees);
+  // Lip nodes that stand apart are not counted: they have no unknowns.
+  const topology::Incision* const counted = options.lips_apart ? nullptr : options.incision.get();
   const auto count_at = [&](double log_scale) {
     scaled.fine = std::exp(log_scale) * shape.fine;
     scaled.coarse = std::exp(log_scale) * shape.coarse;
-    return count(domain, features, scaled, options.incision.get()) + static_cast<double>(options.seeds.size());
+    return count(domain, features, scaled, counted) + static_cast<double>(options.seeds.size());
   };
   // Newton's method in logarithms with the secant slope; the count falls no faster than scale^-3, so that starting from
   // too few nodes never overshoots by much.
@@ -232,6 +234,8 @@ SpacingField spacing_for_count(const topology::Domain& domain, const SpacingFiel
   // Trial fillings show by how much the estimate is off for this body; the best is taken.
   SprinkleOptions trial = options;
   trial.minimum_density = 0;
+  if (options.lips_apart)
+    trial.incision = nullptr;
   SpacingField best = shape;
   double smallest_miss = std::numeric_limits<double>::infinity(), wanted = target;
   double log_scale = std::log(std::cbrt(volume / target) / shape.fine);

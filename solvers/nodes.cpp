@@ -119,8 +119,45 @@ std::vector<int> lip_partners(const NodeCloud& nodes) {
   return partners;
 }
 
+namespace {
+
+SprinkleOptions without_cut(SprinkleOptions options) {
+  options.incision = nullptr;
+  options.ring_ahead = false;
+  return options;
+}
+
+/// The nodes of the uncut body with those on the faces of the cut behind them.
+Sprinkling with_lips_apart(Sprinkling uncut, const topology::Domain& domain, const SprinkleOptions& options,
+                           const NodeCloud* previous) {
+  std::vector<int> kept;
+  if (previous != nullptr)
+    for (int j = 0; j < previous->size(); ++j)
+      if (previous->kinds[j] == NodeKind::lip)
+        if (const auto on = options.incision->closest(previous->positions[j], 0.01 * previous->spacings[j]); on)
+          kept.push_back(j);
+  NodeCloud stays;
+  for (const int j : kept) {
+    stays.add(*previous, j);
+    uncut.nodes.add(*previous, j);
+    uncut.kept_from.push_back(j);
+  }
+  const NodeCloud places = lip_places(domain, options, previous != nullptr ? &stays : nullptr, nullptr);
+  for (int i = 0; i < places.size(); ++i) {
+    uncut.nodes.add(places, i);
+    if (previous != nullptr)
+      uncut.kept_from.push_back(-1);
+  }
+  uncut.report.lip_nodes = static_cast<int>(kept.size()) + places.size();
+  return uncut;
+}
+
+} // namespace
+
 Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& options) {
   check_options(options);
+  if (options.lips_apart && options.incision != nullptr)
+    return with_lips_apart(sprinkle(domain, without_cut(options)), domain, options, nullptr);
   Filler filler(domain, options);
   filler.place_seeds();
   filler.place_cut();
@@ -133,6 +170,19 @@ Sprinkling sprinkle(const topology::Domain& domain, const SprinkleOptions& optio
 
 Sprinkling resprinkle(const topology::Domain& domain, const SprinkleOptions& options, const NodeCloud& previous) {
   check_options(options);
+  if (options.lips_apart && options.incision != nullptr) {
+    NodeCloud base;
+    std::vector<int> ids;
+    for (int j = 0; j < previous.size(); ++j)
+      if (previous.kinds[j] != NodeKind::lip) {
+        base.add(previous, j);
+        ids.push_back(j);
+      }
+    Sprinkling uncut = resprinkle(domain, without_cut(options), base);
+    for (int& from : uncut.kept_from)
+      from = from < 0 ? -1 : ids[from];
+    return with_lips_apart(std::move(uncut), domain, options, &previous);
+  }
   Filler filler(domain, options);
   filler.place_seeds();
   filler.keep(previous);

@@ -80,6 +80,9 @@ struct SprinkleOptions {
   /// A ring of single nodes ahead of the front, too, where a method wants it (wants_ring_ahead). It moves with the
   /// front: an increment exchanges ten nodes where it exchanges one or two without.
   bool ring_ahead = false;
+  /// Lip nodes are places on the faces of the cut and nothing else: the body is filled as if it were uncut, and they
+  /// come after all other nodes. An increment of the cut then adds some and removes none.
+  bool lips_apart = false;
 };
 
 /// What was checked about a sprinkled cloud, per zone of distance from the fine zone. Every node counts with the share

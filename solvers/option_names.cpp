@@ -12,31 +12,35 @@ namespace spherecut::solvers {
 
 namespace {
 
-template <typename Option>
-using Names = std::array<std::pair<Option, std::string_view>, 3>;
+template <typename Option, std::size_t Count = 3>
+using Names = std::array<std::pair<Option, std::string_view>, Count>;
 
 constexpr Names<Method> methods{
     {{Method::published, "published"}, {Method::collocation, "collocation"}, {Method::galerkin, "galerkin"}}};
 constexpr Names<UnheldPieces> treatments{
     {{UnheldPieces::refuse, "refuse"}, {UnheldPieces::hold, "hold"}, {UnheldPieces::drop, "drop"}}};
-constexpr Names<SightRule> sight_rules{{{SightRule::visibility, "visibility"},
-                                        {SightRule::diffraction, "diffraction"},
-                                        {SightRule::enriched, "enriched"}}};
+constexpr Names<SightRule, 4> sight_rules{{{SightRule::visibility, "visibility"},
+                                           {SightRule::diffraction, "diffraction"},
+                                           {SightRule::enriched, "enriched"},
+                                           {SightRule::appended, "appended"}}};
 constexpr Names<LipCondition> lip_conditions{
     {{LipCondition::open, "open"}, {LipCondition::frictionless, "frictionless"}, {LipCondition::sticking, "sticking"}}};
 
-template <typename Option>
-std::string_view name_of(const Names<Option>& names, Option option) {
+template <typename Option, std::size_t Count>
+std::string_view name_of(const Names<Option, Count>& names, Option option) {
   const auto at = std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.first == option; });
   return at != names.end() ? at->second : "unknown";
 }
 
-template <typename Option>
-Option option_of(const Names<Option>& names, std::string_view name, const std::string& refusal) {
+template <typename Option, std::size_t Count>
+Option option_of(const Names<Option, Count>& names, std::string_view name, const std::string& refusal) {
   const auto at = std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.second == name; });
-  if (at == names.end())
-    throw InputError(
-        fmt::format("{}; there are: {}, {}, {}", refusal, names[0].second, names[1].second, names[2].second));
+  if (at == names.end()) {
+    std::string allowed;
+    for (const auto& entry : names)
+      allowed += fmt::format("{}{}", allowed.empty() ? "" : ", ", entry.second);
+    throw InputError(fmt::format("{}; there are: {}", refusal, allowed));
+  }
   return at->first;
 }
 

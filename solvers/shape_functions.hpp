@@ -55,6 +55,13 @@ class Spheres {
   std::shared_ptr<CutSight> cut_;
 };
 
+/// Three unknowns each of which carries a vector function: what is gathered along the front of a cut.
+struct VectorTerm {
+  int group = -1;                  // its coefficients are 3 group .. 3 group + 2 of a field
+  Matrix3 value;                   // displacement of every unknown, a column each
+  std::array<Matrix3, 3> gradient; // of every unknown, du_i/dx_j, 1/m
+};
+
 /// Shape functions at one point; arrays have one entry per supporting node. Reuse the object: it keeps its memory.
 struct ShapeFunctions {
   std::vector<int> nodes;
@@ -63,6 +70,7 @@ struct ShapeFunctions {
   std::vector<double> dxx, dyy, dzz, dxy, dxz, dyz; // 1/m2, filled by evaluate_second alone
   double moment_condition = 0;                      // 1-norm condition of the scaled moment matrix
   double growth = 1;                                // of all radii, for this point alone
+  std::vector<VectorTerm> vectors{}; // of a body with a cut that appends (Discretisation::shape_at alone)
   [[nodiscard]] int size() const { return static_cast<int>(nodes.size()); }
   [[nodiscard]] Vector3 gradient(int k) const { return {dx[k], dy[k], dz[k]}; }
 };

@@ -12,9 +12,10 @@ enum class SightRule {
   visibility,  // a sphere ends where the incision hides its node
   diffraction, // it bends around the front: the distance is that of the shortest way around
   enriched,    // diffraction, and the basis gains sqrt(r) {cos t/2, sin t/2, sin t/2 sin t, cos t/2 sin t} at the front
+  appended,    // spheres stay what they are, and the cut appends functions (solvers/appended; galerkin alone)
 };
 std::string_view to_string(SightRule rule);
-/// Throws InputError naming the value and the three allowed names.
+/// Throws InputError naming the value and the allowed names.
 SightRule sight_rule_from_string(std::string_view name);
 
 /// The cut that the spheres of a node cloud must not see through.

@@ -16,15 +16,18 @@ namespace {
 /// For every supernode the columns of B that are not zero there after the forward solution.
 class ColumnReach {
  public:
-  ColumnReach(const SupernodalFactor& lower, const SparseMatrix& columns)
-      : words_((columns.cols() + word_bits - 1) / word_bits),
+  /// `transposed`: B^T.
+  ColumnReach(const SupernodalFactor& lower, const MatrixX& transposed)
+      : words_((transposed.rows() + word_bits - 1) / word_bits),
         bits_(static_cast<std::size_t>(lower.supernodes * words_), 0) {
     std::vector<int> supernode_of(static_cast<std::size_t>(lower.size));
     for (int s = 0; s < lower.supernodes; ++s)
       std::fill(supernode_of.begin() + lower.first_column[s], supernode_of.begin() + lower.first_column[s + 1], s);
-    for (Eigen::Index c = 0; c < columns.cols(); ++c)
-      for (SparseMatrix::InnerIterator entry(columns, c); entry; ++entry)
-        word(supernode_of[entry.row()], c / word_bits) |= std::uint64_t{1} << c % word_bits;
+    for (int s = 0; s < lower.supernodes; ++s)
+      for (int row = lower.first_column[s]; row < lower.first_column[s + 1]; ++row)
+        for (Eigen::Index c = 0; c < transposed.rows(); ++c)
+          if (transposed(c, row) != 0)
+            word(s, c / word_bits) |= std::uint64_t{1} << c % word_bits;
     for (int s = 0; s < lower.supernodes; ++s) {
       const int below = lower.first_row[s] + lower.first_column[s + 1] - lower.first_column[s];
       if (below < lower.first_row[s + 1])
@@ -52,12 +55,11 @@ class ColumnReach {
 
 } // namespace
 
-MatrixX sparse_compliance(const SupernodalFactor& lower, const SparseMatrix& columns) {
-  MatrixX solution = MatrixX::Zero(columns.cols(), lower.size); // transposed
-  for (Eigen::Index c = 0; c < columns.cols(); ++c)
-    for (SparseMatrix::InnerIterator entry(columns, c); entry; ++entry)
-      solution(c, entry.row()) = entry.value();
-  ColumnReach reach(lower, columns);
+namespace {
+
+/// In place of B^T comes (L^-1 B)^T.
+void solve_forward(const SupernodalFactor& lower, MatrixX& solution) {
+  ColumnReach reach(lower, solution);
   std::vector<int> active;
   MatrixX own, passed_on; // one row a column of B that is not zero there
   for (int s = 0; s < lower.supernodes; ++s) {
@@ -81,7 +83,23 @@ MatrixX sparse_compliance(const SupernodalFactor& lower, const SparseMatrix& col
       for (std::ptrdiff_t c = 0; c < count; ++c)
         solution(active[c], rows[k]) -= passed_on(c, k - width);
   }
+}
+
+} // namespace
+
+MatrixX sparse_compliance(const SupernodalFactor& lower, const SparseMatrix& columns) {
+  MatrixX solution = MatrixX::Zero(columns.cols(), lower.size); // transposed
+  for (Eigen::Index c = 0; c < columns.cols(); ++c)
+    for (SparseMatrix::InnerIterator entry(columns, c); entry; ++entry)
+      solution(c, entry.row()) = entry.value();
+  solve_forward(lower, solution);
   return gram_of_rows(solution);
+}
+
+MatrixX sparse_forward(const SupernodalFactor& lower, const MatrixX& columns) {
+  MatrixX solution = columns.transpose();
+  solve_forward(lower, solution);
+  return solution.transpose();
 }
 
 } // namespace spherecut::solvers

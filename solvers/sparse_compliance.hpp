@@ -17,6 +17,9 @@ struct SupernodalFactor {
   const double* value = nullptr;
 };
 
+/// L^-1 B of columns most of whose entries are zero: no more is worked on than what they reach.
+[[nodiscard]] MatrixX sparse_forward(const SupernodalFactor& lower, const MatrixX& columns);
+
 /// (L^-1 B)^T (L^-1 B), all of it set. B has `size` rows.
 [[nodiscard]] MatrixX sparse_compliance(const SupernodalFactor& lower, const SparseMatrix& columns);
 

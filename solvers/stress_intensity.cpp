@@ -376,8 +376,8 @@ IntensityRule rule_over(const Discretisation& body, bool with_pressure, const Fr
   const double lambda = with_pressure ? 0 : problem.material.lame_lambda();
   const Matrix3 initial = 0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose());
   const Matrix3 relieved = lambda * initial.trace() * Matrix3::Identity() + 2 * mu * initial;
-  const std::size_t count = problem.nodes.positions.size();
-  std::vector<Matrix3> weights(count, Matrix3::Zero()); // row: mode
+  const std::size_t count = static_cast<std::size_t>(body.coefficient_count()) / 3; // nodes, and what a cut appends
+  std::vector<Matrix3> weights(count, Matrix3::Zero());                             // row: mode
   std::vector<Vector3> pressures(with_pressure ? count : 0, Vector3::Zero());
   std::vector<char> known(count, 0);
   IntensityRule rule;
@@ -400,6 +400,13 @@ IntensityRule rule_over(const Discretisation& body, bool with_pressure, const Fr
         weights[node].row(m) += (by_gradient[m] * shape.gradient(k)).transpose();
       if (with_pressure)
         pressures[node] -= shape.value[k] * traces;
+    }
+    for (const VectorTerm& term : shape.vectors) {
+      const auto group = static_cast<std::size_t>(term.group);
+      known[group] = 1;
+      for (int m = 0; m < 3; ++m)
+        for (int unknown = 0; unknown < 3; ++unknown)
+          weights[group](m, unknown) += by_gradient[m].cwiseProduct(term.gradient[unknown]).sum();
     }
   });
   rule.loads = factors.cwiseProduct(rule.loads);

@@ -1,5 +1,6 @@
 #include "src/body_model.hpp"
 
+#include "solvers/appended/appended_body.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -83,6 +84,10 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
 }
 
 } // namespace
+
+bool cut_appends(const Scenario& scenario) {
+  return scenario.method.method == solvers::Method::galerkin && scenario.cut.sight == solvers::SightRule::appended;
+}
 
 int BodyModel::nearest_seen(const Vector3& x) const {
   const std::vector<Vector3>& nodes = sprinkling.nodes.positions;
@@ -193,6 +198,8 @@ solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Do
 namespace {
 
 bool window_pays(const Scenario& scenario, const solvers::Problem& problem, const topology::SurfaceMesh& way) {
+  if (cut_appends(scenario)) // it has no window
+    return true;
   const solvers::DiscretisationOptions method = method_of(scenario);
   if (method.method == solvers::Method::collocation && problem.nodes.size() > largest_followed_balance)
     return false;
@@ -213,6 +220,11 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
   model.window_way = {};
   model.added_nodes = 0;
   model.window_seen.reset();
+  if (cut_appends(scenario)) {
+    model.not_following = "";
+    model.body = solvers::make_appended(std::move(problem), options, model.uncut);
+    return;
+  }
   if (model.not_following[0] != '\0') {
     model.body = solvers::discretise(std::move(problem), options);
     return;
@@ -240,7 +252,7 @@ std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyMod
 std::string hindrance_to_growth(const Scenario& scenario, bool severed) {
   if (scenario.method.method == solvers::Method::published)
     return fmt::format("method {} is not updated", solvers::to_string(scenario.method.method));
-  if (severed && scenario.cut.unheld == solvers::UnheldPieces::drop)
+  if (severed && scenario.cut.unheld == solvers::UnheldPieces::drop && !cut_appends(scenario))
     return "a severed piece has left the computation";
   return "";
 }
@@ -297,6 +309,7 @@ solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<c
   after.added_nodes = growth.update.condensed_anew ? 0 : before.added_nodes + change.added.size();
   after.window_seen = growth.update.condensed_anew ? std::nullopt : before.window_seen;
   after.body = std::move(before.body);
+  after.uncut = before.uncut;
   return growth;
 }
 

@@ -13,25 +13,33 @@
 
 #include <optional>
 
+namespace spherecut::solvers {
+class UncutBody;
+}
+
 namespace spherecut::app {
+
+/// Whether a cut of this scenario's body only appends unknowns (cut.sight = "appended").
+bool cut_appends(const Scenario& scenario);
 
 struct BodyModel {
   std::shared_ptr<const topology::Incision> incision; // null: uncut
   solvers::Sprinkling sprinkling;
   double coarseness = 1; // of its spacings, in those of the scenario
   std::vector<solvers::LipPair> pairs;
-  std::unique_ptr<solvers::Discretisation> body;  // null before the first load, touch or cut
-  const char* not_following = "";                 // why the body cannot follow a cut; empty: it can
-  topology::SurfaceMesh window_way;               // of the cut, for which a body that follows it was condensed
-  int added_nodes = 0;                            // by updates since then
-  std::optional<topology::BladePose> window_seen; // where the blade was when the window was last seen to cover its way
-  solvers::Field base;                            // without tool and contact
-  solvers::ContactPatch patch;                    // no nodes: the tool is far
-  int presses = 0;                                // since it was condensed
-  std::optional<solvers::LipPatch> lips;          // empty: no pair has had to be held yet
-  std::optional<solvers::CutContactState> state;  // empty: not solved yet
-  solvers::Field field;                           // solution
-  mutable solvers::FrontRules front_rules{};      // of these nodes and this cut, found as they are asked for
+  std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut
+  std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
+  const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
+  topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
+  int added_nodes = 0;                             // by updates since then
+  std::optional<topology::BladePose> window_seen;  // where the blade was when the window was last seen to cover its way
+  solvers::Field base;                             // without tool and contact
+  solvers::ContactPatch patch;                     // no nodes: the tool is far
+  int presses = 0;                                 // since it was condensed
+  std::optional<solvers::LipPatch> lips;           // empty: no pair has had to be held yet
+  std::optional<solvers::CutContactState> state;   // empty: not solved yet
+  solvers::Field field;                            // solution
+  mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
 
   /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
   /// rest before the first solution.

@@ -282,10 +282,11 @@ constexpr std::array keys = {
         choice,
         "",
         "",
-        "How a sphere reaches around a cut: it ends where the cut hides its node, it bends around the front, or "
-        "it bends and the basis gains the field of a crack front. Left out: the method's own.",
+        "How a sphere reaches around a cut: it ends where the cut hides its node, it bends around the front, it "
+        "bends and the basis gains the field of a crack front, or it stays what it is and the cut appends functions "
+        "(method galerkin). Left out: the method's own.",
         {},
-        "visibility, diffraction, enriched"},
+        "visibility, diffraction, enriched, appended"},
     ScenarioKey{"cut.lips",
                 choice,
                 "",

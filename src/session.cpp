@@ -330,6 +330,7 @@ solvers::SprinkleOptions Session::sprinkle_options(const BodyModel& model) const
   options.random_seed = scenario_.nodes.random_seed;
   options.incision = model.incision;
   options.ring_ahead = solvers::wants_ring_ahead(scenario_.method.method);
+  options.lips_apart = cut_appends(scenario_);
   return options;
 }
 

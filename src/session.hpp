@@ -224,7 +224,8 @@ class Session {
                                                BodyUpdate& report);
   /// Whether a body that follows the blade's cut by updates is condensed anew beside the steps. Others are rebuilt.
   [[nodiscard]] bool renews_windows() const {
-    return recondensing_on_ && scenario_.blade && blade_force_ == nullptr && !tears() && !follows_cuts_aside();
+    return recondensing_on_ && scenario_.blade && blade_force_ == nullptr && !tears() && !follows_cuts_aside() &&
+           !cut_appends(scenario_);
   }
   void watch_window(const StepSample& sample, const std::optional<topology::BladePose>& last, StepResult& result);
   void meet_blade(const StepSample& sample, const std::optional<topology::BladePose>& last);

@@ -73,8 +73,9 @@ void Session::begin_following(const topology::SurfaceContact& centre) {
 
 // Where nothing but the blade, which may be ahead of its body, changes the tissue.
 bool Session::follows_cuts_aside() const {
-  return following_aside_ && scenario_.blade && scenario_.blade->advance.value_or(aside_advance) > 0 &&
-         blade_force_ == nullptr && !tears() && !(scenario_.tool && scenario_.tool->grasp);
+  return following_aside_ && !cut_appends(scenario_) && scenario_.blade &&
+         scenario_.blade->advance.value_or(aside_advance) > 0 && blade_force_ == nullptr && !tears() &&
+         !(scenario_.tool && scenario_.tool->grasp);
 }
 
 // m that the blade goes before its body follows.

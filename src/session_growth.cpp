@@ -47,6 +47,8 @@ void Session::lead_zone(const topology::Incision& incision, CutGrowth& growth) {
             hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
         !hindrance.empty())
       return hindrance;
+    if (cut_appends(scenario_))
+      return "";
     if (way.triangles.empty())
       return "no front that has moved goes on";
     if (solvers::window_share(model_.body->problem(), scenario_.method, way) > largest_tear_share)
@@ -138,8 +140,10 @@ void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& re
       const solvers::BodyGrowth grown = follow_cut(growth.way_ahead, next, report);
       report.update_reason = next.body == nullptr ? grown.uncovered : grown.update.reason;
     }
-    if (next.body == nullptr)
+    if (next.body == nullptr) {
+      next.uncut = model_.uncut;
       assemble(next, follows ? growth.way_ahead() : topology::SurfaceMesh{}, near);
+    }
   };
   const double seen = solvers::sight_seconds();
   if (followed_) {

@@ -28,14 +28,15 @@ constexpr double pi = std::numbers::pi, radius = 1, tilt = 35 * pi / 180;
 const Vector3 half_size(2, 2, 2); // m
 const CutFrame crack = tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
 
-CutBody penny_body(int nodes, std::uint64_t seed, double nu, solvers::Method method) {
+CutBody penny_body(int nodes, std::uint64_t seed, double nu, const PrecutMethod& method) {
   CutBodyCase cut;
   cut.domain = topology::make_box_domain(-half_size, half_size, 0.5);
   cut.sheets = {topology::make_disc_sheet(crack.origin, crack.normal, radius, 0.1)};
   cut.slope = 0.25 * std::cbrt(2400.0 / nodes); // one field of spacings, scaled: steeper ones cost accuracy
   cut.nodes = nodes;
   cut.seed = seed;
-  cut.method = method;
+  cut.method = method.method;
+  cut.sight = method.sight;
   CutBody body = cut_body(cut);
   body.problem.material = {1, nu, 0};
   return body;
@@ -198,7 +199,7 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
                                     : size == sizes.back() ? seeds
                                                            : std::min(seeds, 5));
              ++seed) {
-          const CutBody body = penny_body(size, static_cast<std::uint64_t>(seed), nu, method.method);
+          const CutBody body = penny_body(size, static_cast<std::uint64_t>(seed), nu, method);
           const PennyErrors e = under_pressure(body, method.options());
           record("pressure", method, nu, seed, body, e);
           spacing = body.fine;
@@ -232,7 +233,7 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
       continue;
     ErrorSeries tilted;
     for (int seed = 1; seed <= seeds; ++seed) {
-      const CutBody body = penny_body(sizes.back(), static_cast<std::uint64_t>(seed), 0.3, method.method);
+      const CutBody body = penny_body(sizes.back(), static_cast<std::uint64_t>(seed), 0.3, method);
       const TiltedRun run = under_tilted_tension(body, method.options());
       record("tilted tension", method, 0.3, seed, body, run.errors);
       tilted.add("k_correlation", run.errors.k_correlation);

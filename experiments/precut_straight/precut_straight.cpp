@@ -69,7 +69,7 @@ std::vector<Check> run_precut_straight(const ExperimentContext& context) {
   for (const PrecutMethod& method : precut_methods(context.quick)) {
     std::array<ErrorSeries, 3> errors;
     for (int seed = 1; seed <= seeds; ++seed) {
-      CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.3, method.method);
+      CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.3, method.method, method.sight);
       const solvers::Material material = body.problem.material;
       solvers::Intensities acting = Vector3::Zero();
       hold_whole_surface(body.problem, [&acting, material](const Vector3& x) {

@@ -10,6 +10,7 @@ CutBody cut_body(const CutBodyCase& cut) {
   options.incision = body.problem.incision;
   options.random_seed = cut.seed;
   options.ring_ahead = solvers::wants_ring_ahead(cut.method);
+  options.lips_apart = cut.sight == solvers::SightRule::appended;
   solvers::SpacingField shape;
   shape.fine = 1;
   shape.coarse = cut.coarse;

@@ -16,6 +16,7 @@ struct CutBodyCase {
   std::uint64_t seed = 1;
   double fine = 0;                                    // m, spacing at the front; 0: as `nodes` asks for
   solvers::Method method = solvers::Method::galerkin; // the nodes are for
+  solvers::SightRule sight = solvers::SightRule::enriched;
 };
 
 struct CutBody {

@@ -39,7 +39,8 @@ double PrecutMethod::bound(double tight, double loose) const {
 
 std::vector<PrecutMethod> precut_methods(bool quick) {
   using solvers::Method, solvers::SightRule;
-  std::vector<PrecutMethod> methods{{Method::galerkin, SightRule::enriched, true},
+  std::vector<PrecutMethod> methods{{Method::galerkin, SightRule::appended, true},
+                                    {Method::galerkin, SightRule::enriched, true},
                                     {Method::collocation, SightRule::enriched, true}};
   if (!quick)
     for (const SightRule rule : {SightRule::diffraction, SightRule::visibility})

@@ -9,7 +9,7 @@ const CutFrame& straight_crack_frame() {
   return frame;
 }
 
-CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method method) {
+CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method method, solvers::SightRule sight) {
   const CutFrame& crack = straight_crack_frame();
   CutBodyCase cut;
   cut.domain = topology::make_box_domain({-1, -0.5, -1}, {1, 0.5, 1}, 0.25);
@@ -18,6 +18,7 @@ CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method met
   cut.nodes = 350;
   cut.seed = seed;
   cut.method = method;
+  cut.sight = sight;
   CutBody body = cut_body(cut);
   body.problem.material = {1, 0.3, 0};
   return body;

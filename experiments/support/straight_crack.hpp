@@ -11,6 +11,7 @@ const CutFrame& straight_crack_frame();
 
 /// The block with E = 1 Pa and nu = 0.3, about 350 nodes; supports are the caller's. `edge` m: of the sheet's
 /// triangles.
-CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method method);
+CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method method,
+                            solvers::SightRule sight = solvers::SightRule::enriched);
 
 } // namespace spherecut::experiments

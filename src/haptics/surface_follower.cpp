@@ -152,7 +152,9 @@ void SurfaceFollower::take_rows(const Session& session) {
     row_places_.clear();
     return;
   }
-  const std::vector<Vector3>& nodes = model.body->problem().nodes.positions;
+  const int spheres = model.body->sphere_count();
+  const std::vector<Vector3>& all = model.body->problem().nodes.positions;
+  const std::vector<Vector3> nodes(all.begin(), all.begin() + spheres);
   std::vector<double> radii(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i)
     radii[i] = model.body->sphere_radius(static_cast<int>(i));
@@ -160,9 +162,11 @@ void SurfaceFollower::take_rows(const Session& session) {
       evaluation_ == row_places_)
     return;
 
+  const bool appends = 3 * spheres != model.body->coefficient_count() || !terms_.empty();
+  std::vector<Term> terms;
   ChangedPlaces changed;
   std::vector<int> now(node_places_.size(), -1); // number of each node before, today
-  if (rows_.empty()) {
+  if (rows_.empty() || appends) {                // functions of a cut have other numbers after each increment
     changed.all();
   } else {
     const PlaceMap numbers = numbered(nodes);
@@ -196,6 +200,7 @@ void SurfaceFollower::take_rows(const Session& session) {
     const Vector3& x = evaluation_[v];
     Row& row = rows[v];
     row.first = static_cast<int>(row_nodes.size());
+    row.first_term = static_cast<int>(terms.size());
     const auto old = old_rows.find(x);
     if (old != old_rows.end() && !changed.touch(x, 0)) {
       const Row& before = rows_[static_cast<std::size_t>(old->second)];
@@ -214,8 +219,15 @@ void SurfaceFollower::take_rows(const Session& session) {
     }
     model.shape_at(x, shape);
     ++evaluated_;
-    row.count = shape.size();
+    for (const solvers::VectorTerm& term : shape.vectors)
+      terms.push_back({term.group, term.value});
     for (int k = 0; k < shape.size(); ++k) {
+      if (shape.nodes[static_cast<std::size_t>(k)] >= spheres) {
+        terms.push_back(
+            {shape.nodes[static_cast<std::size_t>(k)], shape.value[static_cast<std::size_t>(k)] * Matrix3::Identity()});
+        continue;
+      }
+      ++row.count;
       row_nodes.push_back(shape.nodes[static_cast<std::size_t>(k)]);
       weights.push_back(shape.value[static_cast<std::size_t>(k)]);
       row.radius =
@@ -225,6 +237,10 @@ void SurfaceFollower::take_rows(const Session& session) {
   rows_ = std::move(rows);
   nodes_ = std::move(row_nodes);
   weights_ = std::move(weights);
+  for (std::size_t v = 0; v < rows_.size(); ++v)
+    rows_[v].terms =
+        (v + 1 < rows_.size() ? rows_[v + 1].first_term : static_cast<int>(terms.size())) - rows_[v].first_term;
+  terms_ = std::move(terms);
   node_places_ = nodes;
   node_radii_ = std::move(radii);
   row_places_ = evaluation_;
@@ -242,6 +258,10 @@ void SurfaceFollower::deform(const Session& session, std::vector<Eigen::Vector3f
     for (int k = row.first; k < row.first + row.count; ++k)
       displacement += weights_[static_cast<std::size_t>(k)] *
                       model.field.coefficients.segment<3>(3 * nodes_[static_cast<std::size_t>(k)]);
+    for (int k = row.first_term; k < row.first_term + row.terms; ++k)
+      displacement +=
+          terms_[static_cast<std::size_t>(k)].value *
+          model.field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(terms_[static_cast<std::size_t>(k)].group));
     vertices[v] = (places_[v] + displacement).cast<float>();
   }
 }

@@ -38,8 +38,14 @@ class SurfaceFollower {
 
  private:
   struct Row {
-    int first = 0, count = 0; // in nodes_ and weights_
-    double radius = 0;        // m, farthest that a change of the cut matters
+    int first = 0, count = 0;      // in nodes_ and weights_
+    int first_term = 0, terms = 0; // in terms_
+    double radius = 0;             // m, farthest that a change of the cut matters
+  };
+  /// What an appended function does to a vertex: displacement of its three unknowns.
+  struct Term {
+    int group;
+    Matrix3 value;
   };
   void take_surface(const Session& session);
   void take_rows(const Session& session);
@@ -49,6 +55,7 @@ class SurfaceFollower {
   std::vector<Row> rows_;                    // one a vertex; none before there is a body
   std::vector<int> nodes_;
   std::vector<double> weights_;
+  std::vector<Term> terms_; // of a body whose cut only appends
   // The body that rows_ are of:
   std::shared_ptr<const topology::Incision> kept_incision_;
   std::vector<Vector3> node_places_;

@@ -1,0 +1,106 @@
+// Method galerkin on a body whose cut only appends: the uncut body keeps its shape functions and its factor for good,
+// and a cut adds unknowns to it. Nodes of kind lip have no spheres: they are places on the faces of the cut, where lips
+// touch and openings are told. They come after all other nodes.
+#pragma once
+
+#include "solvers/appended/cut_system.hpp"
+#include "solvers/growing_body.hpp"
+
+#include <memory>
+
+namespace spherecut::solvers {
+
+/// How many of the nodes come before the first lip node. Throws InputError where another node comes after one.
+int base_nodes(const NodeCloud& nodes);
+
+class AppendedBody final : public Discretisation, public Growable {
+ public:
+  /// Throws as discretise().
+  AppendedBody(Problem problem, const DiscretisationOptions& options);
+  /// On an uncut body that is there already.
+  AppendedBody(Problem problem, const DiscretisationOptions& options, std::shared_ptr<const UncutBody> uncut);
+
+  BodyGrowth grow(const SprinkleIncrement& change, Problem grown,
+                  const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) override;
+
+  [[nodiscard]] Method method() const override { return Method::galerkin; }
+  [[nodiscard]] const Problem& problem() const override { return problem_; }
+  [[nodiscard]] const AssemblyReport& report() const override { return report_; }
+  [[nodiscard]] const std::shared_ptr<const UncutBody>& uncut() const { return uncut_; }
+  [[nodiscard]] const CutSpace& space() const { return *space_; }
+  [[nodiscard]] int sphere_count() const override { return uncut_->size(); }
+  [[nodiscard]] int coefficient_count() const override {
+    return 3 * (uncut_->size() + static_cast<int>(space_->functions().size()));
+  }
+
+  [[nodiscard]] Field solve() const override;
+  [[nodiscard]] double load_work(const Field& field) const override;
+  [[nodiscard]] std::vector<Field> force_responses(const std::vector<int>& candidates) const override;
+  [[nodiscard]] std::vector<Field> case_responses(const std::vector<int>& nodes, const MatrixX& forces) const override;
+  [[nodiscard]] CaseResponses condense_cases(const std::vector<int>& nodes, const MatrixX& forces,
+                                             const std::vector<int>& at) const override;
+  [[nodiscard]] MatrixX contact_compliance(const std::vector<int>& candidates) const override;
+  [[nodiscard]] MatrixX compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const override;
+  [[nodiscard]] std::vector<Field> pattern_responses(const std::vector<ForcePattern>& patterns) const override;
+  [[nodiscard]] MatrixX pattern_displacements(const std::vector<ForcePattern>& patterns,
+                                              const std::vector<Field>& fields) const override;
+  [[nodiscard]] Field prescribed_response(const std::vector<Vector3>& values) const override;
+  [[nodiscard]] std::vector<Vector3> constraint_points() const override;
+  [[nodiscard]] Vector3 contact_point(int node) const override;
+  [[nodiscard]] MatrixX contact_displacements(const std::vector<int>& nodes,
+                                              const std::vector<Field>& fields) const override;
+  [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
+  [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
+  void shape_at(const Vector3& x, ShapeFunctions& shape) const override;
+  [[nodiscard]] double sphere_radius(int node) const override;
+  [[nodiscard]] std::vector<Vector3> constraint_forces(const Field& field) const override;
+  [[nodiscard]] double residual(const Field& field, const std::vector<int>& loaded_nodes,
+                                const std::vector<Vector3>& nodal_forces) const override;
+
+  /// Intensities of every mode along the front, from what the front functions amount to at the nearest stations, Pa
+  /// sqrt(m). Throws InputError where there are none.
+  [[nodiscard]] Vector3 front_intensities(const Field& field, const topology::FrontFrame& front) const;
+
+ private:
+  struct Contact {
+    CutFunctional mean;
+    Vector3 centroid = Vector3::Zero();
+  };
+  void follow(const BoundingBox& region);
+  void find_pieces();
+  void assemble_loads();
+  [[nodiscard]] const Contact& contact(int node) const;
+  [[nodiscard]] CutFunctional value_at(const Vector3& x) const;
+  /// Mean over the points that have not left the computation: nothing moves the others.
+  [[nodiscard]] CutFunctional mean_over(std::vector<QuadraturePoint> points) const;
+  [[nodiscard]] bool is_dropped(PartId part) const { return !dropped_.empty() && dropped_[components_.of(part)] != 0; }
+  [[nodiscard]] CutVectors split(const VectorX& coefficients) const;
+  [[nodiscard]] std::vector<Field> fields_of(const CutVectors& solutions) const;
+  [[nodiscard]] CutVectors unit_forces(const std::vector<int>& nodes) const;
+  [[nodiscard]] CutVectors case_forces(const std::vector<int>& nodes, const MatrixX& forces) const;
+  [[nodiscard]] Field solved(const CutVectors& loads, const VectorX& prescribed,
+                             const std::function<Vector3(const Vector3&)>& field, double load_factor) const;
+  /// Of the entries that hold the uncut body, from those of the problem.
+  [[nodiscard]] VectorX base_prescribed(const VectorX& prescribed) const;
+
+  Problem problem_;
+  DiscretisationOptions options_;
+  AssemblyReport report_;
+  std::shared_ptr<const UncutBody> uncut_;
+  std::unique_ptr<CutSpace> space_;
+  std::unique_ptr<CutSystem> system_;
+  std::vector<std::vector<int>> loose_; // twins of each piece that nothing holds
+  std::vector<char> dropped_;           // by component of the cut; empty: none
+  CutBoxes::Components components_;
+  CutVectors loads_;
+  mutable std::unique_ptr<SurfacePatches> patches_;
+  mutable std::unordered_map<int, Contact> contacts_;
+  mutable std::vector<CutFunctional> nodal_; // values at the nodes; empty: not asked for yet
+};
+
+/// A body of method galerkin with rule `appended`, on `uncut` where that fits its nodes (else, or where it is null, on
+/// a new one, which it becomes). Throws as discretise().
+std::unique_ptr<Discretisation> make_appended(Problem problem, const DiscretisationOptions& options,
+                                              std::shared_ptr<const UncutBody>& uncut);
+
+} // namespace spherecut::solvers

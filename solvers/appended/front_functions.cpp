@@ -1,0 +1,245 @@
+#include "solvers/appended/front_functions.hpp"
+
+#include "topology/point_tree.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+
+namespace spherecut::solvers {
+
+namespace {
+
+constexpr double least_run = 1e-9; // of a spacing
+
+/// A run of the front in segments that follow one another, with the way along it in spacings.
+struct FrontRun {
+  std::vector<int> segments;
+  std::vector<double> measure; // at the start of every segment, and at the end of the last
+  bool closed = false;
+  bool reversed = false; // measured from its end
+  [[nodiscard]] double length() const { return measure.back(); }
+};
+
+using PointKey = std::array<double, 3>;
+PointKey key_of(const Vector3& x) {
+  return {x.x(), x.y(), x.z()};
+}
+
+std::vector<FrontRun> runs_of(const topology::Incision& incision) {
+  const std::vector<topology::FrontSegment>& front = incision.front();
+  std::map<std::pair<int, PointKey>, int> starting, ending;
+  for (int s = 0; s < std::ssize(front); ++s) {
+    starting[{front[s].sheet, key_of(front[s].from)}] = s;
+    ending[{front[s].sheet, key_of(front[s].to)}] = s;
+  }
+  std::vector<char> taken(front.size(), 0);
+  std::vector<FrontRun> runs;
+  const auto follow = [&](int first) {
+    FrontRun run;
+    for (int s = first; taken[s] == 0;) {
+      taken[s] = 1;
+      run.segments.push_back(s);
+      const auto next = starting.find({front[s].sheet, key_of(front[s].to)});
+      if (next == starting.end())
+        break;
+      run.closed = next->second == first;
+      s = next->second;
+    }
+    runs.push_back(std::move(run));
+  };
+  for (int s = 0; s < std::ssize(front); ++s) // open runs first, from their starts
+    if (taken[s] == 0 && !ending.contains({front[s].sheet, key_of(front[s].from)}))
+      follow(s);
+  for (int s = 0; s < std::ssize(front); ++s)
+    if (taken[s] == 0)
+      follow(s);
+  return runs;
+}
+
+} // namespace
+
+std::vector<std::vector<int>> front_runs(const topology::Incision& incision) {
+  std::vector<std::vector<int>> segments;
+  for (FrontRun& run : runs_of(incision))
+    segments.push_back(std::move(run.segments));
+  return segments;
+}
+
+std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach) {
+  const auto frame = incision.front_frame(x, reach);
+  if (!frame)
+    return std::nullopt;
+  FrontPlace place;
+  place.distance = frame->distance;
+  place.segment = frame->segment;
+  place.nearest = frame->point;
+  const Vector3 d = x - frame->point;
+  Vector3 normal = frame->normal;
+  double behind = 1;
+  if (frame->distance > 0)
+    if (const auto sheet = incision.closest(x, frame->distance * (1 + 1e-9)); sheet && !sheet->on_border) {
+      normal = sheet->normal;
+      place.above = normal.dot(x - sheet->point);
+      behind = -1;
+    }
+  if (behind > 0)
+    place.above = normal.dot(d);
+  const Vector3 along = d - place.above * normal;
+  const double length = std::sqrt(std::max(0.0, frame->distance * frame->distance - place.above * place.above));
+  place.ahead = behind * length;
+  place.grad_above = normal;
+  place.grad_ahead =
+      along.norm() > 1e-9 * frame->distance && length > 0 ? Vector3(behind * along.normalized()) : frame->ahead;
+  return place;
+}
+
+std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
+                                     const FrontOptions& options, std::vector<Vector3>& origins) {
+  std::vector<FrontGroup> groups;
+  const std::vector<topology::FrontSegment>& front = incision.front();
+  if (front.empty() || options.radius <= 0 || options.rings < 1)
+    return groups;
+  const topology::PointTree tree(nodes.positions);
+  const auto spacing_at = [&](const Vector3& x) { return nodes.spacings[tree.nearest(x).index]; };
+  std::vector<FrontRun> runs = runs_of(incision);
+  std::vector<int> run_of(front.size(), -1), place_in_run(front.size(), 0);
+  std::vector<Vector3> starts;
+  for (int r = 0; r < std::ssize(runs); ++r) {
+    FrontRun& run = runs[r];
+    run.measure.assign(1, 0);
+    for (int k = 0; k < std::ssize(run.segments); ++k) {
+      const topology::FrontSegment& segment = front[run.segments[k]];
+      run_of[run.segments[k]] = r;
+      place_in_run[run.segments[k]] = k;
+      run.measure.push_back(run.measure.back() +
+                            (segment.to - segment.from).norm() / spacing_at(0.5 * (segment.from + segment.to)));
+    }
+    if (!run.closed) {
+      const Vector3 &first = front[run.segments.front()].from, &last = front[run.segments.back()].to;
+      double to_first = std::numeric_limits<double>::infinity(), to_last = to_first;
+      for (const Vector3& origin : origins) {
+        to_first = std::min(to_first, (first - origin).squaredNorm());
+        to_last = std::min(to_last, (last - origin).squaredNorm());
+      }
+      run.reversed = to_last < to_first;
+      starts.push_back(run.reversed ? last : first);
+    }
+  }
+  origins = std::move(starts);
+
+  // Stations: an open run has one at either end.
+  struct Stations {
+    std::vector<double> at; // spacings
+    int first = 0;          // among all stations
+  };
+  std::vector<Stations> stations(runs.size());
+  std::vector<FrontStation> all;
+  for (int r = 0; r < std::ssize(runs); ++r) {
+    const FrontRun& run = runs[r];
+    stations[r].first = static_cast<int>(all.size());
+    const double length = run.length();
+    if (length < least_run)
+      continue;
+    std::vector<double>& at = stations[r].at;
+    if (run.closed) {
+      const int count = std::max(3, static_cast<int>(std::lround(length / options.gather)));
+      for (int k = 0; k < count; ++k)
+        at.push_back(length * k / count);
+    } else {
+      for (double s = 0; s < length - 0.5 * options.gather; s += options.gather)
+        at.push_back(s);
+      at.push_back(length);
+    }
+    for (const double measured : at) {
+      const double s = run.reversed ? length - measured : measured;
+      const auto next = std::upper_bound(run.measure.begin() + 1, run.measure.end() - 1, s);
+      const auto k = static_cast<int>(next - run.measure.begin()) - 1;
+      const double share = std::clamp((s - run.measure[k]) / (run.measure[k + 1] - run.measure[k]), 0.0, 1.0);
+      const topology::FrontFrame frame = incision.front_frame_at(run.segments[k], share);
+      FrontStation station;
+      station.point = frame.point;
+      station.axes << frame.ahead, frame.normal, frame.tangent;
+      station.spacing = spacing_at(frame.point);
+      all.push_back(station);
+    }
+  }
+  for (const FrontStation& station : all)
+    for (int ring = 0; ring < options.rings; ++ring)
+      groups.push_back({station, ring, {}, {}});
+
+  double widest = 0;
+  for (const FrontStation& station : all)
+    widest = std::max(widest, station.spacing);
+  for (int j = 0; j < nodes.size(); ++j) {
+    const auto place = front_place(incision, nodes.positions[j], options.radius * widest);
+    if (!place)
+      continue;
+    const int r = run_of[place->segment];
+    if (stations[r].at.empty())
+      continue;
+    const double radius = options.radius * spacing_at(place->nearest);
+    if (place->distance > radius)
+      continue;
+    const FrontRun& run = runs[r];
+    const topology::FrontSegment& segment = front[place->segment];
+    const int k = place_in_run[place->segment];
+    const double length = (segment.to - segment.from).norm();
+    const double share = length > 0 ? std::clamp((place->nearest - segment.from).norm() / length, 0.0, 1.0) : 0;
+    double s = run.measure[k] + share * (run.measure[k + 1] - run.measure[k]);
+    if (run.reversed)
+      s = run.length() - s;
+    const std::vector<double>& at = stations[r].at;
+    const int count = static_cast<int>(at.size());
+    const int low = std::clamp(static_cast<int>(std::upper_bound(at.begin(), at.end(), s) - at.begin()) - 1, 0,
+                               run.closed ? count - 1 : std::max(0, count - 2));
+    const int high = low + 1 < count ? low + 1 : run.closed ? 0 : low;
+    const double to = high == 0 && run.closed ? run.length() : at[high];
+    const double along = high == low ? 0 : std::clamp((s - at[low]) / (to - at[low]), 0.0, 1.0);
+    const double ring = options.rings > 1 ? place->distance / radius * (options.rings - 1) : 0;
+    for (const auto& [which, weight] : {std::pair(low, 1 - along), std::pair(high, along)})
+      for (int i = 0; i < options.rings; ++i)
+        if (const double hat = 1 - std::abs(ring - i); hat > 0 && weight > 0) {
+          FrontGroup& group = groups[(stations[r].first + which) * options.rings + i];
+          group.nodes.push_back(j);
+          group.weights.push_back(weight * hat);
+        }
+  }
+  std::erase_if(groups, [](const FrontGroup& group) { return group.nodes.empty(); });
+  return groups;
+}
+
+TipFields tip_fields(const Material& material, const FrontPlace& place) {
+  // A point on the front has no gradient.
+  constexpr double least = 1e-12; // m
+  const double ahead = std::abs(place.ahead) + std::abs(place.above) < least ? least : place.ahead;
+  TipFields fields;
+  for (int mode = 0; mode < 3; ++mode) {
+    const TipField field = tip_field(material, Vector3::Unit(mode), ahead, place.above);
+    fields.value.col(mode) = field.displacement;
+    fields.by_ahead.col(mode) = field.gradient.col(0);
+    fields.by_above.col(mode) = field.gradient.col(1);
+  }
+  return fields;
+}
+
+FrontFields front_fields(const Material& material, const FrontStation& station, const FrontPlace& place,
+                         const TipFields& tip) {
+  const Matrix3 axes = front_intensity(material, station) * station.axes;
+  FrontFields fields;
+  fields.value = axes * tip.value;
+  const Matrix3 ahead = axes * tip.by_ahead, above = axes * tip.by_above;
+  for (int mode = 0; mode < 3; ++mode)
+    fields.gradient[mode] =
+        ahead.col(mode) * place.grad_ahead.transpose() + above.col(mode) * place.grad_above.transpose();
+  return fields;
+}
+
+double front_intensity(const Material& material, const FrontStation& station) {
+  return 2 * material.shear_modulus() * std::sqrt(2 * std::numbers::pi / station.spacing);
+}
+
+} // namespace spherecut::solvers

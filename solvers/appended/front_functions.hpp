@@ -1,0 +1,83 @@
+// Functions gathered along the front of a cut. Between the stations of the front and over the rings about it the
+// near-tip fields of the three modes are blended by the spheres themselves:
+//
+//   [sum_J N_k(s_J) R_i(r_J) h_J(x)] u_m(a, b),
+//
+// N and R hats along and about the front, evaluated at the nodes; (a, b) the distances of x ahead of the front and
+// above the sheet; u_m the field of a unit intensity [Williams 1957] along the axes of station k.
+#pragma once
+
+#include "solvers/nodes.hpp"
+#include "solvers/stress_intensity.hpp"
+
+#include <optional>
+
+namespace spherecut::solvers {
+
+/// Where a point lies with respect to the front.
+struct FrontPlace {
+  double ahead = 0, above = 0;          // m; behind the front `above` changes its sign at the sheet
+  Vector3 grad_ahead = Vector3::Zero(); // unit
+  Vector3 grad_above = Vector3::Zero(); // unit
+  double distance = 0;                  // m, to the front
+  int segment = -1;                     // of Incision::front(), the nearest
+  Vector3 nearest = Vector3::Zero();    // m, point of the front
+};
+
+/// Nothing farther than `reach` m from the front. Continuous across everything but the sheet.
+std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach);
+
+/// Segments of the front in runs that follow one another; open runs come first.
+std::vector<std::vector<int>> front_runs(const topology::Incision& incision);
+
+struct FrontOptions {
+  double radius = 3; // of the outer ring, in spacings at the front; 0: no functions
+  double gather = 2; // from station to station, in the same units
+  int rings = 3;     // the first on the front
+};
+
+/// One place along the front.
+struct FrontStation {
+  Vector3 point = Vector3::Zero();    // m
+  Matrix3 axes = Matrix3::Identity(); // columns: ahead, normal, along
+  double spacing = 0;                 // m, of the nodes there
+};
+
+/// One station and ring with the nodes that carry it. It stands for three unknowns, one a mode.
+struct FrontGroup {
+  FrontStation station;
+  int ring = 0;
+  std::vector<int> nodes; // ascending
+  std::vector<double> weights;
+  [[nodiscard]] bool operator==(const FrontGroup& other) const {
+    return ring == other.ring && nodes == other.nodes && weights == other.weights &&
+           station.point == other.station.point && station.axes == other.station.axes &&
+           station.spacing == other.station.spacing;
+  }
+};
+
+/// The groups of all runs of the front. An open run is measured from its end nearest to one of `origins` (m, the first
+/// stations of an earlier call), so that stations stay where they are as the other end grows.
+std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
+                                     const FrontOptions& options, std::vector<Vector3>& origins);
+
+/// Near-tip fields of unit intensity in the axes (ahead, normal, along): displacement of every mode in a column, m, and
+/// its derivatives ahead and along the normal.
+struct TipFields {
+  Matrix3 value = Matrix3::Zero(), by_ahead = Matrix3::Zero(), by_above = Matrix3::Zero();
+};
+TipFields tip_fields(const Material& material, const FrontPlace& place);
+
+/// The three fields at a place as a station has them, one a column, of unit size at one spacing from the front, with
+/// their derivatives.
+struct FrontFields {
+  Matrix3 value;
+  std::array<Matrix3, 3> gradient; // of every mode, du_i/dx_j, 1/m
+};
+FrontFields front_fields(const Material& material, const FrontStation& station, const FrontPlace& place,
+                         const TipFields& tip);
+
+/// K of every mode at a coefficient of 1, Pa sqrt(m): the fields above are dimensionless.
+double front_intensity(const Material& material, const FrontStation& station);
+
+} // namespace spherecut::solvers
