@@ -67,7 +67,7 @@ std::vector<Check> run_experiment(const std::string& name, const std::filesystem
   for (const Experiment& experiment : all_experiments()) {
     if (experiment.name != name)
       continue;
-    app::claim_results_folder(out);
+    const app::ResultsClaim claim = app::claim_results_folder(out);
     std::vector<Check> checks = experiment.run({out, quick, say});
     nlohmann::ordered_json summary;
     summary["experiment"] = name;
