@@ -3,7 +3,11 @@
 
 #include "experiments/experiment.hpp"
 
-namespace spherecut::experiments::real_world {
+namespace spherecut::experiments {
+
+std::vector<Check> run_real_world(const ExperimentContext& context);
+
+namespace real_world {
 
 /// Clients that send fewer poses a second than the loop ticks, with jitter, loss and reordering.
 std::vector<Check> slow_clients(const ExperimentContext& context);
@@ -11,7 +15,6 @@ std::vector<Check> slow_clients(const ExperimentContext& context);
 std::vector<Check> device_elsewhere(const ExperimentContext& context);
 /// Numbers, texts, files and signals from outside.
 std::vector<Check> disorder(const ExperimentContext& context);
-/// Criss-cross strokes of a blade in the hand.
-std::vector<Check> scribbles(const ExperimentContext& context);
 
-} // namespace spherecut::experiments::real_world
+} // namespace real_world
+} // namespace spherecut::experiments

@@ -154,6 +154,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   std::unique_ptr<Device> device;
   LoopRecords records;
   try {
+    interruption_point();
     made = std::make_unique<HapticSimulation>(scenario);
     device = make_device(settings, *made);
     run.claim = claim_results_folder(command.out);
