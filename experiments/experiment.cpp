@@ -1,5 +1,6 @@
 #include "experiments/experiment.hpp"
 
+#include "experiments/real_world/live_situations.hpp"
 #include "experiments/registered.hpp"
 #include "experiments/remeshing_ledger/run.hpp"
 #include "src/output_file.hpp"
@@ -55,6 +56,9 @@ const std::vector<Experiment>& all_experiments() {
       {"haptic_loop", "60 s of palpating and cutting a liver in real time: time and lateness of every tick",
        run_haptic_loop},
       {"solve_rate", "whole steps from contact to force a second, uncut and while cutting", run_solve_rate},
+      {"real_world",
+       "what people bring: hardware at its own rate, hands that go where they like, disorder from outside",
+       run_real_world},
       {"remeshing_ledger", "time an increment of a cut takes at equal error: finite spheres against finite elements",
        run_remeshing_ledger},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
@@ -67,7 +71,7 @@ std::vector<Check> run_experiment(const std::string& name, const std::filesystem
   for (const Experiment& experiment : all_experiments()) {
     if (experiment.name != name)
       continue;
-    app::claim_results_folder(out);
+    const app::ResultsClaim claim = app::claim_results_folder(out);
     std::vector<Check> checks = experiment.run({out, quick, say});
     nlohmann::ordered_json summary;
     summary["experiment"] = name;

@@ -2,6 +2,7 @@
 
 #include "solvers/split_box.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 #include "topology/point_tree.hpp"
 
 #include <algorithm>
@@ -310,6 +311,7 @@ class Octree {
     for (int a = 0; a < roots[0]; ++a)
       for (int b = 0; b < roots[1]; ++b)
         for (int c = 0; c < roots[2]; ++c) {
+          interruption_point();
           const Vector3 corner = box.lower + size.cwiseProduct(Vector3(a, b, c));
           divide(corner, corner + size);
         }

@@ -12,6 +12,7 @@
 #include "solvers/linear_complementarity.hpp"
 #include "solvers/tool_gap.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -145,6 +146,7 @@ void press_normally(const ContactPatch& patch, const PressingTool& tool, const C
   double relaxation = 1;
   VectorX last_step;
   for (int iteration = 0; iteration < options.maximum_iterations; ++iteration) {
+    interruption_point();
     ++state.iterations;
     const VectorX base = displacement_of_few(patch, along);
     for (int c = 0; c < count; ++c) {
@@ -443,6 +445,7 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
   const double stride = (frictional ? 0.1 : 0.5) * topology::tip_radius(tool);
   const int steps = std::max(1, static_cast<int>(std::ceil((pose.point - from.point).norm() / stride)));
   for (int step = 1; step <= steps; ++step) {
+    interruption_point();
     const double t = static_cast<double>(step) / steps;
     topology::ToolPose at = pose;
     if (step < steps) {

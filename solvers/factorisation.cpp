@@ -5,6 +5,7 @@
 #include "solvers/large_pages.hpp"
 #include "solvers/sparse_compliance.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -430,14 +431,17 @@ class LuFactorisation final : public Factorisation {
 } // namespace
 
 std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower) {
+  interruption_point();
   return std::make_unique<CholeskyFactorisation>(lower, false);
 }
 
 std::unique_ptr<OrderedCholesky> factor_ordered(const SparseMatrix& lower) {
+  interruption_point();
   return std::make_unique<CholeskyFactorisation>(lower, true);
 }
 
 std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering) {
+  interruption_point();
   return std::make_unique<LuFactorisation>(matrix, ordering);
 }
 

@@ -3,6 +3,7 @@
 #include "solvers/node_filler.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -293,6 +294,7 @@ void Filler::place_edges() {
 
 void Filler::surface_front(std::vector<int> front) {
   for (std::size_t next = 0; next < front.size(); ++next) {
+    interruption_point();
     const int i = front[next];
     const Vector3 centre = nodes_.positions[i];
     const bool lip = nodes_.kinds[i] == NodeKind::lip; // on the rim: its own normal is that of the sheet
@@ -343,6 +345,7 @@ void Filler::fill_surface() {
 
 void Filler::interior_front(std::vector<int> front) {
   for (std::size_t next = 0; next < front.size(); ++next) {
+    interruption_point();
     const int i = front[next];
     const Vector3 centre = nodes_.positions[i], n = nodes_.normals[i];
     const Matrix3 rotation = random_rotation();

@@ -1,6 +1,7 @@
 #include "solvers/node_samples.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -11,6 +12,8 @@
 namespace spherecut::solvers {
 
 namespace {
+
+constexpr double finest_of_extent = 1e-7;
 
 void refuse_above(double expected, int maximum_nodes, const SpacingField& spacing) {
   if (expected > 1.1 * maximum_nodes + 10)
@@ -38,6 +41,7 @@ class VolumeSampler {
         return;
       inside = distance < -half_diagonal;
     }
+    interruption_point();
     const double h = spacing_(centre);
     // h at the centre decides: within a cell it falls by at most slope times half the diagonal, 0.87 slope size.
     if (size > fraction_ * h * (1 + 1e-9)) {
@@ -73,6 +77,9 @@ std::vector<VolumeSample> sample_volume(const topology::Domain& domain, const Sp
   // Root cubes on a lattice such that halving them meets fraction h exactly where h is uniform. The lattice is centred
   // on the body: symmetric bodies get symmetric samples.
   const BoundingBox box = domain.bounds();
+  if (!(spacing.finest() > finest_of_extent * box.extent().maxCoeff())) // halving would come to no end
+    throw InputError(fmt::format("sprinkle: a spacing of {:g} m in a body of {:g} m; it must be above {:g} of that",
+                                 spacing.finest(), box.extent().maxCoeff(), finest_of_extent));
   double root = fraction * spacing.finest();
   while (root < 0.25 * box.extent().maxCoeff())
     root *= 2;
@@ -95,6 +102,7 @@ std::vector<SurfaceSample> sample_surface(const topology::SurfaceMesh& mesh, con
   double expected = 0;
   std::vector<std::array<Vector3, 3>> pieces; // of the current triangle, still to be halved or taken
   for (const Triangle& triangle : mesh.triangles) {
+    interruption_point();
     pieces.assign(1, {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]]});
     while (!pieces.empty()) {
       const auto [a, b, c] = pieces.back();

@@ -1,6 +1,7 @@
 #include "solvers/parallel.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -36,7 +37,11 @@ int thread_count() {
 
 void parallel_ranges(int count, int grain, const std::function<void(int, int)>& part) {
   const int ranges = (count + grain - 1) / grain, threads = thread_count();
-  const auto run = [&](int range) { part(range * grain, std::min(count, (range + 1) * grain)); };
+  const auto run = [&](int range) {
+    interruption_point();
+    part(range * grain, std::min(count, (range + 1) * grain));
+  };
+  const bool winds_up = WindingUp::of_this_thread();
   if (threads == 1 || ranges <= 1) {
     for (int range = 0; range < ranges; ++range)
       run(range);
@@ -49,6 +54,7 @@ void parallel_ranges(int count, int grain, const std::function<void(int, int)>& 
         0, ranges,
         [&](int range) {
           try {
+            const WindingUp as_caller(winds_up);
             run(range);
           } catch (...) {
             failures[static_cast<std::size_t>(range)] = std::current_exception();

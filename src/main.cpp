@@ -4,21 +4,25 @@
 #include "solvers/parallel.hpp"
 #include "src/haptics/run_haptics.hpp"
 #include "src/interrupt.hpp"
+#include "src/printable.hpp"
 #include "src/process_settings.hpp"
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
 #include "src/version.hpp"
 #include "src/viewer/serve.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <condition_variable>
 #include <csignal>
 #include <cstdlib>
+#include <exception>
 #include <fmt/core.h>
-#include <mutex>
+#include <poll.h>
+#include <system_error>
 #include <thread>
+#include <unistd.h>
 
 namespace {
 
@@ -27,10 +31,9 @@ using namespace spherecut;
 constexpr int status_check_failed = 1;
 constexpr int status_bad_input = 2;
 constexpr int status_numerical = 3;
-constexpr int status_interrupted = 130;
 
 int complain(const std::string& message, int status) {
-  fmt::print(stderr, "spherecut: error: {}\n", message);
+  fmt::print(stderr, "spherecut: error: {}\n", app::printable(message));
   return status;
 }
 
@@ -39,11 +42,31 @@ int status_of(app::RunEnd end) {
   case app::RunEnd::complete:
     return 0;
   case app::RunEnd::interrupted:
-    return status_interrupted;
+    return app::status_of_interrupted;
   case app::RunEnd::differs:
     break;
   }
   return status_check_failed;
+}
+
+/// Of the exception at hand.
+std::string what_failed() {
+  try {
+    throw;
+  } catch (const NumericalError& error) {
+    return error.what();
+  } catch (const std::bad_alloc&) {
+    return "out of memory; use fewer nodes, fewer threads or a coarser mesh";
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again)
+      return fmt::format("no thread can be made ({}); more processes or memory must be allowed (ulimit -u, -v)",
+                         error.what());
+    return fmt::format("the system refuses: {}", error.what());
+  } catch (const std::exception& error) {
+    return fmt::format("unexpected: {}", error.what());
+  } catch (...) {
+    return "unexpected: an exception without a text";
+  }
 }
 
 void list_experiments(bool names_only) {
@@ -54,45 +77,30 @@ void list_experiments(bool names_only) {
       fmt::print("{:<24} {}\n", experiment.name, experiment.purpose);
 }
 
-int say_interrupted(const std::string& out) {
-  fmt::print("interrupted: nothing was checked; {} has what was written before, without summary.json\n", out);
-  std::fflush(stdout);
-  return status_interrupted;
+std::string interrupted_text(const std::string& out) {
+  return app::printable(
+      fmt::format("interrupted: nothing was checked; {} has what was written before, without summary.json", out));
 }
 
-/// An interrupted experiment ends at its next line. Where that does not come within two seconds the program ends as it
-/// is: what is being computed knows of no interrupt.
-std::jthread end_when_interrupted(const app::InterruptWatch& watch, const std::string& out) {
-  return std::jthread([&watch, out](const std::stop_token& stop) {
-    constexpr auto look = std::chrono::milliseconds(100);
-    std::mutex mutex;
-    std::condition_variable_any wake;
-    std::unique_lock lock(mutex);
-    for (int looks = 0; looks < 20; looks += watch.interrupted() ? 1 : 0)
-      if (wake.wait_for(lock, stop, look, [&] { return stop.stop_requested(); }))
-        return;
-    std::_Exit(say_interrupted(out));
-  });
+int say_interrupted(const std::string& text) {
+  fmt::print("{}\n", text);
+  std::fflush(stdout);
+  return app::status_of_interrupted;
 }
 
 int run_experiment(const std::string& name, const std::string& out, bool quick) {
-  struct Interrupted {};
-  const app::InterruptWatch watch;
-  std::jthread impatience = end_when_interrupted(watch, out);
+  const app::InterruptWatch watch(interrupted_text(out), app::status_of_interrupted);
   const auto say = [&](const std::string& line) {
-    if (watch.interrupted())
-      throw Interrupted();
-    fmt::print("{}\n", line);
+    interruption_point();
+    fmt::print("{}\n", app::printable(line));
     std::fflush(stdout);
   };
   std::vector<experiments::Check> checks;
   try {
     checks = experiments::run_experiment(name, out, quick, say);
   } catch (const Interrupted&) {
-    impatience = {};
-    return say_interrupted(out);
+    return say_interrupted(interrupted_text(out));
   }
-  impatience = {};
   std::size_t width = 5;
   for (const experiments::Check& check : checks)
     width = std::max(width, check.name.size());
@@ -103,7 +111,7 @@ int run_experiment(const std::string& name, const std::string& out, bool quick) 
     fmt::print("{:<{}}  {:>12.5g}  {} {:>10.4g}  {}\n", check.name, width, check.value, check.relation, check.bound,
                check.pass() ? "pass" : "FAIL");
   }
-  fmt::print("{}: {}; results in {}\n", name, all_pass ? "every check passed" : "a check FAILED", out);
+  fmt::print("{}: {}; results in {}\n", name, all_pass ? "every check passed" : "a check FAILED", app::printable(out));
   return all_pass ? 0 : status_check_failed;
 }
 
@@ -140,6 +148,26 @@ std::string what_is_wrong(const CLI::App& commands, int argc, char** argv, const
   if (!arguments.empty())
     return fmt::format("unexpected argument {} ({} --help)", arguments, path);
   return fmt::format("{} ({} --help)", error.what(), path);
+}
+
+/// What a command says is its result where it writes no files. Said in vain it has failed, unless its reader has gone
+/// and wants no more (a pipe to `head`).
+int ended(int status) {
+  std::fflush(stdout);
+  if (std::ferror(stdout) == 0)
+    return status;
+  pollfd reader{STDOUT_FILENO, 0, 0};
+  if (::poll(&reader, 1, 0) > 0 && (reader.revents & POLLERR) != 0)
+    return status;
+  const int failed = complain("the standard output cannot be written: a full disk?", status_bad_input);
+  return status == 0 ? failed : status;
+}
+
+/// What libraries below would wait for for ever, or end the program by: told before there is anything to lose. Bodies
+/// that are made beside the steps of a loop have threads of their own.
+void require_resources(bool is_real_time) {
+  std::thread([] {}).join();
+  app::reserve_blas_memory(solvers::thread_count() + (is_real_time ? 4 : 1));
 }
 
 int run(int argc, char** argv) {
@@ -223,7 +251,7 @@ int run(int argc, char** argv) {
   try {
     commands.parse(argc, argv);
   } catch (const CLI::Success& success) { // --help, --version
-    return commands.exit(success);
+    return ended(commands.exit(success));
   } catch (const CLI::ParseError& error) {
     return complain(what_is_wrong(commands, argc, argv, error), status_bad_input);
   }
@@ -235,6 +263,8 @@ int run(int argc, char** argv) {
                             : run_one->parsed() ? 1
                                                 : default_threads(haptics->parsed() || serve->parsed()));
 
+  if (!list->parsed() && !help->parsed())
+    require_resources(haptics->parsed() || serve->parsed());
   if (run_command->parsed())
     return status_of(app::run_scenario(scenario, out, stdout));
   if (haptics->parsed())
@@ -249,8 +279,44 @@ int run(int argc, char** argv) {
     return run_experiment(name, out, quick);
   else
     fmt::print("{}", markdown ? app::scenario_reference() : app::scenario_help());
-  return 0;
+  return ended(0);
 }
+
+} // namespace
+
+namespace {
+
+int end_in_words(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const Interrupted&) {
+    return say_interrupted("interrupted before there was anything to keep");
+  } catch (const std::filesystem::filesystem_error& error) {
+    return complain(error.what(), status_bad_input);
+  } catch (const InputError& error) {
+    return complain(error.what(), status_bad_input);
+  } catch (...) {
+    return complain(what_failed(), status_numerical);
+  }
+}
+
+/// Where no one else catches: an exception in a library's own thread, or before main() is reached.
+[[noreturn]] void end_uncaught() {
+  const std::string text =
+      fmt::format("spherecut: error: {}\n",
+                  app::printable(std::current_exception() != nullptr ? what_failed()
+                                                                     : "unexpected: a library has ended the program"));
+  if (::write(STDERR_FILENO, text.data(), text.size()) < 0)
+    ::_exit(status_numerical);
+  ::_exit(status_numerical);
+}
+
+// Before the constructors of the libraries: one of them makes threads there.
+void before_libraries(int /*argc*/, char** /*argv*/, char** /*environment*/) {
+  std::set_terminate(end_uncaught);
+}
+using Initialiser = void (*)(int, char**, char**);
+[[gnu::section(".preinit_array"), gnu::used]] const Initialiser first_initialiser = before_libraries;
 
 } // namespace
 
@@ -259,19 +325,10 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN); // a file over the limit is a disk that takes no more
   app::use_one_blas_thread();
   app::keep_freed_memory();
-  try {
-    return run(argc, argv);
-  } catch (const InputError& error) {
-    return complain(error.what(), status_bad_input);
-  } catch (const NumericalError& error) {
-    return complain(error.what(), status_numerical);
-  } catch (const std::filesystem::filesystem_error& error) {
-    return complain(error.what(), status_bad_input);
-  } catch (const std::bad_alloc&) {
-    return complain("out of memory; use fewer nodes or a coarser mesh", status_numerical);
-  } catch (const std::exception& error) {
-    return complain(fmt::format("unexpected: {}", error.what()), status_numerical);
-  } catch (...) {
-    return complain("unexpected: an exception without a text", status_numerical);
-  }
+  const int status = end_in_words(argc, argv);
+  if (status != status_numerical)
+    return status;
+  // Without memory or threads a library may wait in its destructors for what it never had.
+  std::fflush(nullptr);
+  ::_exit(status);
 }

@@ -4,18 +4,23 @@
 #include <cstring>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
+#include <utility>
 
 namespace spherecut::app {
 namespace {
 
+constexpr const char* lock_name = ".spherecut.lock";
 constexpr std::string_view results[] = {"forces.csv", "cuts.csv",    "summary.json",    "series.pvd",
                                         "frames",     "haptic.json", "haptic.recording"};
 
 } // namespace
 
-OutputFile::OutputFile(std::filesystem::path file) : file_(std::move(file)) {
-  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+OutputFile::OutputFile(std::filesystem::path file, Made made) : file_(std::move(file)) {
+  const int how = made == Made::anew ? O_EXCL : O_TRUNC;
+  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_CREAT | how | O_CLOEXEC, 0666);
   if (descriptor_ < 0)
     fail("cannot be opened for writing");
 }
@@ -76,20 +81,62 @@ void make_folder(const std::filesystem::path& folder) {
     throw OutputError(fmt::format("{}: cannot be created: {}", folder.string(), error.message()));
 }
 
-void claim_results_folder(const std::filesystem::path& folder) {
+ResultsClaim::ResultsClaim(const std::filesystem::path& folder) : lock_(folder / lock_name) {
+  const auto refuse = [&](const std::string& why) {
+    const int descriptor = std::exchange(descriptor_, -1);
+    if (descriptor >= 0)
+      ::close(descriptor);
+    throw InputError(fmt::format("output folder {}: {}", folder.string(), why));
+  };
+  while (true) {
+    descriptor_ = ::open(lock_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+    if (descriptor_ < 0)
+      refuse(fmt::format("cannot be written: {}", std::strerror(errno)));
+    if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0)
+      refuse(errno == EWOULDBLOCK ? "another run writes into it; give another folder, nothing has been changed"
+                                  : fmt::format("cannot be locked: {}", std::strerror(errno)));
+    // The one before may have taken the name away between the two calls: then the lock is on a file nobody sees.
+    struct stat own {
+    }, named{};
+    if (::fstat(descriptor_, &own) == 0 && ::stat(lock_.c_str(), &named) == 0 && own.st_ino == named.st_ino &&
+        own.st_dev == named.st_dev)
+      return;
+    ::close(descriptor_);
+  }
+}
+
+ResultsClaim::~ResultsClaim() {
+  if (descriptor_ < 0)
+    return;
+  ::unlink(lock_.c_str());
+  ::close(descriptor_);
+}
+
+ResultsClaim::ResultsClaim(ResultsClaim&& other) noexcept
+    : lock_(std::move(other.lock_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+ResultsClaim& ResultsClaim::operator=(ResultsClaim&& other) noexcept {
+  std::swap(lock_, other.lock_);
+  std::swap(descriptor_, other.descriptor_);
+  return *this; // the other lets go of what was held before
+}
+
+ResultsClaim claim_results_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (!std::filesystem::is_directory(folder))
     throw InputError(fmt::format("output folder {}: cannot be created: {}", folder.string(),
                                  error ? error.message() : "there is a file of this name"));
+  if (::access(folder.c_str(), W_OK | X_OK) != 0)
+    throw InputError(fmt::format("output folder {}: cannot be written: {}", folder.string(), std::strerror(errno)));
+  ResultsClaim claim(folder); // before the look: results that are being made are there only later
   for (const std::string_view name : results)
     if (std::filesystem::exists(std::filesystem::symlink_status(folder / name, error)))
       throw InputError(
           fmt::format("output folder {}: holds results already ({}); give another folder, nothing has been "
                       "changed",
                       folder.string(), name));
-  if (::access(folder.c_str(), W_OK | X_OK) != 0)
-    throw InputError(fmt::format("output folder {}: cannot be written: {}", folder.string(), std::strerror(errno)));
+  return claim;
 }
 
 } // namespace spherecut::app

@@ -1,5 +1,7 @@
 #include "src/progress.hpp"
 
+#include "src/printable.hpp"
+
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -19,7 +21,7 @@ Progress::~Progress() {
 
 void Progress::say(const std::string& line) {
   clear_bar();
-  std::fputs((line + "\n").c_str(), out_);
+  std::fputs((printable(line) + "\n").c_str(), out_);
   std::fflush(out_);
 }
 

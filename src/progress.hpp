@@ -15,7 +15,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// A line that stays.
+  /// A line that stays, as printable() has it.
   void say(const std::string& line);
   /// `done` of `total` steps, with a word on the last one. Elsewhere than on a terminal about ten lines in all.
   void step(std::size_t done, std::size_t total, const std::string& word);

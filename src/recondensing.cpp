@@ -1,6 +1,7 @@
 #include "src/recondensing.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <condition_variable>
 #include <deque>
@@ -26,6 +27,8 @@ bool attempt(const Work& work) {
   } catch (const InputError&) {
     return false;
   } catch (const NumericalError&) {
+    return false;
+  } catch (const Interrupted&) {
     return false;
   }
 }

@@ -2,9 +2,12 @@
 
 #include "src/blade_account.hpp"
 #include "src/interrupt.hpp"
+#include "src/output_file.hpp"
+#include "src/printable.hpp"
 #include "src/progress.hpp"
 #include "src/run_output.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <cmath>
 #include <fmt/format.h>
@@ -121,10 +124,9 @@ std::string step_text(const StepResult& step) {
 class FolderClaim {
  public:
   explicit FolderClaim(const std::filesystem::path& folder)
-      : folder_(folder), existed_(std::filesystem::exists(folder)) {
-    claim_results_folder(folder);
-  }
+      : folder_(folder), existed_(std::filesystem::exists(folder)), claim_(claim_results_folder(folder)) {}
   ~FolderClaim() {
+    claim_ = {};
     std::error_code ignored;
     if (!existed_ && !begun_)
       std::filesystem::remove(folder_, ignored); // refuses a folder that is not empty
@@ -136,13 +138,16 @@ class FolderClaim {
  private:
   std::filesystem::path folder_;
   bool existed_;
+  ResultsClaim claim_;
   bool begun_ = false;
 };
 
 } // namespace
 
 RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::path& out, std::FILE* screen) {
-  const InterruptWatch watch;
+  const InterruptWatch watch(
+      printable(fmt::format("interrupted; {} has the steps that were finished, without summary.json", out.string())),
+      status_of_interrupted);
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
   Scenario scenario = read_scenario(file);
@@ -153,18 +158,21 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
   RunOutput output(out, session);
   RunEnd end = RunEnd::complete;
   try {
-    for (const StepSample& sample : session.steps()) {
-      if (watch.interrupted()) {
-        end = RunEnd::interrupted;
-        break;
+    try {
+      for (const StepSample& sample : session.steps()) {
+        interruption_point();
+        const StepResult result = session.step(sample);
+        require_tissue(session, result);
+        output.add(session, result);
+        progress.step(output.findings().steps, session.steps().size(), step_text(result));
       }
-      const StepResult result = session.step(sample);
-      require_tissue(session, result);
-      output.add(session, result);
-      progress.step(output.findings().steps, session.steps().size(), step_text(result));
+      if (output.findings().steps > 0)
+        output.check_pieces(session, session.steps()[output.findings().steps - 1].time);
+    } catch (const Interrupted&) { // the step at hand is given up, what the ones before it gave is kept
+      end = RunEnd::interrupted;
     }
-    if (output.findings().steps > 0)
-      output.check_pieces(session, session.steps()[output.findings().steps - 1].time);
+    const WindingUp winding_up(end == RunEnd::interrupted);
+    watch.wind_up();
     output.draw_figures(session);
     output.write_summary(session, end == RunEnd::complete ? RunStatus::complete : RunStatus::interrupted, "");
   } catch (const std::exception& error) {
@@ -184,6 +192,7 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
 }
 
 void check_scenario(const std::filesystem::path& file, std::FILE* screen) {
+  const InterruptWatch watch("interrupted: nothing is known about the scenario", status_of_interrupted);
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
   const Session session(read_scenario(file), say);

@@ -6,10 +6,13 @@
 
 namespace spherecut::app {
 
+inline constexpr int status_of_interrupted = 130; // exit status of a program that was interrupted
+
 enum class RunEnd { complete, interrupted, differs }; // differs: a replay from its recording
 
 /// Reads the scenario, moves tool and blade along their ways, and leaves the results in `out`. Says how it goes on
-/// `screen`. SIGINT and SIGTERM end the run after the current step. Throws InputError and NumericalError; what was
+/// `screen`. SIGINT and SIGTERM end the run within
+/// two seconds, the step at hand given up (interrupt.hpp). Throws InputError and NumericalError; what was
 /// written until then stays.
 RunEnd run_scenario(const std::filesystem::path& scenario, const std::filesystem::path& out, std::FILE* screen);
 

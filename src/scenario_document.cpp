@@ -1,5 +1,6 @@
 #include "src/scenario_document.hpp"
 
+#include "src/toml_limits.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -13,7 +14,8 @@
 namespace spherecut::app {
 namespace {
 
-constexpr std::uintmax_t largest_file = 16U << 20U; // bytes; a scenario is a few kilobytes
+constexpr std::size_t most_entries = 10'000; // of an array
+constexpr std::size_t most_told = 50;        // offences
 
 long line_of(const toml::node& node) {
   return node.source().begin.line;
@@ -183,12 +185,21 @@ class Checker {
     return true;
   }
 
+  bool is_short(const toml::array& array, const std::string& name) {
+    if (array.size() > most_entries)
+      offences_.add(line_of(array),
+                    fmt::format("{}: {} entries; allowed: at most {}", name, array.size(), most_entries));
+    return array.size() <= most_entries;
+  }
+
   void points(const ScenarioKey& key, const std::string& name, const toml::node& node) {
     const toml::array* array = node.as_array();
     if (array == nullptr) {
       wrong_type(key, name, node);
       return;
     }
+    if (!is_short(*array, name))
+      return;
     std::size_t number = 1;
     for (const toml::node& point : *array)
       if (!numbers(key, fmt::format("{}[{}]", name, number++), point))
@@ -216,6 +227,8 @@ class Checker {
       wrong_type(key, name, node);
       return;
     }
+    if (!is_short(*array, name))
+      return;
     for (std::size_t i = 0; i < array->size(); ++i)
       table(*array->get(i)->as_table(), fmt::format("{}[]", key.path), fmt::format("{}[{}]", name, i + 1));
   }
@@ -316,14 +329,14 @@ std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::string text;
   std::array<char, 65536> block{};
-  while (in && text.size() <= largest_file) {
+  while (in && text.size() <= largest_scenario) {
     in.read(block.data(), block.size());
     text.append(block.data(), static_cast<std::size_t>(in.gcount()));
   }
-  if (!in.eof() && text.size() <= largest_file)
+  if (!in.eof() && text.size() <= largest_scenario)
     throw InputError(fmt::format("{}: cannot be read", file.string()));
-  if (text.size() > largest_file)
-    throw InputError(fmt::format("{}: larger than {} bytes, not a scenario file", file.string(), largest_file));
+  if (text.size() > largest_scenario)
+    throw InputError(fmt::format("{}: larger than {} bytes, not a scenario file", file.string(), largest_scenario));
   return text;
 }
 
@@ -338,8 +351,12 @@ void Offences::throw_if_any() {
     return;
   std::stable_sort(found_.begin(), found_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   std::string message;
+  const std::size_t more = found_.size() - std::min(found_.size(), most_told);
+  found_.resize(found_.size() - more);
   for (const auto& [line, what] : found_)
     message += fmt::format("{}{}:{}: {}", message.empty() ? "" : "\n", file_, line, what);
+  if (more > 0)
+    message += fmt::format("\nand {} more", more);
   throw InputError(message);
 }
 
@@ -348,6 +365,9 @@ ScenarioDocument::ScenarioDocument(const std::filesystem::path& file) : Scenario
 ScenarioDocument::ScenarioDocument(const std::filesystem::path& file, std::string text) : text_(std::move(text)) {
   Offences offences(file.string());
   auto document = std::make_shared<toml::table>();
+  if (text_.size() > largest_scenario)
+    throw InputError(fmt::format("{}: larger than {} bytes, not a scenario file", file.string(), largest_scenario));
+  require_shallow_toml(text_, file.string());
   try {
     *document = toml::parse(text_, file.string());
   } catch (const toml::parse_error& error) {

@@ -14,6 +14,8 @@
 
 namespace spherecut::app {
 
+inline constexpr std::size_t largest_scenario = 4U << 20U; // bytes; a scenario is a few kilobytes
+
 /// Offences found in a file. Reported all at once.
 class Offences {
  public:

@@ -141,8 +141,8 @@ long Section::line(std::string_view key) const {
 
 Vector3 direction(const Section& section, std::string_view name, std::string_view key, Offences& offences) {
   const Vector3 value = section.vector(key);
-  if (value.norm() > 0)
-    return value.normalized();
+  if (!value.isZero(0))
+    return value.stableNormalized();
   offences.add(section.line(key), fmt::format("{} = [0, 0, 0]: has no direction; allowed: any other vector", name));
   return Vector3::Zero();
 }

@@ -5,6 +5,7 @@
 #include "src/process_settings.hpp"
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -54,9 +55,10 @@ std::vector<ToolSample> tool_motion_of(const Scenario& scenario, const topology:
 
 } // namespace
 
-Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
+Session::Session(Scenario scenario, std::function<void(const std::string&)> say, Leader leader)
     : scenario_(std::move(scenario)), say_(std::move(say)), organ_(timed_organ(scenario_.organ, profile_.organ)),
       query_(organ_.domain->surface()) {
+  interruption_point();
   use_one_blas_thread();
   for (const std::string& remark : organ_.remarks)
     warn(remark, remark);
@@ -64,7 +66,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
   std::vector<ToolSample> motion;
   if (scenario_.tool) {
     motion = tool_motion_of(scenario_, query_, *organ_.domain);
-    touch_ = scenario_.tool->grasp ? find_grasp(motion) : first_touch(*scenario_.tool, motion, query_);
+    touch_ = find_touch(motion, leader);
   }
   steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
   if (scenario_.method.method == solvers::Method::published)
@@ -107,6 +109,14 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say)
   static_cast<void>(fixed_nodes(scenario_, *organ_.domain, model_.sprinkling.nodes));
   if (cuts()) // regions that hold nothing have been told by now: no piece is severed by that
     check_held(steps_.front().time);
+}
+
+// Where the tool meets the organ. A device may do so anywhere: it is expected where the path comes nearest.
+std::optional<FirstTouch> Session::find_touch(const std::vector<ToolSample>& motion, Leader leader) const {
+  if (scenario_.tool->grasp)
+    return find_grasp(motion, leader);
+  const std::optional<FirstTouch> touch = first_touch(*scenario_.tool, motion, query_);
+  return touch || leader == Leader::path ? touch : nearest_approach(*scenario_.tool, motion, query_);
 }
 
 // Fine at the contact, at the fronts of the precuts, and where the blade is going to cut.
@@ -378,11 +388,13 @@ void Session::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead,
 }
 
 void Session::condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
+  interruption_point();
   const StageTimer timer(profile_.condense);
   app::condense(without_dropped(candidates, scenario_, *model.body), model, for_few_presses);
 }
 
 void Session::solve(const StepSample& sample, BodyModel& model) {
+  interruption_point();
   displaced_body_ = nullptr;
   if (tool_in_reach() && model.patch.nodes.empty())
     condense(candidates(model), model);

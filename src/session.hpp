@@ -61,15 +61,20 @@ inline constexpr double way_spacings = 3;
 /// that a blade goes on before the steps wait for that.
 inline constexpr double aside_advance = 0.5, most_advances = 3;
 
+/// Who leads the tool: the scenario's path, or a device, to which the path says no more than where nodes are fine at
+/// first.
+enum class Leader { path, device };
+
 class Session {
  public:
-  /// Builds and checks organ, motion, precuts and fixed regions; sprinkles when something touches or cuts the organ.
-  /// Throws InputError.
+  /// Builds and checks organ, motion, precuts and fixed regions; sprinkles when something touches or cuts the organ, or
+  /// may do so in a device's hand. Throws InputError.
   explicit Session(
-      Scenario scenario, std::function<void(const std::string&)> say = [](const std::string&) {});
+      Scenario scenario, std::function<void(const std::string&)> say = [](const std::string&) {},
+      Leader leader = Leader::path);
 
   [[nodiscard]] const std::vector<StepSample>& steps() const { return steps_; }
-  /// False: there is no tool, or it never touches the organ, and every step is free of its force.
+  /// False: there is no tool, or its path leads it and never touches the organ: every step is free of its force.
   [[nodiscard]] bool touches() const { return touch_.has_value(); }
   /// Whether there is a blade or a precut, or tissue that tears.
   [[nodiscard]] bool cuts() const { return scenario_.blade || !scenario_.precuts.empty() || tears(); }
@@ -265,7 +270,8 @@ class Session {
                                                      const StepSample& sample, CutReport& report);
   void check_pieces(double time);
   void check_held(double time);
-  [[nodiscard]] FirstTouch find_grasp(const std::vector<ToolSample>& motion) const;
+  [[nodiscard]] std::optional<FirstTouch> find_touch(const std::vector<ToolSample>& motion, Leader leader) const;
+  [[nodiscard]] FirstTouch find_grasp(const std::vector<ToolSample>& motion, Leader leader) const;
   [[nodiscard]] std::vector<int> grasped_nodes(const BodyModel& model) const;
   [[nodiscard]] bool grasped_piece_is_free() const;
   bool handle_grasper(const StepSample& sample);

@@ -20,8 +20,9 @@ topology::SurfaceContact grasped_place(const topology::Domain& domain, const Vec
 
 } // namespace
 
-// Where the grasper will take hold of the organ at rest. Throws InputError when it cannot reach it.
-FirstTouch Session::find_grasp(const std::vector<ToolSample>& motion) const {
+// Where the grasper will take hold of the organ at rest. Throws InputError when its path does not reach it; a device
+// takes it elsewhere.
+FirstTouch Session::find_grasp(const std::vector<ToolSample>& motion, Leader leader) const {
   const GraspSettings& settings = *scenario_.tool->grasp;
   FirstTouch touch;
   while (touch.sample + 1 < motion.size() && motion[touch.sample].time < settings.grasp)
@@ -30,7 +31,7 @@ FirstTouch Session::find_grasp(const std::vector<ToolSample>& motion) const {
   touch.contact = grasped_place(*organ_.domain, touch.pose.point);
   const double reach = topology::tip_radius(scenario_.tool->shape);
   const Vector3& x = touch.pose.point;
-  if (const double away = (touch.contact.point - x).norm(); away > reach)
+  if (const double away = (touch.contact.point - x).norm(); away > reach && leader == Leader::path)
     throw InputError(fmt::format("{}:{}: the grasper cannot reach the organ: when it takes hold, at t = {:g} s, it is "
                                  "at [{:.4g}, {:.4g}, {:.4g}] m, {:.3g} m from the surface at [{:.4g}, {:.4g}, "
                                  "{:.4g}] m; allowed: within tool.radius = {:g} m",

@@ -3,6 +3,7 @@
 #include "src/session.hpp"
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -324,6 +325,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
     tears_->told = false;
   }
   for (int number = 1;; ++number) {
+    interruption_point();
     double drive = states ? drive_of(*states) : 0, ahead = drive; // now, and at the end of the step
     // G falls by exp(-decay way) in the increment: half of that before, half after what moves is in balance.
     const double moving_drive = states ? moving_drive_of(*states, way_of(drive), fine) : 0;

@@ -133,4 +133,15 @@ std::optional<FirstTouch> first_touch(const ToolSettings& tool, const std::vecto
   return std::nullopt;
 }
 
+std::optional<FirstTouch> nearest_approach(const ToolSettings& tool, const std::vector<ToolSample>& motion,
+                                           const topology::ContactQuery& organ) {
+  std::optional<FirstTouch> nearest;
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const auto contact = organ.first_touch(tool.shape, motion[i].pose);
+    if (!nearest || contact.depth > nearest->contact.depth)
+      nearest = FirstTouch{contact, motion[i].pose, i};
+  }
+  return nearest;
+}
+
 } // namespace spherecut::app

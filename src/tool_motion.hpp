@@ -30,4 +30,8 @@ struct FirstTouch {
 std::optional<FirstTouch> first_touch(const ToolSettings& tool, const std::vector<ToolSample>& motion,
                                       const topology::ContactQuery& organ);
 
+/// Where a motion that never touches comes nearest. Its contact's depth is negative.
+std::optional<FirstTouch> nearest_approach(const ToolSettings& tool, const std::vector<ToolSample>& motion,
+                                           const topology::ContactQuery& organ);
+
 } // namespace spherecut::app

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <arpa/inet.h>
+#include <bit>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -19,12 +20,32 @@ namespace {
 constexpr int queue_bytes = 64 * 1024;      // of the system's queue: old poses are worth nothing
 constexpr std::size_t largest_packet = 128; // longer ones are cut off there, and garbage
 
-std::uint64_t next_token(std::uint64_t token) noexcept { // splitmix64
-  token += 0x9e3779b97f4a7c15U;
-  token = (token ^ (token >> 30U)) * 0xbf58476d1ce4e5b9U;
-  token = (token ^ (token >> 27U)) * 0x94d049bb133111ebU;
-  token ^= token >> 31U;
-  return token == 0 ? 1 : token;
+/// SipHash-2-4 of two words [Aumasson and Bernstein 2012]: without the key nobody can tell what it gives.
+std::uint64_t keyed_hash(const std::array<std::uint64_t, 2>& key, std::uint64_t first, std::uint64_t second) noexcept {
+  std::uint64_t a = key[0] ^ 0x736f6d6570736575U, b = key[1] ^ 0x646f72616e646f6dU, c = key[0] ^ 0x6c7967656e657261U,
+                d = key[1] ^ 0x7465646279746573U;
+  const auto rounds = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      a += b;
+      c += d;
+      b = std::rotl(b, 13) ^ a;
+      d = std::rotl(d, 16) ^ c;
+      a = std::rotl(a, 32);
+      c += b;
+      a += d;
+      b = std::rotl(b, 17) ^ c;
+      d = std::rotl(d, 21) ^ a;
+      c = std::rotl(c, 32);
+    }
+  };
+  for (const std::uint64_t word : {first, second, std::uint64_t{16} << 56U}) {
+    d ^= word;
+    rounds(2);
+    a ^= word;
+  }
+  c ^= 0xff;
+  rounds(4);
+  return a ^ b ^ c ^ d;
 }
 
 } // namespace
@@ -61,7 +82,7 @@ struct BridgeDevice::Socket {
 
 BridgeDevice::BridgeDevice(const BridgeSettings& settings, const PathPose& waiting, double rate)
     : socket_(std::make_unique<Socket>()), rate_(rate), timeout_(settings.timeout),
-      silence_(static_cast<std::uint64_t>(std::max(1.0, std::ceil(settings.timeout * rate)))) {
+      silence_(static_cast<std::uint64_t>(std::max(1.0, std::ceil(settings.timeout * rate)))), pace_(rate) {
   const auto fail = [&](const std::string& what) {
     socket_->close();
     throw InputError(fmt::format("haptic bridge at {} port {}: {}", settings.address, settings.port, what));
@@ -99,7 +120,8 @@ BridgeDevice::BridgeDevice(const BridgeSettings& settings, const PathPose& waiti
     socket_->messages[i].msg_hdr.msg_iovlen = 1;
   }
   std::random_device noise;
-  token_ = (static_cast<std::uint64_t>(noise()) << 32U) ^ noise();
+  for (std::uint64_t& word : key_)
+    word = (static_cast<std::uint64_t>(noise()) << 32U) ^ noise();
   state_.position = waiting.position;
   state_.orientation = waiting.orientation;
   state_.connected = false;
@@ -113,6 +135,8 @@ void BridgeDevice::release() noexcept {
   held_ = false;
   state_.connected = false;
   state_.buttons = 0;
+  state_.client = {}; // the tool stays where the loop has it
+  kind_shown_.store(PaceKind::unknown, std::memory_order_relaxed);
   socket_->connect_to(socket_->own);
 }
 
@@ -128,22 +152,22 @@ void BridgeDevice::take(std::size_t packet) noexcept {
   const bool holder =
       held_ && from.sin_addr.s_addr == socket_->client.sin_addr.s_addr && from.sin_port == socket_->client.sin_port;
   if (request.kind == BridgePacket::hello) {
-    if (held_ && !holder) {
-      ++counters_.others;
-      return;
-    }
-    if (!held_) {
-      ++counters_.clients;
-      held_ = true;
-      posed_ = false;
-      socket_->client = from;
-      socket_->connect_to(from);
-      token_ = next_token(token_);
-      heard_ = state_.tick;
-    }
+    if (held_)
+      counters_.others += holder ? 0 : 1;
+    else
+      reply(from, token_for(from), Vector3::Zero());
     return;
   }
-  if (!holder || request.token != token_) {
+  if (!held_ && request.kind == BridgePacket::pose && request.token == token_for(from)) {
+    ++counters_.clients;
+    held_ = true;
+    posed_ = false;
+    token_ = request.token;
+    ++sessions_;
+    pace_.begin();
+    socket_->client = from;
+    socket_->connect_to(from);
+  } else if (!holder || request.token != token_) {
     ++counters_.others;
     return;
   }
@@ -159,8 +183,7 @@ void BridgeDevice::take(std::size_t packet) noexcept {
   posed_ = true;
   sequence_ = request.sequence;
   heard_ = state_.tick;
-  state_.position = request.position;
-  state_.orientation = request.orientation;
+  pace_.take(request.position, request.orientation, state_.tick);
   state_.mode = request.mode;
   state_.buttons = request.buttons;
   state_.connected = true;
@@ -189,18 +212,44 @@ DeviceState BridgeDevice::read(std::uint64_t tick) noexcept {
     ++counters_.lost;
     release();
   }
+  if (held_)
+    follow_pace();
   return state_;
 }
 
-void BridgeDevice::apply(const Vector3& force) noexcept {
-  if (!held_)
-    return;
+void BridgeDevice::follow_pace() noexcept {
+  pace_.lead(state_);
+  const double rate = pace_.measured();
+  if (rate > 0) {
+    counters_.rate = rate;
+    if (pace_.kind() != PaceKind::unknown)
+      counters_.slowest = counters_.slowest > 0 ? std::min(counters_.slowest, rate) : rate;
+  }
+  counters_.interpolated += state_.client.period > 1 ? 1 : 0;
+  counters_.faded += pace_.kind() == PaceKind::too_slow ? 1 : 0;
+  kind_shown_.store(pace_.kind(), std::memory_order_relaxed);
+  rate_shown_.store(rate, std::memory_order_relaxed);
+}
+
+// What has to come back before anybody gets more than one packet for one of his own. It is made from the address that a
+// hello says it comes from, and not kept: whoever forges that address does not learn it, and takes nobody's place.
+std::uint64_t BridgeDevice::token_for(const sockaddr_in& from) const noexcept {
+  const std::uint64_t place = static_cast<std::uint64_t>(from.sin_addr.s_addr) << 16U | from.sin_port;
+  return std::max<std::uint64_t>(keyed_hash(key_, sessions_, place), 1);
+}
+
+void BridgeDevice::reply(const sockaddr_in& to, std::uint64_t token, const Vector3& force) noexcept {
   std::array<std::byte, bridge_body> bytes{};
   const std::size_t size =
-      write_packet(BridgeReply{token_, state_.tick, posed_ ? sequence_ : 0, force, state_.position, timeout_}, bytes);
-  if (::sendto(socket_->open, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL,
-               reinterpret_cast<const sockaddr*>(&socket_->client), sizeof socket_->client) < 0)
+      write_packet(BridgeReply{token, state_.tick, posed_ ? sequence_ : 0, force, state_.position, timeout_}, bytes);
+  if (::sendto(socket_->open, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to),
+               sizeof to) < 0)
     ++counters_.unsent;
+}
+
+void BridgeDevice::apply(const Vector3& force) noexcept {
+  if (held_)
+    reply(socket_->client, token_, force);
 }
 
 } // namespace spherecut::app

@@ -8,9 +8,14 @@
 #pragma once
 
 #include "src/haptics/bridge_protocol.hpp"
+#include "src/haptics/client_pace.hpp"
 #include "src/haptics/device.hpp"
 
+#include <array>
+#include <atomic>
 #include <memory>
+
+struct sockaddr_in;
 
 namespace spherecut::app {
 
@@ -20,9 +25,18 @@ struct BridgeCounters {
   std::uint64_t old = 0;     // of that client, with a sequence that was not newer
   std::uint64_t garbage = 0; // not a packet
   std::uint64_t others = 0;  // of someone who did not hold the tool, or with a wrong token
-  std::uint64_t clients = 0; // that have held the tool
+  std::uint64_t clients = 0; // that have held the tool: sent a pose with the token that answered their hello
   std::uint64_t lost = 0;    // clients that fell silent
   std::uint64_t unsent = 0;  // forces that the system did not take
+  double rate = 0;           // poses a second of the last client, as measured last; 0: not known
+  double slowest = 0;        // the least that was measured
+  std::uint64_t interpolated = 0, faded = 0; // ticks with a pose on its way, with a client too slow for a force
+};
+
+/// A client's rate, as other threads may see it.
+struct BridgePace {
+  PaceKind kind = PaceKind::unknown;
+  double rate = 0; // poses a second
 };
 
 class BridgeDevice : public Device {
@@ -37,12 +51,17 @@ class BridgeDevice : public Device {
   BridgeDevice(const BridgeDevice&) = delete;
   BridgeDevice& operator=(const BridgeDevice&) = delete;
 
-  /// The newest pose of the client that holds the tool. Not connected: nobody does; the tool stays where it was.
+  /// The newest pose of the client that holds the tool, or where the loop has it on the way there (client_pace.hpp).
+  /// Not connected: nobody does; the tool stays where it was.
   DeviceState read(std::uint64_t tick) noexcept override;
   /// Sends the force to that client.
   void apply(const Vector3& force) noexcept override;
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
+  /// From any thread.
+  [[nodiscard]] BridgePace pace() const noexcept {
+    return {kind_shown_.load(std::memory_order_relaxed), rate_shown_.load(std::memory_order_relaxed)};
+  }
   /// From the haptic thread, or after it has ended.
   [[nodiscard]] const BridgeCounters& counters() const { return counters_; }
 
@@ -51,14 +70,23 @@ class BridgeDevice : public Device {
   void take_from(int descriptor, int most) noexcept;
   void take(std::size_t packet) noexcept;
   void release() noexcept;
+  void follow_pace() noexcept;
+  [[nodiscard]] std::uint64_t token_for(const sockaddr_in& from) const noexcept;
+  void reply(const sockaddr_in& to, std::uint64_t token, const Vector3& force) noexcept;
 
   std::unique_ptr<Socket> socket_;
   double rate_, timeout_;
   std::uint64_t silence_; // ticks after which a client is gone
   std::uint16_t port_ = 0;
   DeviceState state_;
-  bool held_ = false, posed_ = false; // by a client; which has sent a pose
+  bool held_ = false, posed_ = false;  // by a client; whose pose has been taken
+  std::array<std::uint64_t, 2> key_{}; // of the tokens
+  std::uint64_t sessions_ = 0;         // that have begun
   std::uint64_t token_ = 0, sequence_ = 0, heard_ = 0;
+  ClientPace pace_;
+  std::atomic<PaceKind> kind_shown_{PaceKind::unknown};
+  std::atomic<double> rate_shown_{0};
+  static_assert(std::atomic<double>::is_always_lock_free && std::atomic<PaceKind>::is_always_lock_free);
   BridgeCounters counters_;
 };
 

@@ -22,6 +22,14 @@ enum class HandMode : std::uint16_t {
   grasper, // the tool of a scenario whose tool is one; closed while button 1 is pressed
 };
 
+/// What is known of the hand behind a device that answers less often than the loop asks.
+struct ClientReading {
+  Vector3 position = Vector3::Zero(); // m, the newest, to which DeviceState::position is on its way
+  double period = 1;                  // ticks between two readings; 1: every tick's position is one, the rest is idle
+  double share = 1;                   // of the force that the hand gets
+  bool fresh = false;                 // this tick's
+};
+
 /// Where a device is at a tick of the haptic loop.
 struct DeviceState {
   std::uint64_t tick = 0;             // of the loop
@@ -30,6 +38,7 @@ struct DeviceState {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity(); // turns +z into the tool's axis; the blade's frame
   bool connected = true;               // false: nobody answers; the loop brings the force to zero
   std::uint16_t mode = 0, buttons = 0; // what the hand has chosen and presses; recorded and replayed with the pose
+  ClientReading client{};
 };
 
 class Device {

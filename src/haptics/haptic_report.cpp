@@ -93,7 +93,41 @@ void write_deadlines(const std::filesystem::path& file, const std::vector<TickRe
   table.write(file);
 }
 
+std::string rate_text(const BridgeCounters& bridge, double ticks) {
+  if (bridge.rate <= 0)
+    return "";
+  std::string text = fmt::format("  the last client sent {:.0f} poses a second, the least {:.0f}\n", bridge.rate,
+                                 bridge.slowest > 0 ? bridge.slowest : bridge.rate);
+  if (bridge.interpolated > 0)
+    text += fmt::format("  {:.3g} s with the pose interpolated, as late as the time between two of the client's\n",
+                        static_cast<double>(bridge.interpolated) / ticks);
+  if (bridge.faded > 0)
+    text += fmt::format("  {:.3g} s without force: {}\n", static_cast<double>(bridge.faded) / ticks,
+                        too_slow_text(bridge.slowest));
+  return text;
+}
+
 } // namespace
+
+std::string too_slow_text(double rate) {
+  return fmt::format("a client of {:.3g} poses a second; allowed: {:g} or more, fewer cannot keep the hand steady",
+                     rate, slowest_client);
+}
+
+std::string pace_text(const BridgePace& pace) {
+  switch (pace.kind) {
+  case PaceKind::full:
+    return fmt::format("bridge: the client sends {:.0f} poses a second", pace.rate);
+  case PaceKind::interpolated:
+    return fmt::format("bridge: the client sends {:.0f} poses a second; its pose is interpolated, {:.2g} ms late",
+                       pace.rate, 1e3 / pace.rate);
+  case PaceKind::too_slow:
+    return "bridge: the force fades: " + too_slow_text(pace.rate);
+  case PaceKind::unknown:
+    break;
+  }
+  return "bridge: nobody holds the tool";
+}
 
 Percentiles percentiles(std::vector<double> samples) {
   if (samples.empty())
@@ -149,6 +183,7 @@ ModelError model_error(const std::vector<TickRecord>& ticks, const std::vector<S
 HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report) {
   HapticFindings findings;
   findings.loop = report;
+  findings.tick_rate = settings.rate;
   std::vector<double> latency;
   std::vector<double> compute;
   std::vector<double> solve;
@@ -231,7 +266,8 @@ std::string text_of(const HapticFindings& f) {
     text += fmt::format("bridge: {} poses of {} clients, {} of them fell silent; {} packets too old, {} garbage, {} of "
                         "others; {} forces unsent\n",
                         f.bridge->poses, f.bridge->clients, f.bridge->lost, f.bridge->old, f.bridge->garbage,
-                        f.bridge->others, f.bridge->unsent);
+                        f.bridge->others, f.bridge->unsent) +
+            rate_text(*f.bridge, f.tick_rate);
   if (has_clock)
     text += fmt::format("time: ticks {:.3g} s, solves {:.3g} s, {} frames {:.3g} s, of {:.3g} s; {:.3g} s to prepare",
                         f.loop.haptic_cpu_seconds, f.loop.solve_seconds, f.loop.frames, f.loop.viewer_seconds,
@@ -286,9 +322,18 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
   for (const AccountEntry& entry : account_of(f.blade_account))
     json["blade"][entry.key] = entry.joules;
   if (f.bridge)
-    json["bridge"] = {{"poses", f.bridge->poses},  {"clients", f.bridge->clients}, {"silent", f.bridge->lost},
-                      {"old", f.bridge->old},      {"garbage", f.bridge->garbage}, {"others", f.bridge->others},
-                      {"unsent", f.bridge->unsent}};
+    json["bridge"] = {{"poses", f.bridge->poses},
+                      {"clients", f.bridge->clients},
+                      {"silent", f.bridge->lost},
+                      {"old", f.bridge->old},
+                      {"garbage", f.bridge->garbage},
+                      {"others", f.bridge->others},
+                      {"unsent", f.bridge->unsent},
+                      {"client_rate", f.bridge->rate},
+                      {"slowest_client_rate", f.bridge->slowest},
+                      {"interpolated_ticks", f.bridge->interpolated},
+                      {"faded_ticks", f.bridge->faded},
+                      {"faded_because", f.bridge->faded > 0 ? too_slow_text(f.bridge->slowest) : ""}};
   replace_file(folder / "haptic.json", json.dump(2) + "\n");
 }
 

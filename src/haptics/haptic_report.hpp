@@ -32,6 +32,7 @@ ModelError model_error(const std::vector<TickRecord>& ticks, const std::vector<S
 struct HapticFindings {
   RealtimeReport loop;
   double rate = 0;       // ticks per second, over the session
+  double tick_rate = 0;  // ticks per second of the scenario
   double solve_rate = 0; // solves per second
   Percentiles latency;   // s, from due to begun
   Percentiles compute;   // s, processor time of a tick
@@ -51,6 +52,10 @@ struct HapticFindings {
   std::optional<BridgeCounters> bridge; // with that device
 };
 HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report);
+
+/// What a client's rate means for its force, as a line for a screen; and why one has none.
+std::string pace_text(const BridgePace& pace);
+std::string too_slow_text(double rate);
 
 /// As lines for a screen.
 std::string text_of(const HapticFindings& findings);

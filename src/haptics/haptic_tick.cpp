@@ -9,6 +9,8 @@ namespace {
 
 constexpr double softening = 50;     // per second, at most, by which the rendered share of the force falls
 constexpr double hardening = 2;      // the same as it rises
+constexpr double force_age = 2;      // times a slow client's time between two readings: interpolated, then held
+constexpr double least_damper = 1;   // N s/m, that a hand has in any case
 constexpr double out_of_body = 1e-3; // m, over which a blade's edge comes clear of the surface
 constexpr double one_place = 1e-3;   // m, within which two contacts are one, that the same walk follows
 constexpr double patch_rim = 0.8;    // of the candidates' reach: a contact beyond it takes the patch along
@@ -49,7 +51,8 @@ topology::ToolPose tool_pose(const topology::ToolShape& tool, const DeviceState&
 HapticTick::HapticTick(const HapticSettings& settings, const topology::ToolShape& tool,
                        const topology::ContactQuery* organ, bool with_tool)
     : settings_(settings), tool_(tool), organ_(organ), with_tool_(with_tool && organ != nullptr),
-      model_(make_force_model(settings.model, tool)), passivity_(settings.limits, settings.rate, settings.passivity) {}
+      model_(make_force_model(settings.model, tool)), passivity_(settings.limits, settings.rate, settings.passivity),
+      client_(settings.limits, settings.rate, settings.passivity) {}
 
 void HapticTick::start(const DeviceState& device) {
   if (with_tool_)
@@ -138,14 +141,49 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
   return model_->at(pose, device.time);
 }
 
+double HapticTick::steady_stiffness(const DeviceState& device) const noexcept {
+  const DeviceLimits& limits = settings_.limits;
+  if (device.client.period <= 1)
+    return limits.stiffness;
+  const double late = force_age * device.client.period / settings_.rate; // s
+  return std::min(limits.stiffness, std::max(limits.damping, least_damper) / late);
+}
+
 // With the controller on, a contact stiffer than the device renders steadily is rendered as stiff as that: by a share
-// of its force, which falls faster than it rises.
-void HapticTick::soften(const ModelForce& model) noexcept {
+// of its force, which falls faster than it rises. At a slow client it is there from the first touch on.
+void HapticTick::soften(const ModelForce& model, const DeviceState& device) noexcept {
   if (!settings_.passivity || !(model.force.squaredNorm() > 0))
     return;
   const double stiffness = settings_.limits.gain * model.stiffness;
-  const double share = stiffness > settings_.limits.stiffness ? settings_.limits.stiffness / stiffness : 1;
-  softened_ += std::clamp(share - softened_, -softening / settings_.rate, hardening / settings_.rate);
+  const double steady = steady_stiffness(device);
+  const double share = stiffness > steady ? steady / stiffness : 1;
+  const bool slow = device.client.period > 1;
+  if (slow && last_model_.squaredNorm() == 0)
+    softened_ = share;
+  const double falling = slow ? hardening : softening; // its rate is measured anew with each of its poses
+  softened_ += std::clamp(share - softened_, -falling / settings_.rate, hardening / settings_.rate);
+}
+
+void HapticTick::place_controller() noexcept {
+  passivity_.place();
+  client_.place();
+}
+
+void HapticTick::find_energy() noexcept {
+  passivity_.find();
+  client_.find();
+}
+
+// The one that has not counted meanwhile begins anew.
+void HapticTick::choose_controller(const DeviceState& device) noexcept {
+  const bool slow = device.client.period > 1;
+  if (slow == slow_client_)
+    return;
+  slow_client_ = slow;
+  if (slow)
+    client_.place();
+  else
+    passivity_.place();
 }
 
 bool HapticTick::jumps(const DeviceState& device) const noexcept {
@@ -170,13 +208,14 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
     position_ = device.position;
     placed_ = device.tick;
     finds_ = true;
-    passivity_.place();
+    place_controller();
   }
+  choose_controller(device);
   const Origin before = std::exchange(origin_, origin(device));
   const bool turns = before != origin_;
   const bool found = finds_ && snapshot_ != nullptr && snapshot_->pose_tick >= placed_;
   if (turns || found)
-    passivity_.find();
+    find_energy();
   finds_ = finds_ && !found;
   const bool arrives = std::exchange(arrived_, false) || turns || placed;
   result.model = ask(device, result.outside);
@@ -191,11 +230,11 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
       difference_ = -result.model.force;
     fading_ = difference_ / std::max(1.0, std::round(settings_.hand_over * settings_.rate));
   }
+  soften(result.model, device);
   model_before_ = arrives ? result.model.force : last_model_;
   last_model_ = result.model.force;
   result.tissue = result.model.force + difference_;
   const DeviceLimits& limits = settings_.limits;
-  soften(result.model);
   result.softened = softened_;
   const double gain = softened_ * limits.gain;
   std::optional<double> stored = result.model.stored;
@@ -206,7 +245,12 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
     stored = paid_;
   if (stored)
     *stored *= gain;
-  Vector3 force = passivity_.control(device.position, gain * result.tissue, stored);
+  if (slow_client_ && !stored && result.model.stiffness > 0) // of a spring as stiff as the contact
+    stored = gain * result.tissue.squaredNorm() / (2 * result.model.stiffness);
+  const Vector3 wanted = gain * result.tissue;
+  Vector3 force = slow_client_ ? client_.control(device.client, device.position, wanted, stored.value_or(0))
+                               : passivity_.control(device.position, wanted, stored);
+  force *= device.client.share;
   if (!device.connected)
     force.setZero();
   if (const double size = force.norm(); size > limits.force) {
@@ -220,9 +264,10 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   }
   sent_ = force;
   passivity_.sent(force);
+  client_.sent(force);
   result.force = force;
   result.sequence = snapshot_ != nullptr ? snapshot_->sequence : 0;
-  result.energy = passivity_.energy();
+  result.energy = passivity_.energy() + client_.energy();
   return result;
 }
 

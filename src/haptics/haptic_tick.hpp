@@ -3,6 +3,7 @@
 // bit.
 #pragma once
 
+#include "src/haptics/client_passivity.hpp"
 #include "src/haptics/device.hpp"
 #include "src/haptics/force_model.hpp"
 #include "src/haptics/passivity.hpp"
@@ -40,6 +41,11 @@ struct TickResult {
 /// before its first solve; where tool and blade change places there is no force until then. Both are handed over as a
 /// solve is. A device that does not answer brings the force to zero at the slew limit.
 ///
+/// Energy is counted where it flows: at every tick, or from reading to reading of a client that gives fewer
+/// (DeviceState::client). Such a client gets its force as late as it interpolates, once more as it holds it, and may
+/// not be stiffer than what its damper (DeviceLimits::damping) keeps from swinging over that time; a share of the force
+/// below 1 is that of a client too slow for any.
+///
 /// A tool that has moved faster than fastest_hand is placed anew, and so is one that somebody has just taken up: no
 /// work is counted for the way there, nothing is owed for what was before, and what energy it meets there, also by the
 /// first solve from there, has been found. The force is handed over, from none where nobody held the tool.
@@ -58,7 +64,9 @@ class HapticTick {
   /// Changes nothing: for the time in which a tick is waited for.
   void fetch() const noexcept;
 
+  /// Of a device that answers at every tick, and of a client that does not.
   [[nodiscard]] const PassivityControl& passivity() const { return passivity_; }
+  [[nodiscard]] const ClientPassivity& client_passivity() const { return client_; }
 
  private:
   enum class Origin { none, tool, grasper, blade }; // of the force
@@ -66,7 +74,11 @@ class HapticTick {
   [[nodiscard]] ModelForce ask(const DeviceState& device, bool& outside) noexcept;
   void locate(const DeviceState& device) noexcept;
   [[nodiscard]] double share_inside(const Vector3& position) noexcept;
-  void soften(const ModelForce& model) noexcept;
+  void soften(const ModelForce& model, const DeviceState& device) noexcept;
+  [[nodiscard]] double steady_stiffness(const DeviceState& device) const noexcept;
+  void choose_controller(const DeviceState& device) noexcept;
+  void place_controller() noexcept;
+  void find_energy() noexcept;
   [[nodiscard]] bool jumps(const DeviceState& device) const noexcept;
 
   HapticSettings settings_;
@@ -75,6 +87,8 @@ class HapticTick {
   bool with_tool_;
   std::unique_ptr<ForceModel> model_;
   PassivityControl passivity_;
+  ClientPassivity client_;
+  bool slow_client_ = false; // in the last tick: then the latter controls
   const ContactSnapshot* snapshot_ = nullptr;
   topology::SurfaceContact contact_;
   std::array<topology::SurfaceContact, BladeGrip::most_places> edge_; // of the blade's edge and the surface

@@ -2,6 +2,7 @@
 
 #include "src/haptics/ring.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -53,6 +54,7 @@ struct Shared {
   Ring<TickRecord> ticks;   // haptic thread to viewer
   Ring<SolveRecord> solves; // simulation thread to viewer
   std::atomic<bool> stop{false}, done{false};
+  std::string failure; // of the simulation thread, which has ended by it; empty: none
 };
 
 bool at_rest(const DeviceState& a, const DeviceState& b) {
@@ -109,9 +111,8 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
   shared.done.store(true, std::memory_order_release);
 }
 
-void simulation_thread(const HapticSettings& settings, HapticSimulation& simulation, Shared& shared, ViewerFeed& feed,
-                       const RealtimeOptions& options, std::uint64_t& lost, RealtimeReport& report) {
-  pthread_setname_np(pthread_self(), "simulation");
+void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shared& shared, ViewerFeed& feed,
+              const RealtimeOptions& options, std::uint64_t& lost, RealtimeReport& report) {
   if (options.niceness > 0)
     static_cast<void>(setpriority(PRIO_PROCESS, 0, options.niceness)); // of this thread alone
   DegradationRule rule(settings.budget);
@@ -155,6 +156,18 @@ void simulation_thread(const HapticSettings& settings, HapticSimulation& simulat
     rule.solved(simulation.result().rebuild, record.seconds);
     feed.offer(simulation, record);
     report.solve_seconds += 1e-9 * static_cast<double>(clock_now(CLOCK_MONOTONIC) - began);
+  }
+}
+
+void simulation_thread(const HapticSettings& settings, HapticSimulation& simulation, Shared& shared, ViewerFeed& feed,
+                       const RealtimeOptions& options, std::uint64_t& lost, RealtimeReport& report) {
+  pthread_setname_np(pthread_self(), "simulation");
+  try {
+    solve_on(settings, simulation, shared, feed, options, lost, report);
+  } catch (const Interrupted&) { // the program ends: the solve at hand is given up, as if it had never been begun
+  } catch (const std::exception& error) {
+    shared.failure = error.what();
+    shared.stop.store(true, std::memory_order_release);
   }
 }
 
@@ -225,7 +238,11 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
   const long long start = clock_now(CLOCK_MONOTONIC);
   const auto ticks = count < 1e18 ? static_cast<std::uint64_t>(count) : ~std::uint64_t{0};
   std::uint64_t lost_solves = 0;
-  std::thread solver([&] { simulation_thread(settings, simulation, *shared, feed, options, lost_solves, report); });
+  // Where the second cannot be made the first has to end before its exception goes on.
+  std::jthread solver([&, ends = shared.get()](const std::stop_token& token) {
+    const std::stop_callback end(token, [ends] { ends->done.store(true, std::memory_order_release); });
+    simulation_thread(settings, simulation, *shared, feed, options, lost_solves, report);
+  });
   std::thread haptic([&] { haptic_thread(settings, device, first, core, *shared, options, ticks, report); });
   Collector collector(*shared, options, records);
   std::exception_ptr failure;
@@ -254,6 +271,8 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
   guarded([&] { collector.collect(); });
   if (failure)
     std::rethrow_exception(failure);
+  if (!shared->failure.empty())
+    throw NumericalError("the simulation has ended: " + shared->failure);
   report.stopped = report.ticks < ticks;
   report.lost += lost_solves;
   report.frames = feed.frames();

@@ -1,7 +1,10 @@
 #include "src/haptics/recording.hpp"
 
 #include "src/build_identity.hpp"
+#include "src/haptics/simulation.hpp"
+#include "src/scenario_keys.hpp"
 #include "topology/errors.hpp"
+#include "topology/regular_file.hpp"
 #include "topology/wound.hpp"
 
 #include <array>
@@ -9,8 +12,6 @@
 #include <cmath>
 #include <cstring>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 
 namespace spherecut::app {
 namespace {
@@ -18,11 +19,14 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "recordings are written as they lie in memory");
 
 constexpr std::string_view signature = "SPHCREC\n";
-constexpr std::uint32_t header_lot = 1, tick_lot = 2, solve_lot = 3, end_lot = 4;
+constexpr std::uint32_t header_lot = 1, tick_lot = 2, solve_lot = 3, end_lot = 4, client_lot = 5;
 constexpr std::size_t lot_head = 16; // kind, size of the payload, its checksum
-constexpr std::size_t tick_size = 112, solve_size = 64;
+constexpr std::size_t tick_size = 112, solve_size = 64, client_size = 56;
 constexpr std::size_t lot_of_ticks = 256;
 constexpr std::uint32_t longest_lot = 64U << 20U;
+constexpr std::uintmax_t largest_recording = 2'000'000'000; // bytes; an hour has 400 million
+constexpr double longest_period = 1e6;                      // ticks
+constexpr double farthest = 1e6;                            // m, of a coordinate
 constexpr std::uint32_t connected = 1;
 constexpr std::uint32_t failed = 1, resprinkled = 2, swapped = 4, aside = 8;
 
@@ -101,8 +105,8 @@ RecordingHeader header_of(Reader& in) {
   header.seed = in.get<std::uint64_t>();
   header.organ = in.get<std::uint64_t>();
   header.rate = in.number();
-  if (!(header.rate > 0))
-    in.fail(fmt::format("a rate of {:g} ticks per second; allowed: above 0", header.rate));
+  if (const ScenarioKey* key = find_scenario_key("haptics.rate"); !key->range.holds(header.rate))
+    in.fail(fmt::format("a rate of {:g} ticks per second; allowed: {}", header.rate, allowed_values(*key)));
   return header;
 }
 
@@ -114,6 +118,8 @@ RecordedTick tick_of(Reader& in, std::size_t expected) {
     in.fail(fmt::format("tick {} where tick {} should be", device.tick, expected));
   device.time = in.number();
   device.position = in.vector();
+  if (!(device.position.cwiseAbs().maxCoeff() <= farthest))
+    in.fail(fmt::format("a position {:g} m from the origin; allowed: {:g} m", device.position.norm(), farthest));
   for (int i = 0; i < 4; ++i)
     device.orientation.coeffs()[i] = in.number();
   if (std::abs(device.orientation.norm() - 1) > 1e-6)
@@ -126,6 +132,32 @@ RecordedTick tick_of(Reader& in, std::size_t expected) {
   return tick;
 }
 
+/// What is known of a client at a tick that has more to tell than its pose.
+struct RecordedClient {
+  std::uint64_t tick = 0;
+  ClientReading reading;
+};
+
+RecordedClient client_of(Reader& in) {
+  RecordedClient client;
+  client.tick = in.get<std::uint64_t>();
+  client.reading.position = in.vector();
+  client.reading.period = in.number();
+  client.reading.share = in.number();
+  client.reading.fresh = in.get<std::uint64_t>() != 0;
+  if (!(client.reading.position.cwiseAbs().maxCoeff() <= farthest) || !(client.reading.period >= 1) ||
+      !(client.reading.period <= longest_period) || !(client.reading.share >= 0) || !(client.reading.share <= 1))
+    in.fail("a client's reading that is out of range");
+  return client;
+}
+
+/// Ticks of a session that was killed may be missing for the last of them.
+void set_clients(Recording& recording, const std::vector<RecordedClient>& clients) {
+  for (const RecordedClient& client : clients)
+    if (client.tick < recording.ticks.size())
+      recording.ticks[client.tick].device.client = client.reading;
+}
+
 SolveRecord solve_of(Reader& in, const std::vector<SolveRecord>& before) {
   SolveRecord solve;
   solve.event.sequence = in.get<std::uint64_t>();
@@ -135,6 +167,8 @@ SolveRecord solve_of(Reader& in, const std::vector<SolveRecord>& before) {
     in.fail(fmt::format("solve {} of tick {} after {} solves, the last of tick {}", solve.event.sequence,
                         solve.event.pose_tick, before.size(), before.empty() ? 0 : before.back().event.pose_tick));
   solve.event.degradation = in.get<std::int32_t>();
+  if (solve.event.degradation < 0 || solve.event.degradation > most_degradation)
+    in.fail(fmt::format("a solve coarsened by {} levels; allowed: 0 to {}", solve.event.degradation, most_degradation));
   const auto flags = in.get<std::uint32_t>();
   solve.failed = (flags & failed) != 0;
   solve.resprinkled = (flags & resprinkled) != 0;
@@ -184,7 +218,8 @@ RecordingHeader recording_header(const Scenario& scenario, const topology::Surfa
           scenario.haptics.rate};
 }
 
-RecordingWriter::RecordingWriter(std::filesystem::path file, const RecordingHeader& header) : file_(std::move(file)) {
+RecordingWriter::RecordingWriter(std::filesystem::path file, const RecordingHeader& header)
+    : file_(std::move(file), OutputFile::Made::anew) {
   std::string start(signature);
   put(start, recording_version);
   put(start, std::uint32_t{0});
@@ -224,6 +259,13 @@ void RecordingWriter::add(const TickRecord& tick) {
   put(ticks_, device.mode);
   put(ticks_, device.buttons);
   put(ticks_, tick.sequence);
+  if (const ClientReading& client = device.client; client.period > 1 || client.share < 1) {
+    put(clients_, device.tick);
+    put(clients_, client.position);
+    put(clients_, client.period);
+    put(clients_, client.share);
+    put(clients_, static_cast<std::uint64_t>(client.fresh ? 1 : 0));
+  }
   ++tick_count_;
   if (ticks_.size() >= lot_of_ticks * tick_size)
     flush();
@@ -242,9 +284,10 @@ void RecordingWriter::add(const SolveRecord& solve) {
   ++solve_count_;
 }
 
-// Solves first: no tick on disk uses one that is not.
+// Solves first: no tick on disk uses one that is not. What a tick knows of a client goes before it, too.
 void RecordingWriter::flush() {
   write(solve_lot, solves_);
+  write(client_lot, clients_);
   write(tick_lot, ticks_);
 }
 
@@ -259,13 +302,7 @@ void RecordingWriter::finish(std::uint64_t lost) {
 }
 
 Recording read_recording(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error))
-    throw InputError(fmt::format("{}: there is no such file", file.string()));
-  std::ifstream stream(file, std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (!stream.good() && !stream.eof())
-    throw InputError(fmt::format("{}: cannot be read", file.string()));
+  const std::string bytes = topology::read_regular_file(file, largest_recording);
   const auto refuse = [&](std::size_t at, const std::string& what) {
     throw InputError(fmt::format("{}: byte {}: {}", file.string(), at, what));
   };
@@ -277,6 +314,7 @@ Recording read_recording(const std::filesystem::path& file) {
            fmt::format("a recording of format {}; this program reads {}", version, recording_version));
   static_cast<void>(start.get<std::uint32_t>());
   Recording recording;
+  std::vector<RecordedClient> clients;
   bool named = false;
   for (std::size_t at = signature.size() + 8; at < bytes.size();) {
     Reader head(std::string_view(bytes).substr(at), file, at);
@@ -288,7 +326,7 @@ Recording read_recording(const std::filesystem::path& file) {
     const auto kind = head.get<std::uint32_t>();
     const auto size = head.get<std::uint32_t>();
     const auto sum = head.get<std::uint64_t>();
-    if (kind < header_lot || kind > end_lot || size > longest_lot || recording.finished ||
+    if (kind < header_lot || kind > client_lot || size > longest_lot || recording.finished ||
         named == (kind == header_lot))
       refuse(at, fmt::format("a lot of kind {} with {} bytes does not belong here", kind, size));
     if (head.left() < size)
@@ -305,6 +343,8 @@ Recording read_recording(const std::filesystem::path& file) {
       recording.ticks.push_back(tick_of(in, recording.ticks.size()));
     while (kind == solve_lot && in.left() >= solve_size)
       recording.solves.push_back(solve_of(in, recording.solves));
+    while (kind == client_lot && in.left() >= client_size)
+      clients.push_back(client_of(in));
     if (in.left() != 0)
       in.fail(fmt::format("{} bytes too many in a lot of kind {}", in.left(), kind));
     named = true;
@@ -314,6 +354,7 @@ Recording read_recording(const std::filesystem::path& file) {
   if (!named)
     refuse(bytes.size(), "the file is cut off here, before anything was recorded");
   set_arrivals(recording, file);
+  set_clients(recording, clients);
   return recording;
 }
 
@@ -330,8 +371,10 @@ RecordedMotion::RecordedMotion(const Recording& recording, double rate) : rate_(
 DeviceState RecordedMotion::read(std::uint64_t tick) noexcept {
   DeviceState state = states_[std::min<std::size_t>(tick, states_.size() - 1)];
   state.tick = tick;
-  if (tick >= states_.size())
+  if (tick >= states_.size()) { // it rests where it was
+    state.client = {};
     state.time = static_cast<double>(tick) / rate_;
+  }
   return state;
 }
 

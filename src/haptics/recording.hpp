@@ -42,7 +42,7 @@ class RecordingWriter {
  private:
   void write(std::uint32_t kind, std::string& payload);
   OutputFile file_;
-  std::string ticks_, solves_;
+  std::string ticks_, solves_, clients_;
   std::uint64_t tick_count_ = 0, solve_count_ = 0;
 };
 

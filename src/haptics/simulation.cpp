@@ -2,6 +2,7 @@
 
 #include "src/haptics/haptic_tick.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -65,7 +66,7 @@ void DegradationRule::solved(Rebuild rebuild, double seconds) {
 }
 
 HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const std::string&)> say)
-    : session_(std::move(scenario), std::move(say)) {
+    : session_(std::move(scenario), std::move(say), Leader::device) {
   session_.set_force_only(true);
   session_.set_tear_gradually(true);
   session_.set_recondensing(true);
@@ -220,6 +221,10 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
   } catch (const NumericalError& error) {
     return failed(error);
   } catch (const InputError& error) { // of the pose: the contact has reached a fixed region
+    return failed(error);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception& error) { // no thread, no memory: the loop goes on with the snapshot it has
     return failed(error);
   }
   snapshot.sequence = event.sequence;

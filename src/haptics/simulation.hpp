@@ -84,7 +84,7 @@ class HapticSimulation {
   HandMode mode_ = HandMode::usual; // of the last solve
 };
 
-/// Solves as an event says and tells what came of it. A failure leaves the snapshot as it was.
+/// Solves as an event says and tells what came of it. A failure leaves the snapshot as it was. Throws Interrupted.
 SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
                             ContactSnapshot& snapshot);
 

@@ -1,6 +1,7 @@
 #include "src/haptics/virtual_loop.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <deque>
 #include <fmt/format.h>
@@ -118,7 +119,7 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
   std::vector<SolveRecord> solves;
   InFlight flights;
   auto next = events.begin();
-  for (std::uint64_t tick = 0; tick < ticks && !options.stop(); ++tick) {
+  const auto run_tick = [&](std::uint64_t tick) {
     const DeviceState state = device.read(tick);
     if (tick == 0) {
       simulation.prepare(state);
@@ -145,6 +146,13 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
       records[m].ticks.push_back(record_of(state, result, arrives));
     }
     options.on_tick(records.front().ticks.back());
+  };
+  try {
+    for (std::uint64_t tick = 0; tick < ticks && !options.stop(); ++tick)
+      run_tick(tick);
+  } catch (const Interrupted&) { // the tick at hand is given up, and the solve in it
+    if (records.front().ticks.empty())
+      throw;
   }
   for (LoopRecords& one : records)
     one.solves = solves;

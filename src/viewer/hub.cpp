@@ -1,11 +1,14 @@
 #include "src/viewer/hub.hpp"
 
+#include "src/scenario_document.hpp"
 #include "topology/errors.hpp"
+#include "topology/regular_file.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
-#include <fstream>
 #include <sched.h>
+#include <sstream>
+#include <system_error>
 #include <utility>
 
 namespace spherecut::app {
@@ -15,7 +18,8 @@ constexpr std::size_t log_lines = 200;                        // kept for tellin
 constexpr auto log_interval = std::chrono::milliseconds(100); // between two lines
 constexpr auto cutting_shown = std::chrono::milliseconds(300);
 constexpr double inside_told = 1; // s, that a tool in its place may be wanted inside the organ for before that is told
-constexpr double reach = 2;       // of the organ's diagonal, from its middle: so far away a hand may be
+constexpr std::size_t title_within = 16384, longest_title = 200; // bytes of a scenario file, of what is told of it
+constexpr double reach = 2; // of the organ's diagonal, from its middle: so far away a hand may be
 
 double seconds_since(std::chrono::steady_clock::time_point then) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - then).count();
@@ -24,26 +28,47 @@ double seconds_since(std::chrono::steady_clock::time_point then) {
 /// Whether threads of this process may have a real-time priority.
 bool fifo_granted() {
   bool granted = false;
-  std::thread([&granted] {
-    sched_param parameter{};
-    parameter.sched_priority = 80;
-    granted = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter) == 0;
-  }).join();
+  try {
+    std::thread([&granted] {
+      sched_param parameter{};
+      parameter.sched_priority = 80;
+      granted = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameter) == 0;
+    }).join();
+  } catch (const std::system_error&) { // no thread of any kind
+  }
   return granted;
 }
 
 /// The title that a scenario file gives itself, without reading the rest; empty: none.
 std::string title_of(const std::filesystem::path& file) {
-  std::ifstream text(file);
+  std::istringstream text(topology::start_of_regular_file(file, title_within));
   for (std::string line; std::getline(text, line) && (line.empty() || line.front() != '[');) {
     if (line.rfind("title", 0) != 0)
       continue;
     const auto from = line.find('"');
     const auto to = line.rfind('"');
     if (from != std::string::npos && to > from)
-      return line.substr(from + 1, to - from - 1);
+      return line.substr(from + 1, std::min(to - from - 1, longest_title));
   }
   return {};
+}
+
+/// What a request costs besides the one message that it is: reading folders and files, beginning a session.
+double cost_of(const Request& request) {
+  switch (request.type) {
+  case RequestType::hello:
+    return 60;
+  case RequestType::reset:
+  case RequestType::scenario:
+  case RequestType::set:
+  case RequestType::record:
+  case RequestType::replay:
+    return 30;
+  case RequestType::overlays:
+    return 3;
+  default:
+    return 0;
+  }
 }
 
 std::string shortened(const std::string& text) {
@@ -107,6 +132,7 @@ std::optional<CloseReason> Hub::message(int client, std::string_view text) {
   } catch (const InputError& error) {
     return CloseReason{CloseCode::invalid, error.what()};
   }
+  server_->charge(client, cost_of(request));
   if (request.type == RequestType::hello) {
     if (request.number != protocol_version)
       return CloseReason{CloseCode::policy, fmt::format("version {} is spoken here", protocol_version)};
@@ -127,7 +153,10 @@ std::optional<CloseReason> Hub::message(int client, std::string_view text) {
 
 void Hub::greet(int client, Client& from) {
   from.greeted = true;
-  send(client, welcome_text(client, scenarios(), recordings(), options_.viewers, options_.speed));
+  WelcomeLists list;
+  list.scenarios = scenarios(list.scenarios_left_out);
+  list.recordings = recordings(list.recordings_left_out);
+  send(client, welcome_text(client, list, options_.viewers, options_.speed));
   send(client, session_text(*session_, epoch_, target_.mode));
   send(client, holder_text(holder_));
   if (tear_.state != TearState::none)
@@ -298,26 +327,27 @@ void Hub::request_overlays() {
   session_->request(std::move(request));
 }
 
-std::vector<ScenarioEntry> Hub::scenarios() const {
-  std::vector<ScenarioEntry> list;
+std::filesystem::path Hub::scenario_folder() const {
   const std::filesystem::path folder = options_.scenario.parent_path();
-  std::error_code error;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(folder.empty() ? std::filesystem::path(".") : folder, error)) {
-    if (entry.path().extension() != ".toml")
-      continue;
-    const std::string name = entry.path().filename().string();
-    list.push_back({name, title_of(entry.path())});
-  }
-  std::sort(list.begin(), list.end(), [](const ScenarioEntry& a, const ScenarioEntry& b) { return a.name < b.name; });
+  return folder.empty() ? std::filesystem::path(".") : folder;
+}
+
+std::vector<ScenarioEntry> Hub::scenarios(std::size_t& left_out) const {
+  std::vector<std::string> names = names_in(scenario_folder(), scenario_extension);
+  std::sort(names.begin(), names.end());
+  left_out = names.size() - std::min(names.size(), most_listed);
+  names.resize(names.size() - left_out);
+  std::vector<ScenarioEntry> list;
+  for (const std::string& name : names)
+    list.push_back({name, title_of(scenario_folder() / name)});
   return list;
 }
 
 void Hub::choose(int client, const std::string& name) {
-  const std::vector<ScenarioEntry> list = scenarios();
-  if (std::none_of(list.begin(), list.end(), [&](const ScenarioEntry& entry) { return entry.name == name; }))
+  const std::filesystem::path file = scenario_folder() / name;
+  if (!is_entry(file, name, scenario_extension))
     throw InputError(fmt::format("there is no scenario '{}' in the list", name));
-  build(client, read_scenario(options_.scenario.parent_path() / name), "scenario", name);
+  build(client, read_scenario_text(file, topology::read_regular_file(file, largest_scenario)), "scenario", name);
 }
 
 void Hub::tick() {

@@ -3,6 +3,8 @@
 // ended.
 #pragma once
 
+#include "src/output_file.hpp"
+#include "src/viewer/listed_files.hpp"
 #include "src/viewer/replies.hpp"
 
 #include <deque>
@@ -88,7 +90,7 @@ class Hub {
   void replay(int client, const std::optional<std::string>& name);
   void tell_recording();
   [[nodiscard]] std::filesystem::path unused_recording() const;
-  [[nodiscard]] std::vector<RecordingEntry> recordings() const;
+  [[nodiscard]] std::vector<RecordingEntry> recordings(std::size_t& left_out) const;
 
   void build(int client, Scenario scenario, std::string_view about, const std::string& what,
              const Recorded& recorded = {});
@@ -102,7 +104,8 @@ class Hub {
   void send_frames(const LiveTick& tick);
   void send_frame(int id, Client& client, const LiveTick& tick, bool picture);
   [[nodiscard]] std::uint32_t state_bits(const LiveTick& tick) const;
-  [[nodiscard]] std::vector<ScenarioEntry> scenarios() const;
+  [[nodiscard]] std::filesystem::path scenario_folder() const;
+  [[nodiscard]] std::vector<ScenarioEntry> scenarios(std::size_t& left_out) const;
 
   HubOptions options_;
   std::function<void(const std::string&)> say_;
@@ -114,9 +117,10 @@ class Hub {
   Clock::time_point log_told_;
 
   std::unique_ptr<LiveSession> session_;
-  bool changed_ = false;   // settings of the session, from those of its file
-  bool recording_ = false; // told so
-  std::string replaying_;  // name; empty: nothing is
+  ResultsClaim recordings_; // the folder, from the first recording on
+  bool changed_ = false;    // settings of the session, from those of its file
+  bool recording_ = false;  // told so
+  std::string replaying_;   // name; empty: nothing is
   std::uint32_t epoch_ = 1;
   bool fifo_ = false;
   PointerTarget target_;

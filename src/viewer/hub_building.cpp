@@ -5,16 +5,12 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <functional>
 #include <malloc.h>
+#include <system_error>
 #include <utility>
 
 namespace spherecut::app {
-namespace {
-
-constexpr const char* recording_extension = ".recording";
-
-} // namespace
-
 // A recording begins with a session, so that it can be run again from there.
 void Hub::record(int client, bool on) {
   if (!on) {
@@ -34,6 +30,8 @@ void Hub::record(int client, bool on) {
   std::filesystem::create_directories(options_.recordings, error);
   if (error)
     throw InputError(fmt::format("cannot make the folder {}: {}", options_.recordings.string(), error.message()));
+  if (!recordings_.holds())
+    recordings_ = ResultsClaim(options_.recordings); // two servers would number theirs alike
   build(client, session_->scenario(), "record", "from the start, recorded", {unused_recording(), {}, {}});
 }
 
@@ -43,8 +41,7 @@ void Hub::replay(int client, const std::optional<std::string>& name) {
       build(client, session_->scenario(), "replay", "from the start");
     return;
   }
-  const std::vector<RecordingEntry> list = recordings();
-  if (std::none_of(list.begin(), list.end(), [&](const RecordingEntry& entry) { return entry.name == *name; }))
+  if (!is_entry(options_.recordings / *name, *name, recording_extension))
     throw InputError(fmt::format("there is no recording '{}' in the list", *name));
   const auto recording = std::make_shared<const Recording>(read_recording(options_.recordings / *name));
   build(client, recorded_scenario(*recording), "replay", "replay of " + *name, {{}, recording, *name});
@@ -60,12 +57,22 @@ std::filesystem::path Hub::unused_recording() const {
   }
 }
 
-std::vector<RecordingEntry> Hub::recordings() const {
-  std::vector<RecordingEntry> list;
+// The newest, should there be many.
+std::vector<RecordingEntry> Hub::recordings(std::size_t& left_out) const {
+  std::vector<std::pair<std::filesystem::file_time_type, std::string>> found;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(options_.recordings, error))
-    if (entry.path().extension() == recording_extension)
-      list.push_back({entry.path().filename().string(), entry.file_size(error)});
+  for (std::string& name : names_in(options_.recordings, recording_extension)) {
+    const auto time = std::filesystem::last_write_time(options_.recordings / name, error);
+    if (!error)
+      found.emplace_back(time, std::move(name));
+  }
+  std::sort(found.begin(), found.end(), std::greater<>());
+  left_out = found.size() - std::min(found.size(), most_listed);
+  found.resize(found.size() - left_out);
+  std::vector<RecordingEntry> list;
+  for (const auto& [time, name] : found)
+    if (const auto bytes = std::filesystem::file_size(options_.recordings / name, error); !error)
+      list.push_back({name, bytes});
   std::sort(list.begin(), list.end(), [](const RecordingEntry& a, const RecordingEntry& b) { return a.name < b.name; });
   return list;
 }
@@ -98,7 +105,7 @@ void Hub::start_building() {
   building_ = std::move(next_);
   send_all(building_text(building_->what));
   Building& job = *building_;
-  job.thread = std::thread([this, &job, scenario = *job.scenario] {
+  const auto make = [this, &job, scenario = *job.scenario] {
     try {
       job.session =
           std::make_unique<LiveSession>(scenario, job.options, [this](const std::string& line) { say_here(line); });
@@ -110,23 +117,36 @@ void Hub::start_building() {
       job.failure = error.what();
     }
     job.done.store(true, std::memory_order_release);
-  });
+  };
+  try {
+    job.thread = std::thread(make);
+  } catch (const std::system_error& error) {
+    job.code = "solver";
+    job.failure = fmt::format("no thread can be made for a new session: {}", error.what());
+    job.done.store(true, std::memory_order_release);
+  }
 }
 
 void Hub::finish_building() {
   if (building_ == nullptr || !building_->done.load(std::memory_order_acquire))
     return;
-  building_->thread.join();
+  if (building_->thread.joinable())
+    building_->thread.join();
   const std::unique_ptr<Building> job = std::move(building_);
   if (job->session != nullptr) {
     // The old one may be in a long solve: it ends on a thread of its own, one at a time.
     if (ending_.joinable())
       ending_.join();
-    ending_ = std::thread([old = std::move(session_)]() mutable {
-      old.reset();
+    const auto old = std::make_shared<std::unique_ptr<LiveSession>>(std::exchange(session_, std::move(job->session)));
+    const auto end = [old] {
+      old->reset();
       malloc_trim(0);
-    });
-    session_ = std::move(job->session);
+    };
+    try {
+      ending_ = std::thread(end);
+    } catch (const std::system_error&) { // then the server waits for it
+      end();
+    }
     ++epoch_;
     changed_ = job->about == "set" || (changed_ && job->about != "scenario" && job->about != "replay");
     recording_ = false;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 namespace spherecut::app {
@@ -65,7 +66,13 @@ LiveSession::~LiveSession() {
 }
 
 void LiveSession::start() {
-  thread_ = std::thread([this] { run(); });
+  try {
+    thread_ = std::thread([this] { run(); });
+  } catch (const std::system_error& error) {
+    const std::lock_guard lock(failures_mutex_);
+    failures_.push_back(fmt::format("the loop cannot begin, no thread can be made: {}", error.what()));
+    failing_ = true;
+  }
 }
 
 void LiveSession::run() {

@@ -10,6 +10,9 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr std::size_t list_bytes =
+    90'000; // of a list: two of them and the session fit into WebServerOptions::text_bytes
+
 std::string_view name_of(HandMode mode) {
   switch (mode) {
   case HandMode::blade:
@@ -57,25 +60,40 @@ std::string dumped(const Json& message) {
   return message.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+/// Takes entries off the end of a list until a client may be sent it. Returns how many.
+std::size_t shorten(Json& list) {
+  std::size_t bytes = 0, kept = 0;
+  for (; kept < list.size(); ++kept)
+    if ((bytes += dumped(list[kept]).size()) > list_bytes)
+      break;
+  const std::size_t left_out = list.size() - kept;
+  list.erase(list.begin() + static_cast<Json::difference_type>(kept), list.end());
+  return left_out;
+}
+
 } // namespace
 
-std::string welcome_text(int client, const std::vector<ScenarioEntry>& scenarios,
-                         const std::vector<RecordingEntry>& recordings, int viewers, double speed) {
+std::string welcome_text(int client, WelcomeLists lists, int viewers, double speed) {
   Json list = Json::array();
-  for (const ScenarioEntry& entry : scenarios)
+  for (const ScenarioEntry& entry : lists.scenarios)
     list.push_back({{"name", entry.name}, {"title", entry.title}});
   Json records = Json::array();
-  for (const RecordingEntry& entry : recordings)
+  for (const RecordingEntry& entry : lists.recordings)
     records.push_back({{"name", entry.name}, {"bytes", entry.bytes}, {"url", "/recordings/" + entry.name}});
+  lists.scenarios_left_out += shorten(list);
+  lists.recordings_left_out += shorten(records);
   return dumped({{"type", "welcome"},
                  {"version", protocol_version},
                  {"id", client},
                  {"server", fmt::format("spherecut {}", version())},
                  {"scenarios", list},
+                 {"scenarios_left_out", lists.scenarios_left_out},
                  {"recordings", records},
+                 {"recordings_left_out", lists.recordings_left_out},
                  {"limits",
                   {{"message_bytes", WebServerOptions{}.message_bytes},
                    {"messages_per_second", WebServerOptions{}.messages_per_second},
+                   {"bytes_per_second", WebServerOptions{}.bytes_per_second},
                    {"credit", most_credit},
                    {"viewers", viewers},
                    {"speed", speed}}}});

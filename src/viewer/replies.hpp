@@ -14,8 +14,15 @@ struct RecordingEntry {
   std::uint64_t bytes = 0;
 };
 
-std::string welcome_text(int client, const std::vector<ScenarioEntry>& scenarios,
-                         const std::vector<RecordingEntry>& recordings, int viewers, double speed);
+/// What there is to choose from, as far as it is told.
+struct WelcomeLists {
+  std::vector<ScenarioEntry> scenarios;
+  std::vector<RecordingEntry> recordings;
+  std::size_t scenarios_left_out = 0, recordings_left_out = 0;
+};
+
+/// Lists too long for a client to be sent at once lose their last entries, which count as left out.
+std::string welcome_text(int client, WelcomeLists lists, int viewers, double speed);
 std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMode mode);
 /// 0: nobody.
 std::string holder_text(int holder);

@@ -4,6 +4,7 @@
 #include "src/progress.hpp"
 #include "src/viewer/hub.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 
 #include <array>
 #include <fmt/format.h>
@@ -71,7 +72,7 @@ void keep_memory_together() {
 
 RunEnd serve(const ServeCommand& command, std::FILE* screen) {
   keep_memory_together();
-  const InterruptWatch watch;
+  const InterruptWatch watch("ended", 0);
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
   const std::filesystem::path page = command.page.empty() ? folder_of("page") : command.page;
@@ -107,7 +108,12 @@ RunEnd serve(const ServeCommand& command, std::FILE* screen) {
   WebServer server(options, handlers); // before the session: a port in use is told at once
   running = &server;
   say(fmt::format("building the session of {}", settings.scenario.string()));
-  hub = std::make_unique<Hub>(settings, say);
+  try {
+    hub = std::make_unique<Hub>(settings, say);
+  } catch (const Interrupted&) {
+    say("ended");
+    return RunEnd::complete;
+  }
   hub->attach(server);
   const std::string url = url_of(command.address, server.port());
   say(fmt::format("{} nodes, {} triangles; serving at {}", hub->session().nodes(),

@@ -13,6 +13,7 @@
 #include <cctype>
 #include <deque>
 #include <fmt/format.h>
+#include <limits>
 #include <map>
 
 namespace spherecut::app {
@@ -26,7 +27,6 @@ using asio::ip::tcp;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::uint32_t header_bytes = 8192;
-constexpr auto http_patience = std::chrono::seconds(15);    // for a request and for its answer
 constexpr auto idle_patience = std::chrono::seconds(60);    // for a sign of life on a WebSocket
 constexpr auto farewell_patience = std::chrono::seconds(5); // for the answer to a close
 constexpr auto shutdown_patience = std::chrono::milliseconds(500);
@@ -38,6 +38,44 @@ constexpr std::string_view policy =
 std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
 }
+
+/// Bytes off the wire as a WebSocket may send them: a bucket that time fills. What never makes a message (frames
+/// without content, messages without an end) empties it like any other; then nothing more is read.
+class ByteBudget {
+ public:
+  /// From now on, per second; as many at once.
+  void limit(double bytes) noexcept {
+    rate_ = left_ = bytes;
+    told_ = Clock::now();
+  }
+  [[nodiscard]] bool spent() const noexcept { return spent_; }
+
+ private:
+  friend class beast::rate_policy_access;
+  static constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+  std::size_t available_read_bytes() noexcept {
+    if (rate_ <= 0)
+      return all;
+    const Clock::time_point now = Clock::now();
+    left_ = std::min(rate_, left_ + rate_ * std::chrono::duration<double>(now - told_).count());
+    told_ = now;
+    return left_ >= 1 ? static_cast<std::size_t>(left_) : 0;
+  }
+  static std::size_t available_write_bytes() noexcept { return all; }
+  void transfer_read_bytes(std::size_t count) noexcept {
+    left_ -= static_cast<double>(count);
+    spent_ = spent_ || (rate_ > 0 && left_ < 1); // there was more to read than it may send
+  }
+  void transfer_write_bytes(std::size_t /*count*/) noexcept {}
+  void on_timer() noexcept {}
+
+  double rate_ = 0; // 0: no limit
+  double left_ = 0;
+  bool spent_ = false; // once and for all
+  Clock::time_point told_;
+};
+
+using Stream = beast::basic_stream<tcp, asio::any_io_executor, ByteBudget>;
 
 } // namespace
 
@@ -71,7 +109,7 @@ struct WebServer::Data::Client : std::enable_shared_from_this<Client> {
     bool binary = false;
   };
 
-  Client(Data& owner, int number, beast::tcp_stream stream)
+  Client(Data& owner, int number, Stream stream)
       : data(owner), id(number), socket(std::move(stream)), tokens(owner.options.messages_per_second) {
     ++data.connections;
   }
@@ -88,9 +126,10 @@ struct WebServer::Data::Client : std::enable_shared_from_this<Client> {
     socket.set_option(websocket::stream_base::decorator(
         [](websocket::response_type& response) { response.set(http::field::server, "spherecut"); }));
     socket.read_message_max(data.options.message_bytes);
+    socket.next_layer().rate_policy().limit(data.options.bytes_per_second);
     // Pings are answered without take_message(); they count like messages. In here nothing may be closed.
     socket.control_callback([this](websocket::frame_type, beast::string_view) {
-      if (!spend())
+      if (!spend(1))
         asio::post(socket.get_executor(), [self = shared_from_this()] { self->close(self->too_many()); });
     });
     socket.async_accept(request, [self = shared_from_this()](beast::error_code error) {
@@ -115,24 +154,29 @@ struct WebServer::Data::Client : std::enable_shared_from_this<Client> {
     });
   }
 
-  /// Whether one message more is within the rate.
-  bool spend() {
+  /// Whether messages that cost so much are within the rate.
+  bool spend(double cost) {
     const Clock::time_point now = Clock::now();
     tokens = std::min(data.options.messages_per_second,
                       tokens + data.options.messages_per_second * std::chrono::duration<double>(now - told).count());
     told = now;
-    if (tokens < 1)
-      return false;
-    tokens -= 1;
-    return true;
+    const bool within = tokens >= 1;
+    tokens -= within ? cost : 0;
+    return within;
   }
   [[nodiscard]] CloseReason too_many() const {
     return {CloseCode::policy, fmt::format("more than {:g} messages a second", data.options.messages_per_second)};
   }
 
+  /// Ends a client that sends more bytes than it may, in whatever form.
+  void check_bytes() {
+    if (opened && !closing && socket.next_layer().rate_policy().spent())
+      close({CloseCode::policy, fmt::format("more than {:g} bytes a second", data.options.bytes_per_second)});
+  }
+
   void take_message() {
     std::optional<CloseReason> reason;
-    if (!spend()) {
+    if (!spend(1)) {
       reason = too_many();
     } else if (!socket.got_text()) {
       reason = CloseReason{CloseCode::unsupported, "binary messages are not taken"};
@@ -217,7 +261,7 @@ struct WebServer::Data::Client : std::enable_shared_from_this<Client> {
 
   Data& data;
   int id;
-  websocket::stream<beast::tcp_stream> socket;
+  websocket::stream<Stream> socket;
   beast::flat_buffer buffer;
   std::deque<Message> queue; // the front is being written
   std::size_t text_waiting = 0;
@@ -231,7 +275,7 @@ namespace {
 
 // One HTTP connection until it becomes a WebSocket.
 struct HttpConnection : std::enable_shared_from_this<HttpConnection> {
-  using Upgrade = std::function<void(beast::tcp_stream, const http::request<http::empty_body>&)>;
+  using Upgrade = std::function<void(Stream, const http::request<http::empty_body>&)>;
 
   HttpConnection(tcp::socket socket, const WebServerOptions& settings, const int& served_port, int& open_connections,
                  std::function<bool()> more_clients, Upgrade upgrade)
@@ -247,7 +291,7 @@ struct HttpConnection : std::enable_shared_from_this<HttpConnection> {
     parser.emplace();
     parser->header_limit(header_bytes);
     parser->body_limit(0);
-    stream.expires_after(http_patience);
+    stream.expires_after(options.patience);
     http::async_read(stream, buffer, *parser, [self = shared_from_this()](beast::error_code error, std::size_t) {
       if (error == http::error::header_limit)
         self->say(http::status::request_header_fields_too_large, "the request is too long", false);
@@ -344,20 +388,36 @@ struct HttpConnection : std::enable_shared_from_this<HttpConnection> {
     response.keep_alive(keep);
   }
 
+  /// An answer on its way.
+  template <typename Response>
+  struct Sending {
+    explicit Sending(std::shared_ptr<Response> answer) : response(std::move(answer)), serializer(*response) {}
+    std::shared_ptr<Response> response;
+    http::response_serializer<typename Response::body_type> serializer;
+  };
+
   template <typename Response>
   void send(std::shared_ptr<Response> response, bool keep) {
-    stream.expires_after(http_patience);
-    Response& message = *response;
-    http::async_write(stream, message,
-                      [self = shared_from_this(), response, keep](beast::error_code error, std::size_t) {
-                        if (!error && keep)
-                          return self->read();
-                        beast::error_code ignored;
-                        self->stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
-                      });
+    send_on(std::make_shared<Sending<Response>>(std::move(response)), keep);
   }
 
-  beast::tcp_stream stream;
+  // Piece by piece: a client has its time for each of them, however long the whole takes.
+  template <typename Response>
+  void send_on(std::shared_ptr<Sending<Response>> sending, bool keep) {
+    stream.expires_after(options.patience);
+    auto& serializer = sending->serializer;
+    http::async_write_some(stream, serializer,
+                           [self = shared_from_this(), sending, keep](beast::error_code error, std::size_t) {
+                             if (!error && !sending->serializer.is_done())
+                               return self->send_on(sending, keep);
+                             if (!error && keep)
+                               return self->read();
+                             beast::error_code ignored;
+                             self->stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
+                           });
+  }
+
+  Stream stream;
   beast::flat_buffer buffer{header_bytes + 4096};
   std::optional<http::request_parser<http::empty_body>> parser;
   const WebServerOptions& options;
@@ -403,7 +463,7 @@ void WebServer::Data::accept() {
       beast::error_code ignored;
       socket.set_option(tcp::no_delay(true), ignored);
       const auto has_room = [this] { return static_cast<int>(clients.size()) < options.clients; };
-      const auto become = [this](beast::tcp_stream stream, const http::request<http::empty_body>& request) {
+      const auto become = [this](Stream stream, const http::request<http::empty_body>& request) {
         const int id = next_client++;
         const auto client = std::make_shared<Client>(*this, id, std::move(stream));
         clients.emplace(id, client);
@@ -420,6 +480,11 @@ void WebServer::Data::tick() {
   timer.async_wait([this](beast::error_code error) {
     if (error || stopping)
       return;
+    std::vector<std::shared_ptr<Client>> open; // to close one takes it out of the list
+    for (const auto& [id, client] : clients)
+      open.push_back(client);
+    for (const auto& client : open)
+      client->check_bytes();
     if (handlers.tick)
       handlers.tick();
     if (!stopping)
@@ -482,6 +547,11 @@ void WebServer::send_binary(int client, std::string bytes) {
 int WebServer::waiting(int client) const {
   const auto found = data_->clients.find(client);
   return found != data_->clients.end() ? found->second->binary_waiting : 0;
+}
+
+void WebServer::charge(int client, double messages) {
+  if (const auto found = data_->clients.find(client); found != data_->clients.end())
+    found->second->tokens -= messages;
 }
 
 void WebServer::close(int client, const CloseReason& reason) {

@@ -27,13 +27,15 @@ struct WebServerOptions {
   int port = 8080;                   // 0: any free one
   /// File of a path of the URL ("/", "/assets/page.js"), or empty: there is none. What it gives must be safe to serve.
   std::function<std::optional<std::filesystem::path>(std::string_view path)> file;
-  std::string no_page;                 // what a GET of the page says when file("/") gives nothing
-  std::size_t message_bytes = 65536;   // longest message taken
-  double messages_per_second = 300;    // per client; as many at once
-  std::size_t text_bytes = 256 * 1024; // text that may wait for a client that does not read
-  int clients = 16;                    // WebSockets at a time
-  int connections = 64;                // of all kinds
-  std::chrono::milliseconds tick{8};   // between two calls of Handlers::tick
+  std::string no_page;                       // what a GET of the page says when file("/") gives nothing
+  std::size_t message_bytes = 4096;          // longest message taken: none of the protocol is half as long
+  double bytes_per_second = 131072;          // off the wire of a WebSocket, in whatever frames; as many at once
+  double messages_per_second = 300;          // per client; as many at once
+  std::size_t text_bytes = 256 * 1024;       // text that may wait for a client that does not read
+  int clients = 16;                          // WebSockets at a time
+  int connections = 64;                      // of all kinds
+  std::chrono::milliseconds tick{8};         // between two calls of Handlers::tick
+  std::chrono::milliseconds patience{15000}; // for an HTTP request, and for each piece of its answer
 };
 
 class WebServer {
@@ -64,6 +66,8 @@ class WebServer {
   void send_binary(int client, std::string bytes);
   /// Binary messages of a client that are not written to its socket yet.
   [[nodiscard]] int waiting(int client) const;
+  /// What a message has cost beyond one, in messages: work counts like the number of them.
+  void charge(int client, double messages);
   void close(int client, const CloseReason& reason);
 
  private:

@@ -171,3 +171,7 @@ TEST_CASE("Quick remeshing ledger: every back end opens the penny as it should, 
 TEST_CASE("Quick solve rate: the steps that are timed give forces") {
   require_quick_run_passes("solve_rate");
 }
+
+TEST_CASE("Quick real world: what people bring gets its right answer or a clear word") {
+  require_quick_run_passes("real_world");
+}

@@ -17,6 +17,7 @@
 #include <sys/socket.h>
 #include <thread>
 #include <unistd.h>
+#include <utility>
 
 using namespace spherecut;
 using namespace spherecut::app;
@@ -60,6 +61,13 @@ class Client {
         FAIL("not a packet");
     token = reply.token;
     return any;
+  }
+  /// Packets that have come.
+  int count() {
+    int packets = 0;
+    for (std::array<std::byte, 200> bytes{}; ::recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT) >= 0;)
+      ++packets;
+    return packets;
   }
   std::uint64_t token = 0;
   BridgeReply reply;
@@ -166,13 +174,16 @@ TEST_CASE("The first client holds the tool until it falls silent or says goodbye
   state = tick(device, 1);
   CHECK_FALSE(state.connected); // it has sent no pose yet
   REQUIRE(first.listen());
-  CHECK_FALSE(second.listen());
+  REQUIRE(second.listen()); // who comes first is told by the first pose
+  CHECK(second.token != first.token);
   CHECK(first.reply.position == waiting.position);
   CHECK(first.reply.timeout == 0.02);
   CHECK(first.token != 0);
   first.pose(1, {0, 0, 0.04});
-  second.token = first.token; // as if it had heard it
+  const std::uint64_t own = std::exchange(second.token, first.token); // as if it had heard it
   second.pose(9, {1, 1, 1});
+  second.token = own;
+  second.pose(10, {1, 1, 1}); // somebody has been faster
   state = tick(device, 2, {0, 0, 2});
   CHECK(state.connected);
   CHECK(state.position == Vector3(0, 0, 0.04));
@@ -208,6 +219,37 @@ TEST_CASE("The first client holds the tool until it falls silent or says goodbye
   CHECK(counters.others == 3);
   CHECK(counters.poses == 3);
   CHECK(counters.garbage == 0);
+}
+
+TEST_CASE("A hello is answered once, with one packet, until its token comes back from where it was sent") {
+  BridgeDevice device(any_port(), waiting, 1000);
+  Client victim(device.port()); // whose address a forger writes on its hellos
+  Client client(device.port());
+  std::uint64_t t = 0;
+  for (int i = 0; i < 5; ++i)
+    victim.hello();
+  int answers = 0;
+  for (; t < 300; ++t) {
+    tick(device, t);
+    answers += victim.count();
+  }
+  CHECK(answers == 5);
+  CHECK(device.counters().clients == 0);
+  for (int i = 0; i < 10; ++i) { // nor does it keep anyone else from the tool
+    victim.hello();
+    tick(device, t++);
+  }
+  client.hello();
+  tick(device, t++);
+  REQUIRE(client.listen());
+  const std::uint64_t token = client.token;
+  client.token = token + 1;
+  client.pose(1, {0, 0, 0.01});
+  CHECK_FALSE(tick(device, t++).connected);
+  client.token = token;
+  client.pose(1, {0, 0, 0.01});
+  CHECK(tick(device, t++).connected);
+  CHECK(device.counters().clients == 1);
 }
 
 TEST_CASE("A pose that is not finite is counted, and the poses after it are those that were sent") {

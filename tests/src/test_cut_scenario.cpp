@@ -91,7 +91,7 @@ TEST_CASE("Toughness makes a blade that is resisted; without it there is none") 
   CHECK(scenario.blade->sharpness == 0.8);
   CHECK(scenario.blade->friction == 30);
   CHECK(scenario.blade->flank == 0.004);
-  CHECK_THAT(complaint(tough("-1") + edge + two_poses), Contains("material.toughness") && Contains("0 < value"));
+  CHECK_THAT(complaint(tough("-1") + edge + two_poses), Contains("material.toughness") && Contains("<= value"));
   CHECK_THAT(complaint(tough("50") + edge + "advance = 0.5\n" + two_poses),
              Contains("blade.advance = 0.5") && Contains("allowed: one of them"));
   CHECK(scenario_of(cut_block + edge + "advance = 0.5\n" + two_poses).blade->advance == 0.5);
@@ -108,7 +108,7 @@ TEST_CASE("Every offence of a cut names file, line, key, value and what is allow
       {"", {"no tool, no blade and no precut"}},
       {"[[precut]]\nshape = \"disc\"\n", {"precut[1].centre is missing", "precut[1].radius is missing"}},
       {"[[precut]]\nshape = \"cone\"\n", {":16:", "precut[1].shape", "cone", "polygon"}},
-      {replaced(disc_precut, "radius = 0.01", "radius = 0"), {":19:", "precut[1].radius", "0 < value"}},
+      {replaced(disc_precut, "radius = 0.01", "radius = 0"), {":19:", "precut[1].radius", "<= value"}},
       {replaced(disc_precut, "radius = 0.01", "radius = 10.1"), {":19:", "precut[1].radius = 10.1 m: out of range"}},
       {replaced(disc_precut, "[0, 0, 0.016]", "[0.10000000000000001, 1, inf]"),
        {":17:", "precut[1].centre = [0.1, 1, inf] m"}},
@@ -139,8 +139,8 @@ TEST_CASE("Every offence of a cut names file, line, key, value and what is allow
       {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\n" + replaced(two_poses, "[0.1, 0, 0]", "[inf, 0, 0]"),
        {":22:", "blade.path[2].position", "inf"}},
       {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nstep = 3\n" + two_poses, {":17:", "blade.step = 3 s", "1 s"}},
-      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nedge_radius = 0\n" + two_poses, {":17:", "edge_radius", "0 < value"}},
-      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nsharpness = 0\n" + two_poses, {":17:", "sharpness", "0 < value <= 1"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nedge_radius = 0\n" + two_poses, {":17:", "edge_radius", "<= value"}},
+      {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nsharpness = 0\n" + two_poses, {":17:", "sharpness", "0.001 <= value <= 1"}},
       {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nsharpness = 0.5\n" + two_poses,
        {":17:", "blade.sharpness", "material.toughness"}},
       {"[blade]\nedge = [[0, 0, 0], [0, 0, 1]]\nflank = 0.01\nfriction = 50\n" + two_poses,

@@ -664,3 +664,37 @@ TEST_CASE("Rebuilds that miss their budget coarsen the next ones, quick ones ref
     rule.rebuilt(1);
   CHECK(rule.level() == most_degradation);
 }
+
+TEST_CASE("A device has the body wherever it touches, also where the scenario's own path never does") {
+  const auto with_path = [](const Vector3& from, const Vector3& to) {
+    const std::string text = small_scenario;
+    const auto approach = text.find("[tool.approach]"), output = text.find("[output]");
+    return text.substr(0, approach) +
+           fmt::format(
+               "[[tool.path]]\ntime = 0\nposition = [{}, {}, {}]\n[[tool.path]]\ntime = 1\nposition = [{}, {}, {}]\n",
+               from.x(), from.y(), from.z(), to.x(), to.y(), to.z()) +
+           text.substr(output);
+  };
+  const std::string above = with_path({0, 0, 0.05}, {0.02, 0, 0.05}); // 20 mm over the block
+  const auto force_at = [](HapticSimulation& simulation, const Vector3& place) {
+    ContactSnapshot snapshot;
+    simulation.prepare(device_at(0, place + Vector3(0, 0, 0.01)));
+    for (std::uint64_t tick = 0; tick <= 10; ++tick) // down to it, as a hand comes
+      simulation.solve(device_at(tick, place + Vector3(0, 0, 0.001 * static_cast<double>(10 - tick))), 0, snapshot);
+    return snapshot.force;
+  };
+  for (const std::string method : {"galerkin", "collocation"})
+    for (const Vector3& place : {Vector3(0, 0, 0.027), Vector3(-0.012, 0.008, 0.027)}) {
+      const std::string how = "[method]\nname = \"" + method + "\"\n";
+      HapticSimulation aside(scenario_of(above + how));
+      HapticSimulation there(scenario_of(with_path(place + Vector3(0, 0, 0.01), place) + how));
+      CHECK(aside.session().touches());
+      const Vector3 force = force_at(aside, place), expected = force_at(there, place);
+      INFO(method << " at " << place.transpose() << ": " << force.transpose() << " N, expected "
+                  << expected.transpose());
+      CHECK(expected.z() > 0.05);
+      CHECK((force - expected).norm() < 0.05 * expected.norm());
+    }
+  // A run keeps to its path, and is as cheap as before.
+  CHECK_FALSE(Session(scenario_of(above)).touches());
+}

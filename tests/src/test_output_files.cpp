@@ -101,22 +101,71 @@ TEST_CASE("A file that cannot be replaced keeps its old contents") {
   CHECK(read_file(file) == "new");
 }
 
+namespace {
+
+void claimed(const std::filesystem::path& folder) {
+  static_cast<void>(claim_results_folder(folder));
+}
+
+} // namespace
+
 TEST_CASE("A results folder is made, and refused when it holds results or is none") {
   const TemporaryFolder folder;
   const auto out = folder.path() / "a" / "b";
-  claim_results_folder(out);
+  CHECK(claim_results_folder(out).holds());
   CHECK(std::filesystem::is_directory(out));
+  CHECK(std::filesystem::is_empty(out));
   write_file(out / "notes.txt", "mine");
-  CHECK_NOTHROW(claim_results_folder(out));
+  CHECK(claim_results_folder(out).holds());
   for (const std::string name : {"forces.csv", "summary.json", "series.pvd", "frames"}) {
     write_file(out / name, "old");
-    CHECK_THROWS_WITH(claim_results_folder(out), Contains("holds results already") && Contains(name));
+    CHECK_THROWS_WITH(claimed(out), Contains("holds results already") && Contains(name));
     CHECK(read_file(out / name) == "old");
     std::filesystem::remove(out / name);
   }
   const auto file = write_file(folder.path() / "file", "");
-  CHECK_THROWS_WITH(claim_results_folder(file), Contains("file"));
-  CHECK_THROWS_WITH(claim_results_folder(file / "inside"), Contains("cannot be created"));
+  CHECK_THROWS_WITH(claimed(file), Contains("file"));
+  CHECK_THROWS_WITH(claimed(file / "inside"), Contains("cannot be created"));
+}
+
+TEST_CASE("A results folder that somebody writes into is refused, and one that a killed program left locked is not") {
+  const TemporaryFolder folder;
+  const auto out = folder.path() / "out";
+  ResultsClaim claim = claim_results_folder(out);
+  CHECK_THROWS_WITH(claimed(out), Contains("another run writes into it") && Contains(out.string()));
+  ResultsClaim taken = std::move(claim);
+  CHECK(taken.holds());
+  CHECK_THROWS_AS(claimed(out), InputError);
+  taken = ResultsClaim();
+  CHECK(std::filesystem::is_empty(out));
+  write_file(out / ".spherecut.lock", ""); // of a program that was killed: nobody has it locked
+  CHECK(claim_results_folder(out).holds());
+}
+
+TEST_CASE("A file that must be new never replaces one, nor goes through a link") {
+  const TemporaryFolder folder;
+  const auto file = write_file(folder.path() / "kept", "old");
+  CHECK_THROWS_AS(OutputFile(file, OutputFile::Made::anew), OutputError);
+  std::filesystem::create_symlink(folder.path() / "elsewhere", folder.path() / "link");
+  CHECK_THROWS_AS(OutputFile(folder.path() / "link", OutputFile::Made::anew), OutputError);
+  CHECK(read_file(file) == "old");
+  CHECK(!std::filesystem::exists(folder.path() / "elsewhere"));
+}
+
+TEST_CASE("Two runs into one folder at once: the second is refused and the results are the first's") {
+  const TemporaryFolder folder;
+  const auto scenario = write_file(folder.path() / "s.toml", small_scenario);
+  const std::string out = (folder.path() / "out").string();
+  const std::string command = spherecut_command({"run", scenario.string(), "--out", out});
+  const ProgramResult both =
+      run_shell(command + " & first=$!; " + command + "; echo second $?; wait $first; echo first $?");
+  INFO(both.out << both.err);
+  const bool second_refused =
+      both.out.find("second 2") != std::string::npos && both.out.find("first 0") != std::string::npos;
+  const bool first_refused =
+      both.out.find("second 0") != std::string::npos && both.out.find("first 2") != std::string::npos;
+  CHECK(second_refused != first_refused);
+  CHECK(!std::filesystem::exists(folder.path() / "out" / ".spherecut.lock"));
 }
 
 TEST_CASE("Both summaries give the whole account of a resisted blade's work") {

@@ -12,7 +12,9 @@
 
 #include <catch2/catch.hpp>
 #include <cstring>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 #include <thread>
 
 using namespace spherecut;
@@ -65,10 +67,10 @@ PointerTarget target(const Vector3& position, std::uint32_t jumps = 0, HandMode 
 /// A hub on a server of its own, driven by a thread.
 class Served {
  public:
-  explicit Served(const std::string& text = live_block) {
+  explicit Served(const std::string& text = live_block, const std::filesystem::path& recordings = {}) {
     HubOptions settings;
     settings.scenario = write_file(folder_.path() / "live.toml", text);
-    settings.recordings = folder_.path() / "recordings";
+    settings.recordings = recordings.empty() ? folder_.path() / "recordings" : recordings;
     write_file(folder_.path() / "bad.toml", replaced(text, "young_modulus = 1e4", "young_modulus = -1"));
     hub_ = std::make_unique<Hub>(settings, [](const std::string&) {});
     WebServerOptions options;
@@ -524,6 +526,52 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
   }
   CHECK(first.sound);
   CHECK(second.sound);
+}
+
+TEST_CASE("What lies beside the scenarios and recordings, and how much of it, stops no viewer") {
+  const Served served;
+  const auto& folder = served.folder().path();
+  REQUIRE(mkfifo((folder / "pipe.toml").c_str(), 0600) == 0);
+  std::filesystem::create_symlink("/dev/zero", folder / "endless.toml");
+  std::filesystem::create_directory(folder / "folder.toml");
+  write_file(folder / "long.toml", "# " + std::string(5'000'000, 'x'));
+  const auto recordings = folder / "recordings";
+  std::filesystem::create_directory(recordings);
+  REQUIRE(mkfifo((recordings / "pipe.recording").c_str(), 0600) == 0);
+  for (int i = 0; i < 4000; ++i)
+    write_file(recordings / fmt::format("{:04}-{}.recording", i, std::string(200, 'n')), "");
+  Viewer viewer(served.port());
+  REQUIRE(viewer.until([&] { return !viewer.welcome.is_null(); }));
+  const Json& welcome = viewer.welcome;
+  std::vector<std::string> names;
+  for (const Json& entry : welcome["scenarios"])
+    names.push_back(entry["name"]);
+  CHECK(names == std::vector<std::string>{"bad.toml", "live.toml", "long.toml"});
+  CHECK(welcome["recordings"].size() >= 100);
+  CHECK(welcome["recordings"].size() + welcome["recordings_left_out"].get<std::size_t>() == 4000);
+  viewer.say({{"type", "take"}});
+  for (const std::string name : {"pipe.toml", "endless.toml", "folder.toml", "../live.toml", "long.toml"}) {
+    const std::size_t before = viewer.errors.size();
+    viewer.say({{"type", "scenario"}, {"name", name}});
+    REQUIRE(viewer.until([&] { return viewer.errors.size() > before; }));
+    CHECK(viewer.errors.back()["code"] == "refused");
+  }
+  const std::size_t before = viewer.errors.size();
+  viewer.say({{"type", "replay"}, {"name", "pipe.recording"}});
+  CHECK(viewer.until([&] { return viewer.errors.size() > before; }));
+}
+
+TEST_CASE("A second server is refused the folder that another records into") {
+  const Served first;
+  const Served second(live_block, first.folder().path() / "recordings");
+  Viewer one(first.port()), two(second.port());
+  one.say({{"type", "take"}});
+  two.say({{"type", "take"}});
+  one.say({{"type", "record"}, {"on", true}});
+  REQUIRE(one.until([&] { return !one.recording.is_null(); }));
+  two.say({{"type", "record"}, {"on", true}});
+  REQUIRE(two.until([&] { return !two.errors.empty(); }));
+  CHECK_THAT(two.errors.back()["text"].get<std::string>(), Contains("another run writes into it"));
 }
 
 TEST_CASE("Serving with --open shows the page in the user's browser") {

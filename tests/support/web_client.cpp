@@ -101,6 +101,12 @@ void WebSocketClient::ping() {
   data_->socket.ping({}, error);
 }
 
+bool WebSocketClient::send_raw(const std::string& bytes) {
+  beast::error_code error;
+  boost::asio::write(data_->socket.next_layer(), boost::asio::buffer(bytes), error);
+  return !error;
+}
+
 std::optional<WebMessage> WebSocketClient::receive(double seconds) {
   if (!data_->open)
     return std::nullopt;

@@ -38,6 +38,8 @@ class WebSocketClient {
   void send(const std::string& text);
   void send_binary(const std::string& bytes);
   void ping();
+  /// Bytes as they are, past the protocol; false: the connection takes no more.
+  bool send_raw(const std::string& bytes);
   /// The next message; none within the time, or when the connection has ended.
   std::optional<WebMessage> receive(double seconds = 30);
   /// Receives until the connection ends; false: not within the time.

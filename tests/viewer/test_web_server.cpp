@@ -7,8 +7,14 @@
 #include "topology/errors.hpp"
 
 #include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/write.hpp>
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -45,6 +51,10 @@ class TestServer {
       }
       if (text == "bad")
         return CloseReason{CloseCode::invalid, "this is bad"};
+      if (text == "dear") {
+        ++dear;
+        server_->charge(client, 1000);
+      }
       if (text == "flood")
         flooded_.push_back(client);
       if (text == "talk")
@@ -73,7 +83,8 @@ class TestServer {
   TestServer& operator=(const TestServer&) = delete;
 
   [[nodiscard]] int port() const { return server_->port(); }
-  std::atomic<int> opened{0}, closed{0}, refused{0}, floods{0};
+  void write(const std::string& name, const std::string& text) const { std::ofstream(folder_.path() / name) << text; }
+  std::atomic<int> opened{0}, closed{0}, refused{0}, floods{0}, dear{0};
 
  private:
   TemporaryFolder folder_;
@@ -82,6 +93,34 @@ class TestServer {
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
+
+/// A GET that reads a million bytes at a time, asked before each whether to go on; true: all of the body came.
+bool slow_download(int port, const std::string& target, const std::function<bool(std::size_t)>& go_on) {
+  boost::asio::io_context context;
+  boost::asio::ip::tcp::socket socket(context);
+  socket.open(boost::asio::ip::tcp::v4());
+  socket.set_option(boost::asio::socket_base::receive_buffer_size(65536));
+  socket.connect({boost::asio::ip::make_address("127.0.0.1"), static_cast<std::uint16_t>(port)});
+  const std::string request =
+      "GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(port) + "\r\nConnection: close\r\n\r\n";
+  boost::asio::write(socket, boost::asio::buffer(request));
+  std::string head;
+  boost::system::error_code error;
+  const std::size_t head_size = boost::asio::read_until(socket, boost::asio::dynamic_buffer(head), "\r\n\r\n", error);
+  if (error)
+    return false;
+  const std::size_t length = std::stoul(head.substr(head.find("Content-Length: ") + 16));
+  std::size_t taken = head.size() - head_size;
+  std::vector<char> block(1'000'000);
+  while (taken < length && go_on(taken)) {
+    taken +=
+        boost::asio::read(socket, boost::asio::buffer(block.data(), std::min(block.size(), length - taken)), error);
+    if (error)
+      return false;
+  }
+  go_on(taken);
+  return taken == length;
+}
 
 bool echoes(WebSocketClient& client) {
   client.send("echo");
@@ -214,6 +253,74 @@ TEST_CASE("A malformed, binary, long or too frequent message ends that client an
         }) == 1008);
   CHECK(echoes(good));
   CHECK(soon([&] { return server.closed == 6; }));
+}
+
+TEST_CASE("Frames without content, and messages without an end, cost what they weigh and end their client") {
+  WebServerOptions options;
+  options.bytes_per_second = 20'000;
+  const TestServer server(options);
+  WebSocketClient good(server.port());
+  REQUIRE(echoes(good));
+  const std::string mask(4, '\0');
+  const auto ended_by = [&](const std::string& first, const std::string& again) {
+    WebSocketClient client(server.port());
+    REQUIRE(client.open());
+    const int before = server.closed;
+    std::string frames = first;
+    while (frames.size() < 60'000)
+      frames += again;
+    client.send_raw(frames);
+    return soon([&] { return server.closed > before; });
+  };
+  CHECK(ended_by(std::string("\x01\x80", 2) + mask, std::string("\x00\x80", 2) + mask)); // empty continuations
+  CHECK(ended_by(std::string("\x01\x81", 2) + mask + "x", std::string("\x00\x81", 2) + mask + "x"));
+  CHECK(echoes(good));
+}
+
+TEST_CASE("What a client sends within its messages is counted in bytes, and in what it costs") {
+  WebServerOptions options;
+  options.bytes_per_second = 12'000;
+  TestServer server(options);
+  WebSocketClient good(server.port());
+  WebSocketClient heavy(server.port());
+  const std::string nested(4000, '[');
+  int heard = 0;
+  for (int i = 0; i < 300 && heavy.open(); ++i) { // as many messages as are allowed at once, 1.2 MB
+    heavy.send(nested);
+    while (heavy.receive(0))
+      ++heard;
+  }
+  CHECK(heavy.wait_for_close());
+  CHECK((heavy.close_code() == 1008 || heavy.close_code() == 1006));
+  CHECK(server.refused < 40);
+  CHECK(echoes(good));
+  WebSocketClient costly(server.port());
+  for (int i = 0; i < 10; ++i)
+    costly.send("dear"); // costs 1000 messages each
+  CHECK(costly.wait_for_close());
+  CHECK(costly.close_code() == 1008);
+  CHECK(server.dear <= 2);
+}
+
+TEST_CASE("A download goes on for as long as its client takes it, and one that takes nothing is ended") {
+  WebServerOptions options;
+  options.patience = std::chrono::milliseconds(400);
+  const TestServer server(options);
+  server.write("long.txt", std::string(24'000'000, 'l')); // more than the system keeps between the two
+  std::size_t taken = 0;
+  const bool whole = slow_download(server.port(), "/long.txt", [&](std::size_t bytes) {
+    taken = bytes;
+    std::this_thread::sleep_for(std::chrono::milliseconds(100)); // 24 of these: six times the patience
+    return true;
+  });
+  CHECK(whole);
+  CHECK(taken == 24'000'000);
+  int rests = 0;
+  CHECK_FALSE(slow_download(server.port(), "/long.txt", [&](std::size_t) {
+    if (rests++ == 0)
+      std::this_thread::sleep_for(std::chrono::seconds(3));
+    return true;
+  }));
 }
 
 TEST_CASE("A client that does not read costs one message, and too much text ends it") {

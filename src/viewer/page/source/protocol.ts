@@ -23,8 +23,17 @@ export interface Welcome {
   id: number;
   server: string;
   scenarios: { name: string; title: string }[];
+  scenarios_left_out: number;
   recordings: Recording[];
-  limits: { message_bytes: number; messages_per_second: number; credit: number; viewers: number; speed: number };
+  recordings_left_out: number;
+  limits: {
+    message_bytes: number;
+    messages_per_second: number;
+    bytes_per_second: number;
+    credit: number;
+    viewers: number;
+    speed: number;
+  };
 }
 
 export type ToolShape =
