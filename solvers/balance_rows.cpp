@@ -4,6 +4,7 @@
 #include "topology/errors.hpp"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <fmt/format.h>
 #include <numeric>
 #include <span>
@@ -18,6 +19,24 @@ constexpr double pair_reach = 0.01;         // nodes nearer than this, in spacin
 constexpr double pressure_smoothing = 0.01; // alpha
 
 using Block = Eigen::Matrix4d;
+
+/// Axes along which a fixed region that leaves others free holds the body's surface of a cell whose node it does not
+/// hold: between the nodes of a coarse set such cells reach the surface too, and what holds them there pulls at them.
+std::array<bool, 3> held_beside(const Problem& problem, const topology::BoundaryFace& face,
+                                const std::array<bool, 3>& of_node) {
+  const Vector3 normal = face.area.normalized();
+  std::array<bool, 3> held{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    std::array<bool, 3> axis{};
+    axis[a] = true;
+    held[a] = problem.prescribed_region.holds(face.centroid, normal, axis);
+  }
+  if (held[0] && held[1] && held[2])
+    return {};
+  for (std::size_t a = 0; a < 3; ++a)
+    held[a] = held[a] && !of_node[a];
+  return held;
+}
 
 } // namespace
 
@@ -49,8 +68,12 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
   for (int l = 0; mixed && l < std::ssize(cells.lips); ++l)
     lips[cells.lips[l].node].push_back(l);
   std::vector<std::vector<int>> boundary(count);
-  for (int b = 0; mixed && b < std::ssize(cells.boundary); ++b)
+  for (int b = 0; b < std::ssize(cells.boundary); ++b)
     boundary[cells.boundary[b].node].push_back(b);
+  std::vector<std::array<bool, 3>> held(static_cast<std::size_t>(count), {false, false, false});
+  for (const Prescribed& entry : problem.prescribed)
+    for (std::size_t c = 0; c < 3; ++c)
+      held[entry.node][c] |= entry.components[c];
 
   const FaceOperators operators = face_operators(cells, problem, spheres, supports, wanted);
   ShapeFunctions shape;
@@ -118,6 +141,23 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
         own.block<3, 1>(0, 3) += 0.5 * area;
         own(3, 3) += smoothing;
       }
+    }
+    for (int b = 0; problem.prescribed_region && b < std::ssize(boundary[i]); ++b) {
+      const topology::BoundaryFace& face = cells.boundary[boundary[i][b]];
+      const std::array<bool, 3> axes = held_beside(problem, face, held[i]);
+      if (!(axes[0] || axes[1] || axes[2]) || !evaluate(spheres, face.centroid, shape))
+        continue;
+      for (int k = 0; k < shape.size(); ++k) {
+        const Vector3 g = shape.gradient(k);
+        const Matrix3 pull = lambda * face.area * g.transpose() + mu * g.dot(face.area) * Matrix3::Identity() +
+                             mu * g * face.area.transpose();
+        for (int a = 0; a < 3; ++a)
+          if (axes[a])
+            block(shape.nodes[k]).block<1, 3>(a, 0) -= pull.row(a);
+      }
+      for (int a = 0; mixed && a < 3; ++a)
+        if (axes[a])
+          block(i)(a, 3) += face.area[a];
     }
     if (mixed) {
       block(i)(3, 3) += cells.volumes[i] / problem.material.lame_lambda();

@@ -4,6 +4,7 @@
 #include "solvers/elimination_order.hpp"
 #include "solvers/factorisation.hpp"
 #include "topology/errors.hpp"
+#include "topology/point_tree.hpp"
 #include "topology/voronoi_cells.hpp"
 
 #include <algorithm>
@@ -217,23 +218,82 @@ std::vector<Field> Collocation::responses_to(const MatrixX& right) const {
   return responses;
 }
 
+std::vector<std::vector<Collocation::CellShare>> Collocation::loaded_cells(const std::vector<int>& nodes) const {
+  constexpr double facing = 0.3; // cosine: what faces the tool less is not pressed by it
+  const NodeCloud& cloud = problem_.nodes;
+  std::vector<std::vector<CellShare>> cells;
+  std::vector<int> place(cloud.positions.size(), -1);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    cells.push_back({{nodes[k], 1}});
+    if (cloud.kinds[nodes[k]] == NodeKind::surface || cloud.kinds[nodes[k]] == NodeKind::edge)
+      place[nodes[k]] = static_cast<int>(k);
+  }
+  const bool reaches = std::any_of(cells_.boundary.begin(), cells_.boundary.end(),
+                                   [&](const auto& face) { return cloud.kinds[face.node] == NodeKind::interior; });
+  if (!reaches)
+    return cells;
+  std::vector<Vector3> skin;
+  std::vector<int> ids;
+  for (int i = 0; i < cloud.size(); ++i)
+    if (cloud.kinds[i] == NodeKind::surface || cloud.kinds[i] == NodeKind::edge) {
+      skin.push_back(cloud.positions[i]);
+      ids.push_back(i);
+    }
+  if (ids.empty())
+    return cells;
+  const topology::PointTree tree(skin);
+  std::vector<double> areas(nodes.size(), 0);
+  for (const topology::BoundaryFace& face : cells_.boundary) {
+    const double area = face.area.norm();
+    if (!(area > 0) || (problem_.touched_from && face.area.dot(*problem_.touched_from) < facing * area))
+      continue;
+    const bool is_own = cloud.kinds[face.node] != NodeKind::interior;
+    const int owner = is_own ? face.node : ids[tree.nearest(face.centroid).index];
+    if (place[owner] < 0 ||
+        (!is_own && problem_.incision && problem_.incision->blocks(cloud.positions[face.node], cloud.positions[owner])))
+      continue;
+    std::vector<CellShare>& shares = cells[place[owner]];
+    if (is_own)
+      areas[place[owner]] += area;
+    else
+      shares.push_back({face.node, area});
+  }
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    double whole = areas[k];
+    for (std::size_t s = 1; s < cells[k].size(); ++s)
+      whole += cells[k][s].part;
+    if (!(areas[k] > 0)) // nothing of its own faces the tool
+      cells[k].resize(1);
+    if (cells[k].size() == 1)
+      continue;
+    cells[k].front().part = areas[k] / whole;
+    for (std::size_t s = 1; s < cells[k].size(); ++s)
+      cells[k][s].part /= whole;
+  }
+  return cells;
+}
+
 std::vector<Field> Collocation::force_responses(const std::vector<int>& candidates) const {
   require_nodes(candidates);
+  const auto cells = loaded_cells(candidates);
   MatrixX right = MatrixX::Zero(report_.unknowns, 3 * std::ssize(candidates));
   for (Eigen::Index c = 0; c < std::ssize(candidates); ++c)
-    for (int axis = 0; axis < 3; ++axis)
-      if (!constrained_[candidates[c]][axis])
-        right(stride_ * candidates[c] + axis, 3 * c + axis) = 1;
+    for (const CellShare& share : cells[c])
+      for (int axis = 0; axis < 3; ++axis)
+        if (!constrained_[share.cell][axis])
+          right(stride_ * share.cell + axis, 3 * c + axis) += share.part;
   return responses_to(right);
 }
 
 std::vector<Field> Collocation::case_responses(const std::vector<int>& nodes, const MatrixX& forces) const {
   require_cases(nodes, forces);
   MatrixX right = MatrixX::Zero(report_.unknowns, forces.cols());
+  const auto cells = loaded_cells(nodes);
   for (Eigen::Index k = 0; k < std::ssize(nodes); ++k)
-    for (int c = 0; c < 3; ++c)
-      if (!constrained_[nodes[k]][c])
-        right.row(Eigen::Index{stride_} * nodes[k] + c) += forces.row(3 * k + c);
+    for (const CellShare& share : cells[k])
+      for (int c = 0; c < 3; ++c)
+        if (!constrained_[share.cell][c])
+          right.row(Eigen::Index{stride_} * share.cell + c) += share.part * forces.row(3 * k + c);
   return responses_to(right);
 }
 
@@ -270,8 +330,10 @@ double Collocation::residual(const Field& field, const std::vector<int>& loaded_
   std::vector<Vector3> applied = loads_;
   for (Vector3& force : applied)
     force *= field.load_factor;
+  const auto cells = loaded_cells(loaded_nodes);
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
-    applied[loaded_nodes[k]] += nodal_forces[k];
+    for (const CellShare& share : cells[k])
+      applied[share.cell] += share.part * nodal_forces[k];
   double worst = 0, largest = 0;
   for (int i = 0; i < problem_.nodes.size(); ++i) {
     const Vector3 force = balance(i, field);

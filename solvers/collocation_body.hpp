@@ -55,6 +55,13 @@ class Collocation : public ElasticBody {
   /// Rows of node i in it: visit(row 0 to 3, column, value).
   template <typename Visit>
   void visit_rows(int i, const Visit& visit) const;
+  /// Cells that a force on a node acts on, with their parts of it: its own, and those of nodes within the body that
+  /// reach the surface nearest to it between the nodes of a coarse set.
+  struct CellShare {
+    int cell;
+    double part;
+  };
+  [[nodiscard]] std::vector<std::vector<CellShare>> loaded_cells(const std::vector<int>& nodes) const;
   /// Stress of a strain as far as the displacements carry it: without the pressure where that is an unknown.
   [[nodiscard]] Matrix3 stress_of(const Matrix3& strain) const {
     const double lambda = mixed_ ? 0 : problem_.material.lame_lambda();

@@ -16,6 +16,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <fmt/format.h>
@@ -42,6 +43,13 @@ void require_own(const ContactPatch& patch, const ContactState& state) {
     throw InputError(fmt::format("a contact's state on {} candidates for a patch of {}: it is another patch's; among() "
                                  "takes it to other candidates",
                                  state.nodal_forces.size(), count));
+}
+
+/// Gap between the tool and the surface of a candidate that has moved by u.
+Gap gap_of(const PressingTool& tool, const ContactPatch& patch, int c, const Vector3& u, double hold = 0) {
+  Gap gap = contact_gap(tool, patch.rest[c] + u, hold);
+  gap.distance -= lift_of(patch, c);
+  return gap;
 }
 
 VectorX displacement_of(const ContactPatch& patch, const std::vector<Vector3>& forces) {
@@ -109,24 +117,30 @@ ContactState resting(const ContactPatch& patch, const topology::ToolPose& pose) 
   return state;
 }
 
-/// Nodes with prescribed displacements `values` on `held`, the others free of force.
+/// Nodes with prescribed displacements `values` on `held`, the others free of force. Along an axis that the body itself
+/// is held at a node no force moves it, and it gets none.
 void hold(const ContactPatch& patch, const std::vector<int>& held, const std::vector<Vector3>& values,
           ContactState& state) {
-  const auto count = static_cast<Eigen::Index>(held.size());
-  MatrixX compliance(3 * count, 3 * count);
-  VectorX right(3 * count);
-  for (Eigen::Index a = 0; a < count; ++a) {
-    right.segment<3>(3 * a) = values[static_cast<std::size_t>(a)] - patch.base_displacement.segment<3>(3 * held[a]);
-    for (Eigen::Index b = 0; b < count; ++b)
-      compliance.block<3, 3>(3 * a, 3 * b) = patch.compliance.block<3, 3>(3 * held[a], 3 * held[b]);
-  }
-  const VectorX forces = compliance.partialPivLu().solve(right);
+  constexpr double rigid = 1e-9; // of the softest entry's compliance
+  double softest = 0;
+  for (const int c : held)
+    softest = std::max(softest, patch.compliance.diagonal().segment<3>(3 * c).maxCoeff());
+  std::vector<Eigen::Index> rows;
+  std::vector<double> way;
+  for (std::size_t a = 0; a < held.size(); ++a)
+    for (int axis = 0; axis < 3; ++axis)
+      if (const Eigen::Index row = 3 * held[a] + axis; patch.compliance(row, row) > rigid * softest) {
+        rows.push_back(row);
+        way.push_back(values[a][axis] - patch.base_displacement[row]);
+      }
+  const MatrixX compliance = patch.compliance(rows, rows);
+  const VectorX forces = compliance.partialPivLu().solve(Eigen::Map<const VectorX>(way.data(), std::ssize(way)));
   std::fill(state.nodal_forces.begin(), state.nodal_forces.end(), Vector3::Zero());
   std::fill(state.active.begin(), state.active.end(), 0);
-  for (Eigen::Index a = 0; a < count; ++a) {
-    state.nodal_forces[held[a]] = forces.segment<3>(3 * a);
-    state.active[held[a]] = 1;
-  }
+  for (Eigen::Index k = 0; k < std::ssize(rows); ++k)
+    state.nodal_forces[static_cast<std::size_t>(rows[k] / 3)][rows[k] % 3] = forces[k];
+  for (const int c : held)
+    state.active[c] = 1;
   state.displacement = displacement_of(patch, state.nodal_forces);
 }
 
@@ -151,7 +165,7 @@ void press_normally(const ContactPatch& patch, const PressingTool& tool, const C
     const VectorX base = displacement_of_few(patch, along);
     for (int c = 0; c < count; ++c) {
       const Vector3 u = state.displacement.segment<3>(3 * c);
-      const Gap gap = contact_gap(tool, patch.rest[c] + u, iteration < undecided ? 0 : flank_hold);
+      const Gap gap = gap_of(tool, patch, c, u, iteration < undecided ? 0 : flank_hold);
       normals[c] = gap.normal;
       gaps[c] = gap.distance + gap.normal.dot(base.segment<3>(3 * c) - u);
     }
@@ -191,12 +205,11 @@ void press_frictionless(const ContactPatch& patch, const PressingTool& tool, con
 /// the tool meets it: at the share of the way at which its gap is used up.
 void carry_bonds(const ContactPatch& patch, const PressingTool& before, const PressingTool& tool, ContactState& state) {
   for (int c = 0; c < size_of(patch); ++c) {
-    const Vector3 x = patch.rest[c] + state.displacement.segment<3>(3 * c);
     double rest_of_way = 1;
     if (!state.active[c]) {
       state.bond[c] = state.displacement.segment<3>(3 * c);
-      const double start = contact_gap(before, x).distance;
-      const double end = contact_gap(tool, x).distance;
+      const double start = gap_of(before, patch, c, state.bond[c]).distance;
+      const double end = gap_of(tool, patch, c, state.bond[c]).distance;
       rest_of_way = start > end ? std::clamp(-end / (start - end), 0.0, 1.0) : 0;
     }
     state.bond[c] += rest_of_way * tool_motion(before.pose, tool.pose, patch.rest[c] + state.bond[c]);
@@ -315,7 +328,7 @@ void press_bonded(const ContactPatch& patch, const PressingTool& tool, const Con
       if (caught[c])
         continue;
       const Vector3 u = state.displacement.segment<3>(3 * c);
-      const Gap gap = contact_gap(tool, patch.rest[c] + u);
+      const Gap gap = gap_of(tool, patch, c, u);
       if (gap.distance < -options.gap_tolerance) {
         caught[c] = 1;
         state.bond[c] = u - gap.distance * gap.normal;
@@ -335,9 +348,12 @@ ContactPatch bare_patch(const Discretisation& body, const std::vector<int>& cand
   for (int node : candidates) {
     if (node < 0 || node >= problem.nodes.size())
       throw InputError(fmt::format("candidate node {} does not exist; there are {}", node, problem.nodes.size()));
+    std::array<bool, 3> held{};
     for (const Prescribed& entry : problem.prescribed)
-      if (entry.node == node)
-        throw InputError(fmt::format("candidate node {} is fixed; the tool cannot press on the fixed region", node));
+      for (std::size_t c = 0; c < 3 && entry.node == node; ++c)
+        held[c] |= entry.components[c];
+    if (held[0] && held[1] && held[2])
+      throw InputError(fmt::format("candidate node {} is fixed; the tool cannot press on the fixed region", node));
   }
   ContactPatch patch;
   patch.nodes = candidates;
@@ -466,7 +482,7 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
   for (int c = 0; c < size_of(patch); ++c)
     state.largest_penetration =
         std::max(state.largest_penetration,
-                 -contact_gap(pressed, patch.rest[c] + state.displacement.segment<3>(3 * c), flank_hold).distance);
+                 -gap_of(pressed, patch, c, state.displacement.segment<3>(3 * c), flank_hold).distance);
   summarise(patch, state);
   return state;
 }

@@ -20,6 +20,9 @@ struct ContactPatch {
   std::vector<Vector3> rest;    // their rest positions, m
   std::vector<double> spacings; // m
   std::vector<Vector3> normals; // outward surface normals
+  /// m, how far the surface of a candidate's share reaches beyond its point towards the tool: its gap is less by that.
+  /// Empty: 0.
+  std::vector<double> lifts;
   MatrixX compliance;           // 3m x 3m, m/N
   VectorX base_displacement;    // 3m, m: displacement without tool
   std::vector<Field> responses; // 3m fields for unit forces (with the far field of the coupling included), or fewer
@@ -28,6 +31,10 @@ struct ContactPatch {
   /// known.
   std::uint64_t number = 0;
 };
+
+inline double lift_of(const ContactPatch& patch, int candidate) {
+  return patch.lifts.empty() ? 0 : patch.lifts[static_cast<std::size_t>(candidate)];
+}
 
 /// Whether the patch has the fields of all its unit forces.
 inline bool has_fields(const ContactPatch& patch) {

@@ -2,12 +2,14 @@
 // factored once; loads, contact and haptics then work with its condensed responses.
 #pragma once
 
+#include "solvers/held_region.hpp"
 #include "solvers/material.hpp"
 #include "solvers/nodes.hpp"
 #include "solvers/sight.hpp"
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 namespace spherecut::solvers {
@@ -50,10 +52,14 @@ struct Problem {
   std::vector<Prescribed> prescribed;
   Loads loads;
   /// The part of the surface that `prescribed` holds, told point by point. With it the weak form holds the mean over
-  /// each node's share of that part; without it, the nodes themselves.
-  std::function<bool(const Vector3& x, const Vector3& normal)> prescribed_region;
+  /// each node's share of that part, for every entry of the part held along its components; without it, the nodes
+  /// themselves. A node may have several entries, for axes that are held on different parts.
+  HeldRegion prescribed_region;
   /// Prescribed displacement anywhere on that part, m. Null: Prescribed::value, constant over a node's share.
   std::function<Vector3(const Vector3& x)> prescribed_field;
+  /// Unit vector out of the body towards the tool that is going to touch it. Forces on a node at a sharp edge act on the
+  /// side of its share that faces the tool; where none does alone, on the edge. Empty: on the whole share.
+  std::optional<Vector3> touched_from;
 };
 
 /// What becomes of a piece that is cut off and that no prescribed displacement holds.

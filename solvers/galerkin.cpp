@@ -218,7 +218,7 @@ class Galerkin final : public ElasticBody {
     auto known = contact_means_.find(node);
     if (known == contact_means_.end())
       known = contact_means_
-                  .emplace(node, patches_ ? patches_->mean(node, spheres_, problem_.prescribed_region)
+                  .emplace(node, patches_ ? patches_->contact_mean(node, spheres_, problem_)
                                           : value_at(spheres_, problem_.nodes.positions[node]))
                   .first;
     return known->second;
@@ -266,16 +266,12 @@ class Galerkin final : public ElasticBody {
 
 void Galerkin::hold_surface() {
   patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
-  std::vector<int> nodes;
-  nodes.reserve(problem_.prescribed.size());
-  for (const Prescribed& entry : problem_.prescribed)
-    nodes.push_back(entry.node);
   if (problem_.prescribed_region) {
-    held_ = patches_->means(nodes, spheres_, problem_.prescribed_region);
+    held_ = patches_->means(problem_.prescribed, spheres_, problem_.prescribed_region);
     return;
   }
-  for (int node : nodes)
-    held_.push_back(value_at(spheres_, problem_.nodes.positions[node]));
+  for (const Prescribed& entry : problem_.prescribed)
+    held_.push_back(value_at(spheres_, problem_.nodes.positions[entry.node]));
 }
 
 void Galerkin::treat_unheld(UnheldPieces unheld) {

@@ -35,6 +35,7 @@ class GrowingCollocation final : public Collocation, public Growable {
 
   [[nodiscard]] MatrixX solution(const MatrixX& right) const override;
   /// Whether the window has these nodes and their supports.
+  [[nodiscard]] bool loads_in_window(const std::vector<int>& nodes) const;
   [[nodiscard]] bool in_window(const std::vector<int>& nodes) const;
   [[nodiscard]] MatrixX unit_forces(const std::vector<int>& nodes) const; // by slots
   [[nodiscard]] MatrixX window_solution(const MatrixX& right) const;

@@ -158,17 +158,27 @@ bool GrowingCollocation::in_window(const std::vector<int>& nodes) const {
   });
 }
 
+bool GrowingCollocation::loads_in_window(const std::vector<int>& nodes) const {
+  for (const std::vector<CellShare>& cells : loaded_cells(nodes))
+    for (const CellShare& share : cells)
+      if (slot_[share.cell] < 0)
+        return false;
+  return true;
+}
+
 MatrixX GrowingCollocation::unit_forces(const std::vector<int>& nodes) const {
   MatrixX right = MatrixX::Zero(window_->slots(), 3 * std::ssize(nodes));
+  const auto cells = loaded_cells(nodes);
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
-    for (int axis = 0; axis < 3; ++axis)
-      if (!constrained_[nodes[c]][axis])
-        right(stride_ * slot_[nodes[c]] + axis, 3 * c + axis) = 1;
+    for (const CellShare& share : cells[c])
+      for (int axis = 0; axis < 3; ++axis)
+        if (!constrained_[share.cell][axis])
+          right(stride_ * slot_[share.cell] + axis, 3 * c + axis) += share.part;
   return right;
 }
 
 MatrixX GrowingCollocation::contact_compliance(const std::vector<int>& candidates) const {
-  if (!in_window(candidates))
+  if (!in_window(candidates) || !loads_in_window(candidates))
     return ElasticBody::contact_compliance(candidates);
   const auto count = std::ssize(candidates);
   MatrixX functionals = MatrixX::Zero(window_->slots(), 3 * count);
@@ -180,7 +190,7 @@ MatrixX GrowingCollocation::contact_compliance(const std::vector<int>& candidate
 }
 
 MatrixX GrowingCollocation::compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const {
-  if (!in_window(at) || !in_window(forced))
+  if (!in_window(at) || !in_window(forced) || !loads_in_window(forced))
     return ElasticBody::compliance_between(at, forced);
   const MatrixX solved = window_->solve(unit_forces(forced));
   MatrixX compliance = MatrixX::Zero(3 * std::ssize(at), solved.cols());

@@ -97,7 +97,7 @@ const DisplacementMean& GrowingCut::State::mean(int node) const {
                                               of_lip ? SurfacePatches::Of::faces : SurfacePatches::Of::skin_and_faces);
     known =
         means
-            .emplace(node, known_shares->patches.mean(known_shares->compact[node], *spheres, problem.prescribed_region))
+            .emplace(node, known_shares->patches.contact_mean(known_shares->compact[node], *spheres, problem))
             .first;
   }
   return known->second;

@@ -58,7 +58,7 @@ GrowingCut::Scratch GrowingCut::from_scratch(const std::vector<Vector3>& contact
   MatrixX right = MatrixX::Zero(size, 3 * count + 1);
   std::vector<DisplacementMean> means;
   for (int node : s.options.contact)
-    means.push_back(shares.patches.mean(shares.compact[node], *spheres, problem.prescribed_region));
+    means.push_back(shares.patches.contact_mean(shares.compact[node], *spheres, problem));
   right.col(3 * count) = s.loads;
   for (Eigen::Index c = 0; c < count; ++c)
     for (std::size_t n = 0; n < means[c].nodes.size(); ++n) {

@@ -247,7 +247,7 @@ struct GrowingCut::State {
     };
     const Shares regional(problem, removed, SurfacePatches::Part{around(points_reach), around(nodes_reach)});
     for (const std::size_t c : wanted)
-      contact[c] = regional.patches.mean(regional.compact[options.contact[c]], *spheres, problem.prescribed_region);
+      contact[c] = regional.patches.contact_mean(regional.compact[options.contact[c]], *spheres, problem);
   }
   /// Candidates that the cut has removed are none any more.
   void drop_removed_contact() {

@@ -21,11 +21,10 @@ Shares::Shares(const Problem& problem, const std::vector<char>& removed,
 
 std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& spheres, const Shares& shares) {
   if (problem.prescribed_region) {
-    std::vector<int> nodes;
-    nodes.reserve(problem.prescribed.size());
-    for (const Prescribed& entry : problem.prescribed)
-      nodes.push_back(shares.compact[entry.node]);
-    return shares.patches.means(nodes, spheres, problem.prescribed_region);
+    std::vector<Prescribed> entries = problem.prescribed;
+    for (Prescribed& entry : entries)
+      entry.node = shares.compact[entry.node];
+    return shares.patches.means(entries, spheres, problem.prescribed_region);
   }
   std::vector<DisplacementMean> means;
   means.reserve(problem.prescribed.size());
@@ -36,23 +35,26 @@ std::vector<DisplacementMean> held_means(const Problem& problem, const Spheres& 
 
 std::vector<HeldChange> held_changes(const std::vector<Prescribed>& before, const std::vector<DisplacementMean>& old,
                                      const std::vector<Prescribed>& now, const std::vector<DisplacementMean>& held) {
-  std::unordered_map<int, int> entry;
+  const auto key = [](const Prescribed& one) { // a node has an entry for every set of axes that are held together
+    return 8L * one.node + (one.components[0] ? 1 : 0) + (one.components[1] ? 2 : 0) + (one.components[2] ? 4 : 0);
+  };
+  std::unordered_map<long, int> entry;
   for (int k = 0; k < std::ssize(before); ++k)
-    entry.emplace(before[k].node, k);
+    entry.emplace(key(before[k]), k);
   std::vector<HeldChange> changes;
   for (int k = 0; k < std::ssize(now); ++k) {
-    const auto known = entry.find(now[k].node);
+    const auto known = entry.find(key(now[k]));
     if (known == entry.end()) {
       changes.push_back({-1, k});
       continue;
     }
     const int b = known->second;
     entry.erase(known);
-    if (!equal_to_rounding(held[k], old[b]) || now[k].components != before[b].components)
+    if (!equal_to_rounding(held[k], old[b]))
       changes.push_back({b, k});
   }
   for (int k = 0; k < std::ssize(before); ++k)
-    if (entry.contains(before[k].node))
+    if (entry.contains(key(before[k])))
       changes.push_back({k, -1});
   return changes;
 }

@@ -103,12 +103,12 @@ struct NodalForces {
   }
 };
 
-std::vector<int> closed_entries(const std::vector<char>& closed, int modes) {
+std::vector<int> closed_entries(const std::vector<char>& closed, const LipPatch& lips) {
   std::vector<int> entries;
   for (int p = 0; p < std::ssize(closed); ++p)
     if (closed[p] != 0)
-      for (int m = 0; m < modes; ++m)
-        entries.push_back(modes * p + m);
+      for (int m = 0; m < (lips.pairs[p].slides ? 1 : lips.modes); ++m)
+        entries.push_back(lips.modes * p + m);
   return entries;
 }
 
@@ -148,7 +148,7 @@ int wanted_set(const LipPatch& lips, const LipState& state, double tolerance, st
 
 /// Forces of the closed pairs that bring their openings to zero.
 void hold_closed(const LipPatch& lips, const VectorX& free_opening, LipState& state) {
-  const std::vector<int> a = closed_entries(state.closed, lips.modes);
+  const std::vector<int> a = closed_entries(state.closed, lips);
   state.forces = VectorX::Zero(free_opening.size());
   if (!a.empty()) {
     const VectorX held = gathered(lips.compliance, a, a).partialPivLu().solve(-gathered(free_opening, a));
@@ -225,9 +225,10 @@ ContactPatch held_patch(const ContactPatch& patch, const LipPatch& lips, const s
   held.rest = patch.rest;
   held.spacings = patch.spacings;
   held.normals = patch.normals;
+  held.lifts = patch.lifts;
   held.compliance = patch.compliance;
   held.base_displacement = patch.base_displacement;
-  const std::vector<int> a = closed_entries(closed, lips.modes);
+  const std::vector<int> a = closed_entries(closed, lips);
   if (a.empty()) {
     held.number = patch.number;
     return held;
@@ -275,6 +276,8 @@ LipPatch condense_lips(const Discretisation& body, const std::vector<LipPair>& p
   lips.modes = condition == LipCondition::sticking ? 3 : 1;
   const std::vector<int> nodes = nodes_of(pairs);
   lips.base_opening = openings(body, pairs, lips.modes, {tool != nullptr ? tool->base : body.solve()}).col(0);
+  for (Eigen::Index p = 0; p < std::ssize(pairs); ++p)
+    lips.base_opening[lips.modes * p] += pairs[p].gap;
   if (pairs.empty()) {
     lips.compliance.resize(0, 0);
     lips.tool_of_lips.resize(tool != nullptr ? 3 * std::ssize(tool->nodes) : 0, 0);

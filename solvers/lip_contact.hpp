@@ -14,10 +14,12 @@ std::string_view to_string(LipCondition condition);
 /// Throws InputError naming the value and the three allowed names.
 LipCondition lip_condition_from_string(std::string_view name);
 
-/// Two lip nodes on either face of a cut at one place.
+/// Two lip nodes on either face of a cut at one place, or two nodes of the organ's surface that face each other.
 struct LipPair {
   int plus = -1, minus = -1;
   Vector3 normal = Vector3::Zero(); // unit, from the material of `minus` into that of `plus`
+  double gap = 0;                   // m, between the two at rest, along the normal
+  bool slides = false;              // when closed, whatever the lips do
 };
 
 /// Pairs every lip node with its partner across the sheet. A lip node without one (its partner lay outside the body)
@@ -26,7 +28,7 @@ std::vector<LipPair> lip_pairs(const NodeCloud& nodes);
 
 /// The body seen from its lips and a tool's candidates. A pair force lambda acts as +lambda on `plus` and -lambda on
 /// `minus`; the opening conjugate to it is u_plus - u_minus. Entries come `modes` a pair: the normal component first
-/// (positive when open), then, when the lips stick, two tangential ones.
+/// (positive when open), then, when the lips stick, two tangential ones, which carry nothing in a pair that slides.
 struct LipPatch {
   std::vector<LipPair> pairs;
   int modes = 1;

@@ -60,8 +60,8 @@ DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::v
   return mean;
 }
 
-/// Index of the nearest position that the cut (may be null) does not hide from x; of the nearest when it hides all.
-/// Found sooner where the position `guess` is near.
+} // namespace
+
 int nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>& positions,
                      const topology::Incision* incision, const Vector3& x, int guess) {
   const topology::PointTree::Found nearest = tree.nearest(x, guess);
@@ -82,10 +82,12 @@ int nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>
   return nearest.index;
 }
 
+namespace {
+
 /// The same for some of the points.
-std::vector<int> nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>& positions,
-                                  const topology::Incision* incision, const std::vector<SurfacePoint>& points,
-                                  const std::vector<int>& chosen) {
+std::vector<int> owners_in_sight(const topology::PointTree& tree, const std::vector<Vector3>& positions,
+                                 const topology::Incision* incision, const std::vector<SurfacePoint>& points,
+                                 const std::vector<int>& chosen) {
   std::vector<int> nearest(chosen.size());
   parallel_ranges(static_cast<int>(chosen.size()), 256, [&](int begin, int end) {
     for (int k = begin; k < end; ++k)
@@ -161,7 +163,7 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
     const topology::PointTree tree(positions);
     std::vector<int> all(static_cast<std::size_t>(end - begin));
     std::iota(all.begin(), all.end(), begin);
-    const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, all);
+    const std::vector<int> owners = owners_in_sight(tree, positions, incision_.get(), points_, all);
     owners_.resize(static_cast<std::size_t>(end), -1);
     for (std::size_t k = 0; k < all.size(); ++k) {
       owners_[all[k]] = ids[owners[k]];
@@ -170,12 +172,36 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
   }
 }
 
-DisplacementMean SurfacePatches::mean(int node, const Spheres& spheres,
-                                      const std::function<bool(const Vector3&, const Vector3&)>& held) const {
+namespace {
+
+/// Of the points of a share those of the side that faces `facing`; none where sides face it alike.
+std::vector<int> facing_side(const std::vector<SurfacePoint>& points, const std::vector<int>& share,
+                             const Vector3& facing) {
+  constexpr double same_side = 0.7; // cosine between normals of one side of an edge
+  constexpr double alike = 0.5;     // of how much the side that faces most does: another one is pressed as well
+  const auto turned = [&](int p) { return points[p].normal.dot(facing); };
+  const int best = *std::max_element(share.begin(), share.end(), [&](int a, int b) { return turned(a) < turned(b); });
+  if (turned(best) <= 0)
+    return share;
+  std::vector<int> side;
+  for (const int p : share)
+    if (points[p].normal.dot(points[best].normal) > same_side)
+      side.push_back(p);
+    else if (turned(p) > alike * turned(best))
+      return {};
+  return side;
+}
+
+} // namespace
+
+DisplacementMean SurfacePatches::mean(int node, const Spheres& spheres, const HeldRegion& held,
+                                      const std::optional<Vector3>& facing) const {
   std::vector<int> chosen;
   for (int p : points_of_node_[node])
     if (!held || p >= faces_begin_ || !held(points_[p].position, points_[p].normal))
       chosen.push_back(p);
+  if (facing && !chosen.empty() && chosen.front() < faces_begin_)
+    chosen = facing_side(points_, chosen, *facing);
   return chosen.empty() ? value_at(spheres, nodes_.positions[node]) : mean_over(points_, chosen, spheres);
 }
 
@@ -205,7 +231,7 @@ SurfacePatches::means(const std::vector<int>& nodes, const Spheres& spheres,
     }
   if (!others.empty()) {
     const topology::PointTree tree(positions);
-    const std::vector<int> owners = nearest_in_sight(tree, positions, incision_.get(), points_, others);
+    const std::vector<int> owners = owners_in_sight(tree, positions, incision_.get(), points_, others);
     for (std::size_t k = 0; k < others.size(); ++k)
       chosen[owners[k]].push_back(others[k]);
     for (std::vector<int>& points : chosen)
@@ -216,6 +242,30 @@ SurfacePatches::means(const std::vector<int>& nodes, const Spheres& spheres,
     for (int k = begin; k < end; ++k)
       result[k] = chosen[k].empty() ? value_at(spheres, positions[k]) : mean_over(points_, chosen[k], spheres);
   });
+  return result;
+}
+
+std::vector<DisplacementMean> SurfacePatches::means(const std::vector<Prescribed>& entries, const Spheres& spheres,
+                                                    const HeldRegion& held) const {
+  std::vector<DisplacementMean> result(entries.size());
+  std::vector<char> found(entries.size(), 0);
+  for (std::size_t first = 0; first < entries.size(); ++first) {
+    if (found[first] != 0)
+      continue;
+    const std::array<bool, 3>& axes = entries[first].components;
+    std::vector<int> nodes;
+    std::vector<std::size_t> alike;
+    for (std::size_t k = first; k < entries.size(); ++k)
+      if (entries[k].components == axes) {
+        nodes.push_back(entries[k].node);
+        alike.push_back(k);
+        found[k] = 1;
+      }
+    std::vector<DisplacementMean> of_nodes =
+        means(nodes, spheres, [&](const Vector3& x, const Vector3& normal) { return held.holds(x, normal, axes); });
+    for (std::size_t k = 0; k < alike.size(); ++k)
+      result[alike[k]] = std::move(of_nodes[k]);
+  }
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include "solvers/background_cells.hpp"
 #include "solvers/discretisation.hpp"
 #include "solvers/shape_functions.hpp"
+#include "topology/point_tree.hpp"
 
 #include <optional>
 
@@ -28,6 +29,11 @@ DisplacementMean reweighed(const DisplacementMean& mean, const Spheres& spheres)
 /// Value at one point. Throws NumericalError when no sound support covers it.
 DisplacementMean value_at(const Spheres& spheres, const Vector3& x);
 
+/// Index of the nearest position that the cut (may be null) does not hide from x; of the nearest when it hides all.
+/// Found sooner where the position `guess` is near.
+int nearest_in_sight(const topology::PointTree& tree, const std::vector<Vector3>& positions,
+                     const topology::Incision* incision, const Vector3& x, int guess = -1);
+
 /// The surface and the faces of the incision, point by point, with the node that each point belongs to: the nearest
 /// surface node or, on a face, lip node that it sees.
 class SurfacePatches {
@@ -44,18 +50,33 @@ class SurfacePatches {
                  std::shared_ptr<const topology::Incision> incision = nullptr,
                  const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces);
 
-  /// Mean over the share of `node` of the surface outside `held` (null: all of it) or, for a lip node, of its face; the
-  /// node itself when it has no share.
-  [[nodiscard]] DisplacementMean mean(int node, const Spheres& spheres,
-                                      const std::function<bool(const Vector3&, const Vector3&)>& held = nullptr) const;
+  /// Mean over the share of `node` of the surface that is not held along all axes (`held` empty: all of it) or, for a
+  /// lip node, of its face; the node itself when it has no share.
+  [[nodiscard]] DisplacementMean mean(int node, const Spheres& spheres, const HeldRegion& held = nullptr) const {
+    return mean(node, spheres, held, std::nullopt);
+  }
 
-  /// Means over the parts of `held` that belong to each of `nodes`; a point of `held` nearest to none of them goes to
-  /// the nearest of them, so that the whole of `held` is shared out.
+  /// What a force of a tool on `node` acts on: that mean, of a share about a sharp edge over the side that faces the
+  /// tool (Problem::touched_from), whose mean lies on the surface and not within the body. Where several sides face it
+  /// alike, the node itself. `node` is one of this cloud; of the problem the rest is asked for.
+  [[nodiscard]] DisplacementMean contact_mean(int node, const Spheres& spheres, const Problem& problem) const {
+    return mean(node, spheres, problem.prescribed_region, problem.touched_from);
+  }
+
+  /// Means over the parts of `held` that belong to each entry: of what is held along its components. A point nearest to
+  /// none of the entries' nodes goes to the nearest of them, so that the whole is shared out.
+  [[nodiscard]] std::vector<DisplacementMean> means(const std::vector<Prescribed>& entries, const Spheres& spheres,
+                                                    const HeldRegion& held) const;
+
+  /// The same for `nodes` that are held alike.
   [[nodiscard]] std::vector<DisplacementMean>
   means(const std::vector<int>& nodes, const Spheres& spheres,
         const std::function<bool(const Vector3&, const Vector3&)>& held) const;
 
  private:
+  [[nodiscard]] DisplacementMean mean(int node, const Spheres& spheres, const HeldRegion& held,
+                                      const std::optional<Vector3>& facing) const;
+
   const NodeCloud& nodes_;
   std::shared_ptr<const topology::Incision> incision_;
   std::vector<SurfacePoint> points_; // of the surface, then from faces_begin_ on of the faces

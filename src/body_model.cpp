@@ -1,6 +1,7 @@
 #include "src/body_model.hpp"
 
 #include "solvers/appended/appended_body.hpp"
+#include "solvers/bank_pairs.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -23,6 +24,8 @@ constexpr double long_advance = 0.2, largest_share_of_long = 0.2;
 constexpr int largest_followed_balance = 1200;
 constexpr double crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a fixed region is kept
 constexpr double crowded_by_seed = 0.7;  // likewise, to a node that must be where it is
+constexpr double near_banks = 0.25;      // spacings: banks that come so near to each other are looked at together
+constexpr int most_bank_rounds = 6;      // in which banks that have come to each other are held apart
 constexpr double rim = 1e-2; // of its spacing: a lip node so near to the surface stands on the rim of its wound
 
 bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& nodes, int node) {
@@ -36,6 +39,25 @@ bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& n
     return true;
   }
   return true;
+}
+
+/// Sets of axes that the same regions hold: what one of them holds, all of its set are.
+std::vector<std::array<bool, 3>> axes_held_together(const std::vector<FixedRegion>& fixed) {
+  const auto alike = [&](std::size_t a, std::size_t b) {
+    return std::all_of(fixed.begin(), fixed.end(),
+                       [&](const FixedRegion& region) { return region.components[a] == region.components[b]; });
+  };
+  std::vector<std::array<bool, 3>> sets;
+  std::array<bool, 3> known{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (known[a])
+      continue;
+    sets.emplace_back();
+    for (std::size_t b = a; b < 3; ++b)
+      if (alike(a, b))
+        sets.back()[b] = known[b] = true;
+  }
+  return sets;
 }
 
 solvers::DiscretisationOptions method_of(const Scenario& scenario) {
@@ -61,6 +83,13 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
     problem.prescribed_region = [regions = scenario.fixed](const Vector3& x, const Vector3&) {
       return std::any_of(regions.begin(), regions.end(), [&](const FixedRegion& region) { return region.holds(x); });
     };
+  else
+    problem.prescribed_region = [regions = scenario.fixed](const Vector3& x, const Vector3&, int axis) {
+      return std::any_of(regions.begin(), regions.end(), [&](const FixedRegion& region) {
+        return region.components[static_cast<std::size_t>(axis)] && region.holds(x);
+      });
+    };
+  problem.touched_from = model.touched_from;
   if (scenario.gravity) {
     const Vector3 weight = scenario.material.density * *scenario.gravity;
     problem.loads.body_force = [weight](const Vector3&) -> const Vector3& { return weight; };
@@ -124,18 +153,20 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
                                              const solvers::NodeCloud& nodes) {
   std::vector<solvers::Prescribed> prescribed;
   std::vector<int> held(scenario.fixed.size(), 0);
+  const std::vector<std::array<bool, 3>> sets = axes_held_together(scenario.fixed);
   for (int i = 0; i < nodes.size(); ++i) {
     if (!carries_surface(domain, nodes, i))
       continue;
-    solvers::Prescribed entry{i, {false, false, false}, Vector3::Zero()};
+    std::array<bool, 3> axes{};
     for (std::size_t r = 0; r < scenario.fixed.size(); ++r)
       if (scenario.fixed[r].holds(nodes.positions[i])) {
         ++held[r];
         for (int c = 0; c < 3; ++c)
-          entry.components[c] = entry.components[c] || scenario.fixed[r].components[c];
+          axes[c] = axes[c] || scenario.fixed[r].components[c];
       }
-    if (entry.components[0] || entry.components[1] || entry.components[2])
-      prescribed.push_back(entry);
+    for (const std::array<bool, 3>& set : sets)
+      if ((set[0] && axes[0]) || (set[1] && axes[1]) || (set[2] && axes[2]))
+        prescribed.push_back({i, set, Vector3::Zero()});
   }
   for (std::size_t r = 0; r < scenario.fixed.size(); ++r)
     if (held[r] == 0) {
@@ -149,16 +180,38 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
   return prescribed;
 }
 
+int held_nodes(const std::vector<solvers::Prescribed>& prescribed) {
+  int count = 0;
+  for (std::size_t k = 0; k < prescribed.size(); ++k) // those of a node lie together
+    count += k == 0 || prescribed[k].node != prescribed[k - 1].node ? 1 : 0;
+  return count;
+}
+
+std::vector<std::array<bool, 3>> held_axes(const std::vector<solvers::Prescribed>& prescribed, int count) {
+  std::vector<std::array<bool, 3>> held(static_cast<std::size_t>(count), {false, false, false});
+  for (const solvers::Prescribed& entry : prescribed)
+    for (std::size_t c = 0; c < 3; ++c)
+      held[static_cast<std::size_t>(entry.node)][c] |= entry.components[c];
+  return held;
+}
+
+bool gives_way(const std::array<bool, 3>& held, const Vector3& normal) {
+  constexpr double least = 0.3; // of the normal along free axes: less would take many times the force
+  Vector3 free = normal;
+  for (std::size_t c = 0; c < 3; ++c)
+    if (held[c])
+      free[static_cast<Eigen::Index>(c)] = 0;
+  return free.norm() > least;
+}
+
 std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domain& domain,
                                  const solvers::NodeCloud& nodes, const topology::SurfaceContact& centre,
                                  double reach) {
-  std::vector<char> held(nodes.positions.size(), 0);
-  for (const solvers::Prescribed& entry : fixed_nodes(scenario, domain, nodes))
-    held[entry.node] = 1;
+  const std::vector<std::array<bool, 3>> held = held_axes(fixed_nodes(scenario, domain, nodes), nodes.size());
   std::vector<int> near;
   for (int i = 0; i < nodes.size(); ++i)
-    if (on_surface(nodes.kinds[i]) && held[i] == 0 && (nodes.positions[i] - centre.point).norm() <= reach &&
-        nodes.normals[i].dot(centre.normal) > 0)
+    if (on_surface(nodes.kinds[i]) && gives_way(held[i], centre.normal) &&
+        (nodes.positions[i] - centre.point).norm() <= reach && nodes.normals[i].dot(centre.normal) > 0)
       near.push_back(i);
   if (near.empty())
     throw InputError(fmt::format("no free surface node within {:g} m of the contact at [{:.4g}, {:.4g}, {:.4g}] m: the "
@@ -317,6 +370,7 @@ void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few
   model.lips.reset();
   model.state.reset();
   model.presses = 0;
+  model.watch.reset();
   if (candidates.empty()) {
     model.patch = {};
     model.base = model.body->solve();
@@ -345,9 +399,12 @@ void bond(const std::vector<Vector3>& displacements, const topology::ToolPose& p
 
 } // namespace
 
-void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
-                   const std::vector<Vector3>* grasped, const std::optional<solvers::GripMemory>& memory,
-                   bool lips_touch) {
+namespace {
+
+/// One solution for tool and lips.
+void solve_with_lips(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario,
+                     BodyModel& model, const std::vector<Vector3>* grasped,
+                     const std::optional<solvers::GripMemory>& memory, bool lips_touch) {
   const solvers::ContactOptions options{.condition = scenario.contact.condition,
                                         .friction = scenario.contact.friction,
                                         .maximum_iterations = most_iterations,
@@ -374,11 +431,14 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
       return;
     }
   }
-  if (!model.lips)
-    model.lips = solvers::condense_lips(*model.body, model.pairs, scenario.cut.lips, in_reach ? &model.patch : nullptr);
+  if (!model.lips) {
+    std::vector<solvers::LipPair> pairs = model.pairs;
+    pairs.insert(pairs.end(), model.banks.begin(), model.banks.end());
+    model.lips = solvers::condense_lips(*model.body, pairs, scenario.cut.lips, in_reach ? &model.patch : nullptr);
+  }
   solvers::CutContactState state;
   if (in_reach) {
-    const bool goes_on = previous != nullptr && (previous->lips.closed.size() == model.pairs.size() ||
+    const bool goes_on = previous != nullptr && (previous->lips.closed.size() == model.lips->pairs.size() ||
                                                  options.condition == solvers::ContactCondition::frictional);
     state = grasped != nullptr
                 ? solvers::prescribe(model.patch, *model.lips, *grasped, lip_tolerance)
@@ -394,15 +454,57 @@ void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, con
   model.state = std::move(state);
 }
 
+/// Looks where the surface has come to itself. True: places where it has passed through that no pair holds apart yet,
+/// which are now among the banks.
+bool finds_banks(BodyModel& model) {
+  const solvers::BankPairs found =
+      solvers::bank_pairs(model.sprinkling.nodes, model.body->nodal_displacements(model.field), near_banks);
+  model.passed_through = {};
+  std::vector<solvers::LipPair> fresh;
+  bool passes = false;
+  for (std::size_t p = 0; p < found.pairs.size(); ++p) {
+    const solvers::LipPair& pair = found.pairs[p];
+    const double depth = -found.openings[p];
+    if (depth > model.passed_through.depth)
+      model.passed_through = {depth, model.sprinkling.nodes.positions[pair.minus],
+                              model.sprinkling.nodes.spacings[pair.minus]};
+    const bool known = std::any_of(model.banks.begin(), model.banks.end(), [&](const solvers::LipPair& bank) {
+      return (bank.plus == pair.plus && bank.minus == pair.minus) ||
+             (bank.plus == pair.minus && bank.minus == pair.plus);
+    });
+    passes = passes || (depth > lip_tolerance && (!known || !model.lips));
+    if (!known)
+      fresh.push_back(pair);
+  }
+  if (passes)
+    model.banks = solvers::joined_without_rings(model.banks, fresh, model.sprinkling.nodes.size());
+  return passes;
+}
+
+} // namespace
+
+void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
+                   const std::vector<Vector3>* grasped, const std::optional<solvers::GripMemory>& memory,
+                   bool lips_touch) {
+  const std::optional<solvers::CutContactState> before = model.state;
+  solve_with_lips(tool, pose, scenario, model, grasped, memory, lips_touch);
+  for (int round = 0;
+       finds_banks(model) && scenario.cut.lips != solvers::LipCondition::open && round < most_bank_rounds; ++round) {
+    model.lips.reset();
+    model.state = before;
+    solve_with_lips(tool, pose, scenario, model, grasped, memory, true);
+  }
+}
+
 double residual(const BodyModel& model) {
   std::vector<int> loaded = model.patch.nodes;
   std::vector<Vector3> forces = model.state->tool.nodal_forces;
   if (model.lips) {
     const std::vector<Vector3> pair_forces = solvers::pair_forces(*model.lips, model.state->lips);
     for (std::size_t p = 0; p < pair_forces.size(); ++p) {
-      loaded.push_back(model.pairs[p].plus);
+      loaded.push_back(model.lips->pairs[p].plus);
       forces.push_back(pair_forces[p]);
-      loaded.push_back(model.pairs[p].minus);
+      loaded.push_back(model.lips->pairs[p].minus);
       forces.emplace_back(-pair_forces[p]);
     }
   }

@@ -7,6 +7,7 @@
 #include "solvers/tearing.hpp"
 #include "src/recondensing.hpp"
 #include "src/scenario.hpp"
+#include "src/surface_watch.hpp"
 
 #include "topology/blade.hpp"
 #include "topology/contact.hpp"
@@ -25,21 +26,31 @@ bool cut_appends(const Scenario& scenario);
 struct BodyModel {
   std::shared_ptr<const topology::Incision> incision; // null: uncut
   solvers::Sprinkling sprinkling;
-  double coarseness = 1; // of its spacings, in those of the scenario
-  std::vector<solvers::LipPair> pairs;
-  std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut
+  double coarseness = 1;               // of its spacings, in those of the scenario
+  std::optional<Vector3> touched_from; // solvers::Problem::touched_from
+  std::vector<solvers::LipPair> pairs; // of the cut
+  std::vector<solvers::LipPair> banks; // of the organ's own surface where it has come to itself
+  /// Where the surface reaches deepest through itself in the last solution.
+  struct PassedThrough {
+    double depth = 0;                // m, 0: nowhere
+    Vector3 place = Vector3::Zero(); // m, at rest
+    double spacing = 0;              // m, of the node there
+  };
+  PassedThrough passed_through;
+  std::unique_ptr<solvers::Discretisation> body;  // null before the first load, touch or cut
   std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
-  const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
-  topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
-  int added_nodes = 0;                             // by updates since then
-  std::optional<topology::BladePose> window_seen;  // where the blade was when the window was last seen to cover its way
-  solvers::Field base;                             // without tool and contact
-  solvers::ContactPatch patch;                     // no nodes: the tool is far
-  int presses = 0;                                 // since it was condensed
-  std::optional<solvers::LipPatch> lips;           // empty: no pair has had to be held yet
-  std::optional<solvers::CutContactState> state;   // empty: not solved yet
-  solvers::Field field;                            // solution
-  mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
+  const char* not_following = "";                 // why the body cannot follow a cut; empty: it can
+  topology::SurfaceMesh window_way;               // of the cut, for which a body that follows it was condensed
+  int added_nodes = 0;                            // by updates since then
+  std::optional<topology::BladePose> window_seen; // where the blade was when the window was last seen to cover its way
+  solvers::Field base;                            // without tool and contact
+  solvers::ContactPatch patch;                    // no nodes: the tool is far
+  std::optional<SurfaceWatch> watch;              // of the surface about the patch; empty: not looked at yet
+  int presses = 0;                                // since it was condensed
+  std::optional<solvers::LipPatch> lips;          // pairs, then banks; empty: none has had to be held yet
+  std::optional<solvers::CutContactState> state;  // empty: not solved yet
+  solvers::Field field;                           // solution
+  mutable solvers::FrontRules front_rules{};      // of these nodes and this cut, found as they are asked for
 
   /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
   /// rest before the first solution.
@@ -55,12 +66,22 @@ inline bool on_surface(solvers::NodeKind kind) {
   return kind == solvers::NodeKind::surface || kind == solvers::NodeKind::edge;
 }
 
-/// Nodes of the fixed regions with the components that are held. Throws InputError naming the region that holds none.
+/// Nodes of the fixed regions with the components that are held: an entry for every set of axes that are held by the
+/// same regions. Throws InputError naming the region that holds none.
 std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const topology::Domain& domain,
                                              const solvers::NodeCloud& nodes);
 
+/// How many nodes these entries of fixed_nodes() hold.
+int held_nodes(const std::vector<solvers::Prescribed>& prescribed);
+
+/// Axes along which each of `count` nodes is held by any of the entries.
+std::vector<std::array<bool, 3>> held_axes(const std::vector<solvers::Prescribed>& prescribed, int count);
+
+/// Whether a force along the unit vector `normal` moves a node that is held along some axes.
+bool gives_way(const std::array<bool, 3>& held, const Vector3& normal);
+
 /// Surface nodes that a tool at `centre` may touch: within `reach` m on its side of the organ, without those that are
-/// held. Throws InputError when there are none.
+/// held against it. Throws InputError when there are none.
 std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domain& domain,
                                  const solvers::NodeCloud& nodes, const topology::SurfaceContact& centre, double reach);
 

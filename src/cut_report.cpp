@@ -62,22 +62,30 @@ void CutReport::add(const CutReport& later) {
   seconds.solve += later.seconds.solve;
 }
 
-double opening_volume(const topology::Wound& wound, const BodyModel& model) {
+Opening opening_of(const topology::Wound& wound, const BodyModel& model) {
   std::vector<std::optional<Vector3>> displacement(wound.surface.vertices.size());
   const auto moved = [&](int vertex) {
     if (!displacement[vertex])
       displacement[vertex] = model.at(wound.evaluation[vertex]).displacement;
     return *displacement[vertex];
   };
-  double volume = 0;
+  Opening opening;
+  std::vector<Vector3> into_plus(wound.surface.vertices.size(), Vector3::Zero()); // m2, along the normal of the sheet
   for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
     if (wound.part[t] == topology::WoundPart::organ)
       continue;
     const Triangle& triangle = wound.surface.triangles[t];
+    const Vector3 area = area_vector(wound.surface, triangle);
     const Vector3 mean = (moved(triangle[0]) + moved(triangle[1]) + moved(triangle[2])) / 3;
-    volume -= mean.dot(area_vector(wound.surface, triangle)); // outward is into the cut
+    opening.volume -= mean.dot(area); // outward is into the cut
+    if (wound.part[t] == topology::WoundPart::wall_plus)
+      for (const int vertex : triangle)
+        into_plus[vertex] -= area;
   }
-  return volume;
+  for (const topology::LipPair& pair : topology::lip_pairs(wound))
+    if (const Vector3& normal = into_plus[pair.plus]; !normal.isZero(0))
+      opening.largest = std::max(opening.largest, normal.normalized().dot(moved(pair.plus) - moved(pair.minus)));
+  return opening;
 }
 
 namespace {

@@ -18,7 +18,7 @@ struct CutReport : BodyUpdate {
   int pieces = 1;
   std::vector<double> volumes; // m3, of the pieces, largest first
   int unheld = 0;              // pieces that no fixed region holds
-  double opening = 0;          // m, largest distance between the faces along their normal
+  double opening = 0;          // m, largest distance between the faces along their normal; 0: held together
   double opening_volume = 0;   // m3, between the faces
   int lip_pairs = 0, closed_pairs = 0;
   bool lips_converged = true;
@@ -32,9 +32,12 @@ struct CutReport : BodyUpdate {
 /// Nodes of a body that has been built, and what of the time of its assembly, s, was sight and factorisation.
 void report_body(const BodyModel& body, double sight, BodyUpdate& report);
 
-/// Volume between the faces of the cut, m3: the integral of the opening over the sheets, each face displaced as the
-/// material on its own side.
-double opening_volume(const topology::Wound& wound, const BodyModel& model);
+/// How far the faces of the cut have parted, as the surface shows it that is written: corner by corner.
+struct Opening {
+  double largest = 0; // m, largest distance between two corners at one place of a sheet, along its normal
+  double volume = 0; // m3, the integral of the opening over the sheets, each face displaced as the material on its side
+};
+Opening opening_of(const topology::Wound& wound, const BodyModel& model);
 
 /// The pieces of tissue: all but splinters, what rounding leaves between strips of a cut that all but coincide, whose 6
 /// volume / area is below 2e-4 of the largest piece's.

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <numbers>
 
 namespace spherecut::app {
 namespace {
@@ -16,10 +15,13 @@ constexpr double sheet_edges = 0.5; // edges of a sheet's triangles, of the fine
 constexpr double across_precut = 6; // derived spacings across a precut
 constexpr double across_blade = 12; // and along the edge of a blade
 constexpr double across_organ = 10; // and, at the coarsest, across the organ
+// Of a disc's radius. Opening volume under pressure, `galerkin`, against Sneddon's: 5.9 % too small at 0.3 radii, 3.8 %
+// at 0.22, 2.6 % at 0.18, 1.5 % at 0.15.
+constexpr double of_disc = 0.15;
 
 double size_of(const PrecutSettings& precut, double extent) {
   if (const auto* disc = std::get_if<DiscSheet>(&precut.shape))
-    return std::sqrt(std::numbers::pi) * disc->radius;
+    return across_precut * of_disc * disc->radius;
   if (const auto* rectangle = std::get_if<RectangleSheet>(&precut.shape))
     return std::sqrt(rectangle->width * rectangle->height);
   if (const auto* polygon = std::get_if<PolygonSheet>(&precut.shape)) {

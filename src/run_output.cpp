@@ -134,6 +134,8 @@ void RunOutput::add(const Session& session, const StepResult& step) {
       every > 0 && (findings_.steps % static_cast<std::size_t>(every) == 0 || findings_.steps + 1 == findings_.planned))
     add_frame(session, step);
   ++findings_.steps;
+  findings_.largest_penetration = std::max(findings_.largest_penetration, step.largest_penetration);
+  findings_.self_penetration = std::max(findings_.self_penetration, step.self_penetration);
   findings_.largest_residual = std::max(findings_.largest_residual, step.residual);
   findings_.largest_rotation_degrees = std::max(findings_.largest_rotation_degrees, step.rotation_degrees);
   if (step.resprinkled)

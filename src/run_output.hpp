@@ -24,6 +24,8 @@ struct RunFindings {
   std::vector<std::pair<double, double>> resprinkles; // time, relative jump of the force
   CutReport cut;                                      // of the last step
   double largest_opening = 0;                         // m
+  double largest_penetration = 0;                     // m, of the surface in the tool
+  double self_penetration = 0;                        // m, of the surface through itself
   int increments = 0, refused_cuts = 0;
   TearReport tear;                          // of the last step, its account of the whole run
   int tear_increments = 0;                  // of the whole run, as the next four

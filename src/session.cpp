@@ -1,6 +1,7 @@
 #include "src/session.hpp"
 
 #include "solvers/tangential_force.hpp"
+#include "solvers/tool_gap.hpp"
 #include "src/dropped_nodes.hpp"
 #include "src/process_settings.hpp"
 #include "src/stage_timer.hpp"
@@ -18,22 +19,14 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double stretched_rotation = 10;   // degrees, beyond which linear elasticity is being stretched
-constexpr double allowed_force_jump = 0.02; // at a re-sprinkle
-constexpr double patch_gap = 0.02;          // of the fine spacing: penetration outside the patch that makes it grow
-constexpr int patch_growths = 6;            // in one step
-constexpr double same_place = 1e-6;         // of the fine spacing: a blade that has gone less has not moved
-constexpr double rest_delay = 0.1;          // s without motion after which it is at rest
-constexpr double stiffest_galerkin = 0.49;  // Poisson's ratio
-constexpr int few_in_contact = 3;           // nodes
-constexpr double deep_press = 0.25;         // of the tip radius
-constexpr int candidates_a_press = 4;       // whose fields are made beside a press
-constexpr int pairs_a_press = 4;            // of lips, likewise
+constexpr double stretched_rotation = 10;        // degrees, beyond which linear elasticity is being stretched
+constexpr double allowed_force_jump = 0.02;      // at a re-sprinkle
+constexpr double same_place = 1e-6;              // of the fine spacing: a blade that has gone less has not moved
+constexpr double rest_delay = 0.1;               // s without motion after which it is at rest
+constexpr double stiffest_galerkin = 0.49;       // Poisson's ratio
+constexpr int few_in_contact = 3;                // nodes
+constexpr double deep_press = 0.25;              // of the tip radius
 constexpr double contact_crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a contact is put
-
-bool is_any_closed(const solvers::LipState& lips) {
-  return std::find(lips.closed.begin(), lips.closed.end(), 1) != lips.closed.end();
-}
 
 Organ timed_organ(const OrganSettings& settings, double& seconds) {
   const StageTimer timer(seconds);
@@ -42,9 +35,9 @@ Organ timed_organ(const OrganSettings& settings, double& seconds) {
 
 // With the place in the file where the motion begins.
 std::vector<ToolSample> tool_motion_of(const Scenario& scenario, const topology::ContactQuery& query,
-                                       const topology::Domain& domain) {
+                                       const BoundingBox& bounds) {
   try {
-    return tool_motion(*scenario.tool, query, domain);
+    return tool_motion(*scenario.tool, query, bounds);
   } catch (const InputError& error) {
     const auto* approach = std::get_if<Approach>(&scenario.tool->motion);
     const int line =
@@ -65,7 +58,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
   zone_ = fine_zone(scenario_, *organ_.domain);
   std::vector<ToolSample> motion;
   if (scenario_.tool) {
-    motion = tool_motion_of(scenario_, query_, *organ_.domain);
+    motion = tool_motion_of(scenario_, query_, organ_.domain->bounds());
     touch_ = find_touch(motion, leader);
   }
   steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
@@ -96,6 +89,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
     return;
   if (touch_)
     zone_contact_ = first_zone_ = centre_of(touch_->contact, touch_->pose);
+  model_.touched_from = facing();
   lay_out_zone();
   try {
     sprinkle(nullptr, model_);
@@ -109,6 +103,33 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
   static_cast<void>(fixed_nodes(scenario_, *organ_.domain, model_.sprinkling.nodes));
   if (cuts()) // regions that hold nothing have been told by now: no piece is severed by that
     check_held(steps_.front().time);
+  approach_hanging();
+}
+
+// The way of an approach counts from its first touch of the body as its loads hold it before the tool comes.
+void Session::approach_hanging() {
+  const bool is_loaded = scenario_.gravity || !scenario_.pretension.isZero() ||
+                         std::any_of(scenario_.precuts.begin(), scenario_.precuts.end(),
+                                     [](const PrecutSettings& precut) { return precut.pressure != 0; });
+  if (!is_loaded || !touch_ || !std::holds_alternative<Approach>(scenario_.tool->motion))
+    return;
+  assemble(model_, {}, candidates(model_));
+  app::condense({}, model_);
+  solve_contact(nullptr, nullptr, scenario_, model_);
+  topology::SurfaceMesh hanging = organ_.domain->surface();
+  for (Vector3& x : hanging.vertices)
+    x += model_.at(x).displacement;
+  model_.state.reset();
+  seen_hanging_ = true;
+  std::vector<ToolSample> motion;
+  try {
+    motion = tool_motion_of(scenario_, topology::ContactQuery(hanging), topology::bounds(hanging));
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{} (of the organ as its loads have moved it before the tool comes)", error.what()));
+  }
+  const Vector3 sag = motion.back().pose.point - steps_.back().tool->point;
+  steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
+  say_(fmt::format("the loads move the tool's first touch by {:.3g} mm", 1e3 * sag.norm()));
 }
 
 // Where the tool meets the organ. A device may do so anywhere: it is expected where the path comes nearest.
@@ -247,11 +268,12 @@ std::optional<solvers::GripMemory> Session::remembered_grip() const {
 }
 
 void Session::prepare(const StepSample& sample) {
-  if ((!touch_ && !cuts()) || model_.body != nullptr)
+  if ((!touch_ && !cuts()) || (model_.body != nullptr && !std::exchange(seen_hanging_, false)))
     return;
   if (sample.tool)
     last_contact_ = find_contact(*sample.tool);
-  build(model_);
+  if (model_.body == nullptr)
+    build(model_);
   if (touch_ && !scenario_.tool->grasp && model_.patch.nodes.empty())
     condense(candidates(model_), model_);
   if (!renews_windows() || scenario_.blade->advance.value_or(1) > 0) // in the loop it may be made beside the steps
@@ -311,6 +333,7 @@ void Session::follow(const StepSample& sample, const topology::SurfaceContact& c
   zone_contact_ = next_zone(centre);
   zone_.spacing.centres = {zone_contact_->point};
   BodyModel next;
+  next.touched_from = facing();
   next.incision = model_.incision;
   sprinkle(&model_.sprinkling.nodes, next);
   build(next);
@@ -358,6 +381,13 @@ std::vector<int> Session::candidates(const BodyModel& model) const {
   return touchable_nodes(scenario_, *organ_.domain, model.sprinkling.nodes, *zone_contact_, zone_.candidate_radius);
 }
 
+// Where the tool comes from; a grasper holds what is between its jaws.
+std::optional<Vector3> Session::facing() const {
+  if (!zone_contact_ || !scenario_.tool || scenario_.tool->grasp)
+    return std::nullopt;
+  return zone_contact_->normal;
+}
+
 // Whether the tool can be on the surface, as far as that has moved by now.
 bool Session::tool_in_reach() const {
   if (!touch_ || !last_contact_)
@@ -384,102 +414,13 @@ void Session::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead,
   const solvers::SprinkleReport& report = model.sprinkling.report;
   say_(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",
                    model.sprinkling.nodes.size(), report.surface_nodes + report.edge_nodes, report.lip_nodes,
-                   model.body->problem().prescribed.size()));
+                   held_nodes(model.body->problem().prescribed)));
 }
 
 void Session::condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
   interruption_point();
   const StageTimer timer(profile_.condense);
   app::condense(without_dropped(candidates, scenario_, *model.body), model, for_few_presses);
-}
-
-void Session::solve(const StepSample& sample, BodyModel& model) {
-  interruption_point();
-  displaced_body_ = nullptr;
-  if (tool_in_reach() && model.patch.nodes.empty())
-    condense(candidates(model), model);
-  const ToolSettings* tool = scenario_.tool ? &*scenario_.tool : nullptr;
-  const topology::ToolPose* pose = sample.tool ? &*sample.tool : nullptr;
-  if (grasps()) {
-    const StageTimer timer(profile_.press);
-    const std::vector<Vector3> held = grasped_displacements(*pose, model);
-    solve_contact(tool, pose, scenario_, model, &held, std::nullopt, lips_touch_);
-    lips_touch_ = is_any_closed(model.state->lips);
-    extend_fields(model);
-    return;
-  }
-  for (int growth = 0; growth <= patch_growths; ++growth) {
-    {
-      const StageTimer timer(profile_.press);
-      solve_contact(tool, pose, scenario_, model, nullptr, grip_memory_, lips_touch_);
-      lips_touch_ = is_any_closed(model.state->lips);
-    }
-    const std::vector<int> missed =
-        model.patch.nodes.empty() ? std::vector<int>{} : penetrated_outside_patch(*pose, model);
-    if (missed.empty()) {
-      extend_fields(model);
-      return;
-    }
-    std::vector<int> grown = model.patch.nodes;
-    grown.insert(grown.end(), missed.begin(), missed.end());
-    std::sort(grown.begin(), grown.end());
-    std::optional<solvers::CutContactState> bonded;
-    if (scenario_.contact.condition == solvers::ContactCondition::bonded) // what is held goes on being held
-      bonded = solvers::CutContactState{solvers::among(model.patch, model.state->tool, grown), model.state->lips};
-    condense(grown, model);
-    model.state = std::move(bonded);
-  }
-  warn("patch", "the tool reaches surface nodes beyond its candidate patch; give a larger contact.candidate_radius");
-}
-
-// A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
-void Session::extend_fields(BodyModel& model) {
-  const bool is_for_good = blade_rests_ || (put_off_ == 0 && !cuts_aside()); // else the next body is on its way
-  const bool bare_patch = !solvers::has_fields(model.patch);
-  const bool bare_lips = lips_touch_ && model.lips && !solvers::has_fields(*model.lips);
-  if (!force_only_ || !is_for_good || (!bare_patch && !bare_lips) || ++model.presses <= few_presses)
-    return;
-  if (bare_patch)
-    solvers::extend_responses(*model.body, candidates_a_press, model.patch);
-  else
-    solvers::extend_responses(*model.body, pairs_a_press, *model.lips);
-}
-
-// Displacements at the nodes, 3 a node, m; those asked for last are kept.
-const VectorX& Session::displacements_of(const BodyModel& model) const {
-  const VectorX& coefficients = model.field.coefficients;
-  if (displaced_body_ != model.body.get() || displaced_coefficients_.size() != coefficients.size() ||
-      displaced_coefficients_ != coefficients) {
-    displaced_ = model.body->nodal_displacements(model.field);
-    displaced_coefficients_ = coefficients;
-    displaced_body_ = model.body.get();
-  }
-  return displaced_;
-}
-
-// Surface nodes that the tool has gone into although they were not candidates.
-std::vector<int> Session::penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const {
-  const solvers::NodeCloud& nodes = model.sprinkling.nodes;
-  std::vector<char> known = dropped_nodes(scenario_, *model.body);
-  known.resize(nodes.positions.size(), 0);
-  for (const int node : model.patch.nodes)
-    known[node] = 1;
-  for (const solvers::Prescribed& entry : model.body->problem().prescribed)
-    known[entry.node] = 1;
-  // A share of the surface moves about as its node does: the mean over it is looked at near the tool alone.
-  const VectorX& displacements = displacements_of(model);
-  const auto near = [&](int i) {
-    return topology::tool_distance(scenario_.tool->shape, pose, nodes.positions[i] + displacements.segment<3>(3 * i)) <
-           zone_.spacing.fine;
-  };
-  std::vector<int> missed;
-  for (int i = 0; i < nodes.size(); ++i)
-    if (on_surface(nodes.kinds[i]) && known[i] == 0 && near(i) &&
-        topology::tool_distance(scenario_.tool->shape, pose,
-                                model.body->contact_point(i) + model.body->contact_displacement(i, model.field)) <
-            -patch_gap * zone_.spacing.fine)
-      missed.push_back(i);
-  return missed;
 }
 
 // Below where the surface would be without the tool, m: loads and pretension may have drawn it away.
@@ -505,7 +446,7 @@ void Session::evaluate(StepResult& result) {
   result.nodes = model_.sprinkling.nodes.size();
   result.iterations = tool.iterations;
   result.converged = tool.converged;
-  result.largest_penetration = tool.largest_penetration;
+  result.largest_penetration = penetration_ ? penetration_->deepest : tool.largest_penetration;
   node_displacements_ = displacements_of(model_);
   if (!force_only_)
     result.residual = residual(model_);
@@ -523,6 +464,25 @@ void Session::evaluate(StepResult& result) {
   if (!result.converged)
     warn("contact", fmt::format("the contact did not converge at t = {:g} s: {:.2g} m of penetration left", result.time,
                                 result.largest_penetration));
+  if (penetration_ && penetration_->deepest > most_left_over * penetration_->spacing)
+    warn(penetration_->pushed ? "surface" : "held surface",
+         fmt::format("the surface lies {:.2g} m in the tool at [{:.4g}, {:.4g}, {:.4g}] m, t = {:g} s: {:.0f} % of the "
+                     "nodes' spacing there, allowed {:g} %; {}",
+                     penetration_->deepest, penetration_->place.x(), penetration_->place.y(), penetration_->place.z(),
+                     result.time, 100 * penetration_->deepest / penetration_->spacing, 100 * most_left_over,
+                     penetration_->pushed
+                         ? "finer nodes at the contact follow the tool"
+                         : "a fixed region holds it there against the tool, whose force is too small"));
+  result.self_penetration = model_.passed_through.depth;
+  if (const BodyModel::PassedThrough& passed = model_.passed_through; passed.depth > most_left_over * passed.spacing) {
+    const bool is_open = scenario_.cut.lips == solvers::LipCondition::open;
+    warn(is_open ? "passes open" : "passes",
+         fmt::format("the organ's surface passes through itself by {:.2g} m at [{:.4g}, {:.4g}, {:.4g}] m, t = {:g} s: "
+                     "{}",
+                     passed.depth, passed.place.x(), passed.place.y(), passed.place.z(), result.time,
+                     is_open ? "cut.lips = \"open\" leaves the contact of its parts out"
+                             : "its parts push on one another from node to node, and the nodes do not tell it finer"));
+  }
   // Where that deep a tip touches one or two nodes, its force is that of these nodes' places.
   const double depth = touch_ ? depth_of_press(result.contact) : 0;
   if (touch_ && !scenario_.tool->grasp && result.active_nodes < few_in_contact &&

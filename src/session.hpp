@@ -38,7 +38,8 @@ struct StepResult {
   int iterations = 0;
   bool converged = true;
   double residual = 0;            // largest unbalanced force / largest force
-  double largest_penetration = 0; // m, left over
+  double largest_penetration = 0; // m, deepest that the deformed surface lies in the tool
+  double self_penetration = 0;    // m, deepest that it reaches through itself, from node to node
   double rotation_degrees = 0;    // largest rotation of the tissue
   bool resprinkled = false;       // the fine zone has followed the tool
   double force_jump = 0;          // |force after - before| / |force before| at the re-sprinkle
@@ -64,6 +65,9 @@ inline constexpr double aside_advance = 0.5, most_advances = 3;
 /// Who leads the tool: the scenario's path, or a device, to which the path says no more than where nodes are fine at
 /// first.
 enum class Leader { path, device };
+
+/// Of the spacing: deepest that a point of the surface may be left in the tool.
+inline constexpr double most_left_over = 0.02;
 
 class Session {
  public:
@@ -184,6 +188,7 @@ class Session {
 
  private:
   void lay_out_zone();
+  void approach_hanging();
   void watch_blade_way();
   [[nodiscard]] std::vector<std::array<Vector3, 2>> fine_segments(const topology::Incision& incision) const;
   void make_precuts();
@@ -198,12 +203,18 @@ class Session {
   [[nodiscard]] solvers::SprinkleOptions sprinkle_options(const BodyModel& model) const;
   void sprinkle(const solvers::NodeCloud* previous, BodyModel& model);
   [[nodiscard]] std::vector<int> candidates(const BodyModel& model) const;
+  [[nodiscard]] std::optional<Vector3> facing() const;
   [[nodiscard]] bool tool_in_reach() const;
   void build(BodyModel& model);
   void assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near);
   void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
   void extend_fields(BodyModel& model);
   void solve(const StepSample& sample, BodyModel& model);
+  [[nodiscard]] std::vector<int> press_surface(const ToolSettings* tool, const topology::ToolPose* pose,
+                                               BodyModel& model);
+  bool lift_shares(const SurfaceWatch::Depths& depths, const topology::ToolPose& pose, BodyModel& model) const;
+  [[nodiscard]] std::vector<int> touchable(std::vector<int> nodes, const topology::ToolPose& pose,
+                                           const BodyModel& model) const;
   [[nodiscard]] const VectorX& displacements_of(const BodyModel& model) const;
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model) const;
   bool move_blade(const StepSample& sample, CutReport& report);
@@ -294,6 +305,7 @@ class Session {
   [[nodiscard]] topology::FrontGrowth join_tears(const std::vector<solvers::FrontState>& states) const;
   bool take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report, BodyUpdate& update);
   void report_cut(CutReport& report) const;
+  void report_opening(const topology::Wound& wound, CutReport& report) const;
   [[nodiscard]] double depth_of_press(const topology::SurfaceContact& contact) const;
   void evaluate(StepResult& result);
   void evaluate_nodes(StepResult& result);
@@ -361,6 +373,7 @@ class Session {
   std::optional<topology::Wound> shown_wound_;  // of the body while the cut is ahead of it; empty: that of the cut
   std::optional<solvers::Field> without_blade_; // field of model_ without blade; empty: that is model_.field
   std::optional<topology::SurfaceContact> last_contact_;
+  bool seen_hanging_ = false;                     // the body has been built for approach_hanging() alone
   double put_off_ = 0;                            // m the edge has gone since the body last followed its cut
   std::optional<topology::BladePose> last_blade_; // where the blade was in the last step that had one
   std::vector<topology::BladePose> passed_;       // since then
@@ -372,6 +385,7 @@ class Session {
   VectorX node_displacements_;                                      // m, 3 a node, in the last step
   mutable VectorX displaced_, displaced_coefficients_;              // at the nodes, of a field since solve() began
   mutable const solvers::Discretisation* displaced_body_ = nullptr; // of that field; null: none
+  std::optional<SurfaceWatch::Depths> penetration_; // of the surface in the last solution; empty: not looked at
   std::optional<Grasp> grasp_;
   std::optional<bool> grip_; // a hand's; empty: by the times of the scenario
   bool lost_grip_ = false;   // the piece in the grasper has come off

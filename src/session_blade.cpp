@@ -230,6 +230,7 @@ std::optional<BodyModel> Session::propose_cut(const std::vector<topology::BladeP
     if (!sweep_proposal(poses, sample, report))
       return std::nullopt;
     BodyModel next;
+    next.touched_from = facing();
     next.incision = incisions_->incision();
     rebuild_ = Rebuild::in_step;
     const auto to_rest = [this](const Vector3& x) { return rest_position(x, model_); };

@@ -245,6 +245,7 @@ bool Session::cut(const StepSample& sample, CutReport& report) {
   }
   try {
     BodyModel next;
+    next.touched_from = facing();
     next.incision = incisions_->incision();
     if (!grasps()) // a grasper remembers what it holds
       require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
@@ -308,6 +309,28 @@ void Session::check_held(double time) {
                                                                        : "it leaves the computation"));
 }
 
+// Lips in contact are held together in the mean over their shares; where they are apart, the distance is that of the
+// surface, or, where no picture is made of it, of the nodes on it.
+void Session::report_opening(const topology::Wound& wound, CutReport& report) const {
+  constexpr double touching = 1e-9; // m, as finely as the contact of the lips is solved
+  double apart = 0;
+  for (const double mean : normal_openings(model_))
+    apart = std::max(apart, mean);
+  const auto tell = [&](double largest) { report.opening = apart > touching ? std::max(largest, touching) : apart; };
+  if (!force_only_) {
+    const Opening opening = opening_of(wound, model_);
+    report.opening_volume = opening.volume;
+    tell(opening.largest);
+    return;
+  }
+  const VectorX& moved = displacements_of(model_);
+  double largest = 0;
+  for (const solvers::LipPair& pair : model_.pairs)
+    largest = std::max(largest, pair.normal.dot(moved.segment<3>(3 * static_cast<Eigen::Index>(pair.plus)) -
+                                                moved.segment<3>(3 * static_cast<Eigen::Index>(pair.minus))));
+  tell(largest);
+}
+
 void Session::report_cut(CutReport& report) const {
   const topology::Wound& wound = *this->wound();
   if (blade_force_ != nullptr)
@@ -325,12 +348,9 @@ void Session::report_cut(CutReport& report) const {
   report.nodes = model_.sprinkling.nodes.size();
   report.lip_pairs = static_cast<int>(model_.pairs.size());
   if (model_.state) {
-    for (const double opening : normal_openings(model_))
-      report.opening = std::max(report.opening, opening);
-    if (!force_only_)
-      report.opening_volume = opening_volume(wound, model_);
-    for (const char closed : model_.state->lips.closed)
-      report.closed_pairs += closed;
+    report_opening(wound, report);
+    for (std::size_t p = 0; p < std::min(model_.pairs.size(), model_.state->lips.closed.size()); ++p)
+      report.closed_pairs += model_.state->lips.closed[p];
     report.lips_converged = model_.state->lips.converged;
   }
   if (!force_only_)

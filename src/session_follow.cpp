@@ -62,6 +62,7 @@ void Session::begin_following(const topology::SurfaceContact& centre) {
     model.incision = how.incision;
     model.sprinkling = resprinkle_held(scenario, *domain, how, previous);
     model.coarseness = coarseness;
+    model.touched_from = centre.normal;
     const std::vector<int> near = touchable_nodes(scenario, *domain, model.sprinkling.nodes, centre, reach);
     app::assemble(scenario, domain, model, {}, near);
     app::condense(without_dropped(near, scenario, *model.body), model);
@@ -100,7 +101,7 @@ std::future<Session::MadeAside> Session::make_beside(std::shared_ptr<const topol
   auto make = [&scenario = scenario_, domain = organ_.domain, how = sprinkle_options(next),
                incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, reason,
                coarseness = coarseness_, centre = touches ? zone_contact_ : std::nullopt,
-               reach = zone_.candidate_radius, waits_for = std::move(unwanted_)]() mutable {
+               reach = zone_.candidate_radius, facing = facing(), waits_for = std::move(unwanted_)]() mutable {
     yield_to_steps();
     if (waits_for.valid())
       waits_for.wait();
@@ -109,6 +110,7 @@ std::future<Session::MadeAside> Session::make_beside(std::shared_ptr<const topol
     BodyUpdate& update = made.report;
     model.incision = how.incision;
     model.coarseness = coarseness;
+    model.touched_from = facing;
     BodyModel before;
     before.incision = std::move(incision_before);
     before.sprinkling = std::move(sprinkling);

@@ -58,7 +58,7 @@ std::vector<solvers::FrontState> Session::front_states() const {
   const double fine = zone_.spacing.fine;
   std::vector<Vector3> closed;
   if (model_.state)
-    for (std::size_t p = 0; p < model_.state->lips.closed.size(); ++p)
+    for (std::size_t p = 0; p < std::min(model_.pairs.size(), model_.state->lips.closed.size()); ++p)
       if (model_.state->lips.closed[p] != 0)
         closed.push_back(model_.sprinkling.nodes.positions[model_.pairs[p].plus]);
   std::vector<solvers::FrontState> states =

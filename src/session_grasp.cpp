@@ -8,6 +8,7 @@
 namespace spherecut::app {
 namespace {
 
+constexpr std::array<bool, 3> all_axes{true, true, true};
 constexpr double kept_about = 1.5; // fine spacings beyond the jaws: nodes that share the surface with the patch
 
 topology::SurfaceContact grasped_place(const topology::Domain& domain, const Vector3& x) {
@@ -44,14 +45,12 @@ FirstTouch Session::find_grasp(const std::vector<ToolSample>& motion, Leader lea
 // Free nodes of the organ's surface between the jaws: within the radius of the place, not beyond a cut.
 std::vector<int> Session::grasped_nodes(const BodyModel& model) const {
   const solvers::NodeCloud& nodes = model.sprinkling.nodes;
-  std::vector<char> held(nodes.positions.size(), 0);
-  for (const solvers::Prescribed& entry : fixed_nodes(scenario_, *organ_.domain, nodes))
-    held[entry.node] = 1;
+  const std::vector<std::array<bool, 3>> held = held_axes(fixed_nodes(scenario_, *organ_.domain, nodes), nodes.size());
   const double reach = topology::tip_radius(scenario_.tool->shape);
   const Vector3 inside = grasp_->place - 1e-3 * zone_.spacing.fine * grasp_->normal;
   std::vector<int> grasped;
   for (int i = 0; i < nodes.size(); ++i)
-    if (on_surface(nodes.kinds[i]) && held[i] == 0 && (nodes.positions[i] - grasp_->place).norm() <= reach &&
+    if (on_surface(nodes.kinds[i]) && held[i] != all_axes && (nodes.positions[i] - grasp_->place).norm() <= reach &&
         (model.incision == nullptr || !model.incision->blocks(inside, nodes.positions[i])))
       grasped.push_back(i);
   if (grasped.empty())

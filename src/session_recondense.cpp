@@ -146,6 +146,7 @@ bool Session::take_recondensed(BodyModel& into, solvers::ContactPatch& patch) {
   if (made.body == nullptr)
     return false;
   into.body = std::move(made.body);
+  into.watch.reset();
   into.not_following = "";
   into.window_way = std::move(recondensing_way_);
   into.added_nodes = 0;
@@ -185,6 +186,7 @@ bool Session::swap_body() {
     return true;
   }
   model_.base = patch.base;
+  patch.lifts = std::move(model_.patch.lifts);
   model_.patch = std::move(patch);
   return true;
 }

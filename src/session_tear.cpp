@@ -166,6 +166,7 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
   const auto before = model_.incision;
   try {
     BodyModel next;
+    next.touched_from = facing();
     next.incision = incisions_->incision();
     CutGrowth growth{.way_ahead = [&] { return way_of_front(before.get(), *next.incision); }};
     if (!grasps())

@@ -71,11 +71,13 @@ OrderedJson peak(const StepResult& step) {
 
 OrderedJson solver(const Session& session, const RunFindings& findings) {
   OrderedJson out = {{"largest_residual", findings.largest_residual},
-                     {"largest_rotation_degrees", findings.largest_rotation_degrees}};
+                     {"largest_rotation_degrees", findings.largest_rotation_degrees},
+                     {"largest_penetration_m", findings.largest_penetration},
+                     {"self_penetration_m", findings.self_penetration}};
   if (session.body() != nullptr) {
     const solvers::AssemblyReport& report = session.body()->report();
     out["unknowns"] = report.unknowns;
-    out["fixed_nodes"] = session.body()->problem().prescribed.size();
+    out["fixed_nodes"] = held_nodes(session.body()->problem().prescribed);
     out["matrix_nonzeros"] = report.matrix_nonzeros;
     out["factor_nonzeros"] = report.factor_nonzeros;
     out["condition_estimate"] = report.condition_estimate;

@@ -1,6 +1,5 @@
 #include "src/tool_motion.hpp"
 
-#include "topology/domain.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -73,8 +72,8 @@ std::vector<double> with_corners(std::vector<double> times, const std::vector<do
 }
 
 std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::ContactQuery& organ,
-                                    const topology::Domain& domain) {
-  const std::vector<PathPoint> path = waypoints(tool, organ, domain.bounds());
+                                    const BoundingBox& bounds) {
+  const std::vector<PathPoint> path = waypoints(tool, organ, bounds);
   const double start = path.front().time;
   const double duration = path.back().time - start;
   const double step = tool.step > 0 ? tool.step : duration / default_steps;
@@ -92,14 +91,14 @@ std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::Co
     return motion;
   const topology::ToolPose& pose = motion.front().pose;
   const auto contact = organ.first_touch(tool.shape, pose);
-  if (contact.depth > touch_tolerance || domain.signed_distance(pose.point) < -touch_tolerance)
+  const double inside = organ.closest_point(pose.point).depth;
+  if (contact.depth > touch_tolerance || inside > touch_tolerance)
     throw InputError(fmt::format("{}: the tool starts inside the organ, {:.3g} mm deep at t = {:g} s; allowed: a start "
                                  "outside",
                                  std::holds_alternative<Approach>(tool.motion)
                                      ? fmt::format("tool.approach: its start at {}", metres_text(pose.point))
                                      : fmt::format("tool.path[1].position = {}", metres_text(pose.point)),
-                                 1e3 * std::max(contact.depth, -domain.signed_distance(pose.point)),
-                                 motion.front().time));
+                                 1e3 * std::max(contact.depth, inside), motion.front().time));
   return motion;
 }
 

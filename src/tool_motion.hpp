@@ -15,10 +15,11 @@ struct ToolSample {
 std::vector<double> with_corners(std::vector<double> times, const std::vector<double>& corners, double step);
 
 /// Poses from the start to the end of the motion, every ToolSettings::step seconds (0: 20 steps) and at every pose of
-/// its path. An approach is placed by its first touch of the surface at rest; when its line misses the organ it runs
-/// past the target instead. Throws InputError, with the key, when the tool touches or is inside the organ at the start.
+/// its path. An approach is placed by its first touch of the surface; when its line misses the organ it runs past the
+/// target instead. The surface, within `bounds`, is that at rest or that of the body as its loads have moved it. Throws
+/// InputError, with the key, when the tool touches or is inside the organ at the start.
 std::vector<ToolSample> tool_motion(const ToolSettings& tool, const topology::ContactQuery& organ,
-                                    const topology::Domain& domain);
+                                    const BoundingBox& bounds);
 
 /// The first contact on the motion: where the tool begins to touch the surface at rest, between two samples found by
 /// bisection to 1e-7 m. Empty when it never does.

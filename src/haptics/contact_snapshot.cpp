@@ -10,7 +10,7 @@ namespace spherecut::app {
 
 ContactSnapshot::ContactSnapshot()
     : displacement(most_candidates), forces(most_candidates), along(most_candidates), bond(most_candidates),
-      active(most_candidates) {}
+      active(most_candidates), lifts(most_candidates) {}
 
 std::shared_ptr<const CondensedContact> numbered(CondensedContact condensed) {
   static std::atomic<std::uint64_t> made = 0;
@@ -111,6 +111,7 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
     snapshot.along[k] = state.along.empty() ? Vector3::Zero() : state.along[c];
     snapshot.bond[k] = state.bond.empty() ? Vector3::Zero() : state.bond[c];
     snapshot.active[k] = state.active[c];
+    snapshot.lifts[k] = solvers::lift_of(patch, c);
     snapshot.reach = std::max(snapshot.reach, (patch.rest[c] - contact.point).norm());
   }
   snapshot.condensed = condensed_contact(patch, chosen, last);

@@ -52,6 +52,7 @@ struct ContactSnapshot {
   std::vector<Vector3> along;        // N, frictional: part of the forces that acts along the tool's surface
   std::vector<Vector3> bond;         // m, displacement at which an active node sticks to the tool
   std::vector<char> active;          // in contact
+  std::vector<double> lifts;         // m, as ContactPatch::lifts
   double rest_sum = 0;               // of all entries: equal sums mean the same candidates
   double reach = 0;                  // m, of the candidates about the contact's point
   std::shared_ptr<const CondensedContact> condensed; // null: no candidates

@@ -154,6 +154,13 @@ void TangentModel::fetch() const noexcept {
   }
 }
 
+// Between the tool and the surface of a candidate that has moved by u.
+solvers::Gap TangentModel::gap_of(const solvers::PressingTool& tool, int c, const Vector3& u) const noexcept {
+  solvers::Gap gap = solvers::contact_gap(tool, condensed_->rest[c] + u);
+  gap.distance -= snapshot_->lifts[c];
+  return gap;
+}
+
 // Pressures of the active candidates that close their gaps: N^T C N p = -q by Cholesky, column by column. False: the
 // block is not positive definite, and the candidate that made it so has been let go.
 bool TangentModel::solve_active() noexcept {
@@ -329,7 +336,7 @@ void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
   for (int c = 0; c < snapshot_->count; ++c) {
     if (active_[c] == 0 && clearance_[c] - travelled_ > far)
       continue;
-    const double gap = solvers::contact_gap(tool, condensed_->rest[c] + displacement_[c]).distance;
+    const double gap = gap_of(tool, c, displacement_[c]).distance;
     clearance_[c] = gap + travelled_;
     if (active_[c] != 0 || gap <= 2 * far)
       near_[near_count_++] = c;
@@ -358,7 +365,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     ++result.rounds;
     for (int k = 0; k < near_count_; ++k) {
       const int c = near_[k];
-      const solvers::Gap gap = solvers::contact_gap(tool, condensed_->rest[c] + displacement_[c]);
+      const solvers::Gap gap = gap_of(tool, c, displacement_[c]);
       normal_[c] = gap.normal;
       gap_[c] = gap.distance + gap.normal.dot(condensed_->base[c] - displacement_[c]);
       fresh_[c] = 0;
@@ -515,7 +522,7 @@ ModelForce TangentModel::follow(const topology::ToolPose& pose) noexcept {
     for (int c = 0; c < count && chosen_count_ < most_bonded; ++c) {
       if (active_[c] != 0)
         continue;
-      const solvers::Gap gap = solvers::contact_gap(tool, condensed_->rest[c] + moved_[c]);
+      const solvers::Gap gap = gap_of(tool, c, moved_[c]);
       result.sinking = std::max(result.sinking, -gap.distance);
       if (gap.distance < -gap_slack) {
         bond_[c] = moved_[c] - gap.distance * gap.normal;

@@ -28,6 +28,7 @@ class TangentModel : public ForceModel {
 
   ModelForce press(const topology::ToolPose& pose) noexcept;
   ModelForce follow(const topology::ToolPose& pose) noexcept;
+  [[nodiscard]] solvers::Gap gap_of(const solvers::PressingTool& tool, int c, const Vector3& u) const noexcept;
   [[nodiscard]] bool solve_active() noexcept;
   void displace() noexcept;
   void drag_along() noexcept;
