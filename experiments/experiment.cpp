@@ -55,6 +55,8 @@ const std::vector<Experiment>& all_experiments() {
       {"haptic_loop", "60 s of palpating and cutting a liver in real time: time and lateness of every tick",
        run_haptic_loop},
       {"solve_rate", "whole steps from contact to force a second, uncut and while cutting", run_solve_rate},
+      {"real_world", "what people bring: organs from files, thin walls, loads alone, against closed forms",
+       run_real_world},
       {"remeshing_ledger", "time an increment of a cut takes at equal error: finite spheres against finite elements",
        run_remeshing_ledger},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
