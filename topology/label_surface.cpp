@@ -1,6 +1,7 @@
 #include "topology/errors.hpp"
 #include "topology/label_volume.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

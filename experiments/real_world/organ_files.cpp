@@ -78,7 +78,7 @@ std::string pressed_cube(const std::string& file, const std::string& method, int
       "[organ]\nshape = \"file\"\nfile = \"{}\"\n[material]\nyoung_modulus = 1e4\npoisson_ratio = 0.3\n"
       "[[fixed]]\nregion = \"half_space\"\npoint = [0, 0, 5e-4]\nnormal = [0, 0, 1]\n"
       "[method]\nname = \"{}\"\n[nodes]\nfine_spacing = 0.002\ncoarse_spacing = 0.002\nrandom_seed = {}\n"
-      "[tool]\nshape = \"sphere_tip\"\nradius = 0.004\nstep = 1\n[tool.approach]\n"
+      "[tool]\nshape = \"sphere_tip\"\nradius = 0.008\nstep = 1\n[tool.approach]\n"
       "target = [0.01, 0.01, 0.02]\ndirection = [0, 0, -1]\ndepth = 0.001\n",
       file, method, seed);
 }

@@ -126,9 +126,8 @@ TEST_CASE("One cut has the same nodes however far its sheet reaches out of the b
 
 TEST_CASE("A sheet that ends just below the surface is cut through to it, and that is said") {
   const auto front_of = [](double below, bool& said) {
-    const std::string text =
-        cut_block + rectangle_precut(fmt::format("[0, 0, {}]", 0.03 - below - 0.006), "[1, 0, 0]", "[0, 0, 1]", "0.02",
-                                     "0.012");
+    const std::string text = cut_block + rectangle_precut(fmt::format("[0, 0, {}]", 0.03 - below - 0.006), "[1, 0, 0]",
+                                                          "[0, 0, 1]", "0.02", "0.012");
     const Session session = session_of(text);
     said = warns(session, "cut through to the surface");
     return session.incision()->front_length();
@@ -142,9 +141,8 @@ TEST_CASE("A sheet that ends just below the surface is cut through to it, and th
 
 TEST_CASE("A small piece is judged by the nodes that it gets") {
   // A corner of 9 mm, on nodes 12 mm apart where nothing asks for finer ones.
-  const std::string corner =
-      rectangle_precut("[0.0255, 0.0255, 0.0255]", "[1, 1, 1]", "[1, -1, 0]", "0.08", "0.08") +
-      "[cut]\nunheld = \"hold\"\n";
+  const std::string corner = rectangle_precut("[0.0255, 0.0255, 0.0255]", "[1, 1, 1]", "[1, -1, 0]", "0.08", "0.08") +
+                             "[cut]\nunheld = \"hold\"\n";
   const Session session = session_of(cut_block + corner);
   const auto& nodes = session.sprinkling().nodes;
   int in_corner = 0;
@@ -170,12 +168,14 @@ TEST_CASE("Nodes that nobody has chosen follow a thin wall; chosen ones that can
 
 TEST_CASE("The margin of a liver is no wall that is too thin for its nodes") {
   const Session session = session_of("[organ]\nshape = \"liver\"\ntriangles = 5000\n[material]\nyoung_modulus = 6e3\n"
-                                     "poisson_ratio = 0.45\n" + held_below("-0.02") + "[nodes]\nfine_spacing = 0.008\n"
+                                     "poisson_ratio = 0.45\n" +
+                                     held_below("-0.02") +
+                                     "[nodes]\nfine_spacing = 0.008\n"
                                      "coarse_spacing = 0.03\n[gravity]\nacceleration = [0, 0, -9.81]\n");
   CHECK(session.sprinkling().nodes.size() > 100);
   const Session derived = session_of("[organ]\nshape = \"liver\"\ntriangles = 5000\n[material]\nyoung_modulus = 6e3\n"
-                                     "poisson_ratio = 0.45\n" + held_below("-0.02") +
-                                     "[gravity]\nacceleration = [0, 0, -9.81]\n");
+                                     "poisson_ratio = 0.45\n" +
+                                     held_below("-0.02") + "[gravity]\nacceleration = [0, 0, -9.81]\n");
   CHECK(derived.sprinkling().nodes.size() < 4000);
 }
 

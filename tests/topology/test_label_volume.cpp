@@ -1,6 +1,7 @@
 // Label volumes: the same ball of voxels in each format, and its surface.
 #include "tests/support/mesh_checks.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "topology/domain.hpp"
 #include "topology/errors.hpp"
 #include "topology/label_volume.hpp"
 #include "topology/surface_check.hpp"
@@ -175,7 +176,13 @@ TEST_CASE("Damaged label volumes are refused in words, wherever they end", "[lab
     const auto file = folder.path() / name;
     for (std::size_t part = 1; part < 40; ++part) {
       save(file, bytes.substr(0, bytes.size() * part / 40));
-      CHECK_THROWS_WITH(read_label_volume(file), Catch::Contains(name));
+      try { // of a packed file, what follows the last label may be missing
+        const LabelVolume volume = read_label_volume(file);
+        CHECK(part == 39);
+        require_ball(volume);
+      } catch (const InputError& error) {
+        CHECK_THAT(error.what(), Catch::Contains(name));
+      }
       std::string flipped = bytes;
       flipped[bytes.size() * part / 40] = static_cast<char>(flipped[bytes.size() * part / 40] ^ 0x2A);
       save(file, flipped);
@@ -198,7 +205,7 @@ TEST_CASE("Damaged label volumes are refused in words, wherever they end", "[lab
   std::string image;
   for (std::size_t i = 0; i < ball_labels().size(); ++i)
     image += fmt::format("{} ", 0.37 * static_cast<double>(i));
-  refused("a.nrrd", nrrd("float", "text", image), "is this an image");
+  refused("a.nrrd", nrrd("float", "text", image), "Is this an image");
   refused("a.mha", mha("MET_UCHAR", false, raw.substr(1)), "cut short");
   std::string huge = mha("MET_UCHAR", false, raw);
   huge.replace(huge.find("DimSize = 24"), 12, "DimSize = 24000000");
@@ -244,12 +251,15 @@ TEST_CASE("Which label is the organ is told, asked for, or refused", "[label_vol
 }
 
 TEST_CASE("A wall of one voxel stays a wall", "[label_volume]") {
-  LabelVolume plate{{12, 12, 5}, Vector3::Zero(), 1e-3 * Matrix3::Identity(), true, {}};
+  constexpr int wide = 32;
+  LabelVolume plate{{wide, wide, 5}, Vector3::Zero(), 1e-3 * Matrix3::Identity(), true, {}};
   for (int k = 0; k < 5; ++k)
-    for (int j = 0; j < 12; ++j)
-      for (int i = 0; i < 12; ++i)
-        plate.labels.push_back(k == 2 && i > 0 && i < 11 && j > 0 && j < 11 ? 1 : 0);
+    for (int j = 0; j < wide; ++j)
+      for (int i = 0; i < wide; ++i)
+        plate.labels.push_back(k == 2 && i > 0 && i < wide - 1 && j > 0 && j < wide - 1 ? 1 : 0);
   const CheckedSurface surface = check_surface(label_surface(plate, 1, "plate").soup, "plate");
   tests::require_closed_sphere(surface.mesh);
-  CHECK(topology::volume(surface.mesh) == Approx(100e-9).epsilon(0.12));
+  CHECK(topology::volume(surface.mesh) == Approx((wide - 2) * (wide - 2) * 1e-9).epsilon(0.1));
+  const auto domain = make_organ_domain(surface.mesh, 2.4e-4);
+  CHECK(domain->signed_distance(Vector3(0.0155, 0.0155, 0.002)) == Approx(-5e-4).epsilon(0.05));
 }

@@ -138,7 +138,7 @@ TEST_CASE("Files that are missing, empty, folders or of another kind are refused
   CHECK_THROWS_WITH(read_polygons(save(folder, "empty.ply", "")), Catch::Contains("empty"));
   std::filesystem::create_directory(folder.path() / "folder.obj");
   CHECK_THROWS_WITH(read_polygons(folder.path() / "folder.obj"), Catch::Contains("folder"));
-  CHECK_THROWS_WITH(read_polygons(save(folder, "a.vtk", "x")), Catch::Contains(".vtk") && Catch::Contains(".stl"));
+  CHECK_THROWS_WITH(read_polygons(save(folder, "a.xyz", "x")), Catch::Contains(".xyz") && Catch::Contains(".stl"));
   CHECK_THROWS_WITH(read_polygons(save(folder, "noextension", "x")), Catch::Contains("extension"));
   const SurfaceMesh mesh = make_block(Vector3(1, 1, 1), 1);
   // The wrong extension for the contents.
