@@ -57,7 +57,7 @@ const std::vector<Experiment>& all_experiments() {
        run_haptic_loop},
       {"solve_rate", "whole steps from contact to force a second, uncut and while cutting", run_solve_rate},
       {"real_world",
-       "what people bring: hardware at its own rate, hands that go where they like, disorder from outside",
+       "what people bring: organs from files, thin walls, loads alone, hardware at its own rate, disorder from outside",
        run_real_world},
       {"remeshing_ledger", "time an increment of a cut takes at equal error: finite spheres against finite elements",
        run_remeshing_ledger},

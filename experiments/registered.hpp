@@ -32,5 +32,6 @@ std::vector<Check> run_force_continuity(const ExperimentContext& context);
 std::vector<Check> run_passivity(const ExperimentContext& context);
 std::vector<Check> run_haptic_loop(const ExperimentContext& context);
 std::vector<Check> run_solve_rate(const ExperimentContext& context);
+std::vector<Check> run_real_world(const ExperimentContext& context);
 
 } // namespace spherecut::experiments

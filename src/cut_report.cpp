@@ -2,6 +2,7 @@
 
 #include "topology/errors.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <fmt/format.h>
@@ -134,6 +135,33 @@ std::vector<int> tissue_pieces(const topology::Wound& wound) {
   return tissue_pieces(wound, piece_areas(wound));
 }
 
+void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& spacing) {
+  if (wound.pieces.size() < 2)
+    return;
+  const std::vector<PieceArea> areas = piece_areas(wound);
+  for (const int piece : tissue_pieces(wound, areas)) {
+    const Vector3 middle = areas[piece].moment / areas[piece].area;
+    const double size = size_of(wound.pieces[piece], areas[piece]);
+    if (size >= spacing(middle) || size < spacing.fine)
+      continue;
+    Matrix3 spread = Matrix3::Zero();
+    std::vector<Vector3> corners;
+    for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t)
+      if (wound.piece_of(static_cast<int>(t)) == piece)
+        for (const int vertex : wound.surface.triangles[t]) {
+          corners.push_back(wound.surface.vertices[vertex] - middle);
+          spread += corners.back() * corners.back().transpose();
+        }
+    const Vector3 axis = Eigen::SelfAdjointEigenSolver<Matrix3>(spread).eigenvectors().col(2);
+    double lower = 0, upper = 0;
+    for (const Vector3& corner : corners) {
+      lower = std::min(lower, axis.dot(corner));
+      upper = std::max(upper, axis.dot(corner));
+    }
+    spacing.segments.push_back({middle + lower * axis, middle + upper * axis});
+  }
+}
+
 void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing) {
   if (wound.pieces.size() < 2)
     return;
@@ -142,9 +170,11 @@ void require_pieces(const topology::Wound& wound, const solvers::SpacingField& s
     const Vector3 middle = areas[piece].moment / areas[piece].area;
     const double size = size_of(wound.pieces[piece], areas[piece]);
     if (const double h = spacing(middle); size < h)
-      throw InputError(fmt::format("the cut leaves a piece of {:.3g} m3 at [{:.4g}, {:.4g}, {:.4g}] m that is smaller "
-                                   "than the node spacing: {:.3g} m across; allowed: at least {:.3g} m",
-                                   wound.pieces[piece].volume, middle.x(), middle.y(), middle.z(), size, h));
+      throw InputError(
+          fmt::format("the cut leaves a piece of {:.3g} m3 at [{:.4g}, {:.4g}, {:.4g}] m that is smaller "
+                      "than the node spacing there: {:.3g} m across; allowed: at least {:.3g} m. Finer nodes "
+                      "(cut.front_spacing, nodes.fine_spacing, nodes.count) or a cut elsewhere do",
+                      wound.pieces[piece].volume, middle.x(), middle.y(), middle.z(), size, h));
   }
 }
 

@@ -43,6 +43,9 @@ Opening opening_of(const topology::Wound& wound, const BodyModel& model);
 /// volume / area is below 2e-4 of the largest piece's.
 std::vector<int> tissue_pieces(const topology::Wound& wound);
 
+/// Makes nodes fine along every piece that would be too small for the spacing there but not for the fine one.
+void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& spacing);
+
 /// Throws InputError naming the first piece that is smaller than the node spacing there: 6 volume / area, the diameter
 /// of a ball of that ratio, below it. Splinters are left out here
 /// and below.

@@ -1,7 +1,7 @@
 #include "src/incision_builder.hpp"
 
+#include "src/precut_sheets.hpp"
 #include "src/schedule.hpp"
-#include "topology/cut_sheets.hpp"
 #include "topology/errors.hpp"
 #include "topology/sheet_front.hpp"
 
@@ -12,25 +12,9 @@
 namespace spherecut::app {
 namespace {
 
-topology::SurfaceMesh sheet_of(const PrecutSettings& precut, double edge) {
-  // A sheet smaller than the triangles wanted gets four of them across.
-  if (const auto* disc = std::get_if<DiscSheet>(&precut.shape))
-    return topology::make_disc_sheet(disc->centre, disc->normal, disc->radius, std::min(edge, disc->radius / 2));
-  if (const auto* rectangle = std::get_if<RectangleSheet>(&precut.shape))
-    return topology::make_rectangle_sheet(rectangle->centre, rectangle->normal, rectangle->up, rectangle->width,
-                                          rectangle->height,
-                                          std::min({edge, rectangle->width / 4, rectangle->height / 4}));
-  if (const auto* polygon = std::get_if<PolygonSheet>(&precut.shape)) {
-    for (std::size_t i = 0; i < polygon->points.size(); ++i)
-      edge = std::min(edge, (polygon->points[i] - polygon->points[(i + 1) % polygon->points.size()]).norm());
-    return topology::make_polygon_sheet(polygon->points, edge);
-  }
-  const auto& file = std::get<SheetFile>(precut.shape);
-  return topology::read_sheet(file.file, file.scale);
-}
-
 constexpr double same_edge_place = 1e-6; // edges: nearer to the pose before it a pose is the same
 constexpr double straight = 2e-3;        // edges: a way is, where no pose put off is farther from it
+constexpr double near_surface = 0.02;    // edges, two of which are a spacing: a sheet's end so near to it is on it
 constexpr double least_overlap = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
 
 /// Part of a sheet's area that lies on the cut so far, 0 to 1, looked at every `edge` m.
@@ -66,8 +50,15 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
   for (std::size_t k = 0; k < scenario.precuts.size(); ++k) {
     const PrecutSettings& precut = scenario.precuts[k];
     try { // one at a time, so that an unusable sheet is told with its line
-      topology::SurfaceMesh sheet = sheet_of(precut, edge);
+      std::vector<std::string> said;
+      topology::SurfaceMesh sheet = precut_sheet(precut, *domain_, edge, &said);
       topology::check_sheet(sheet, "its sheet"); // before the incision does, which counts sheets from 0
+      if (const int moved = end_on_surface(sheet, *domain_, near_surface * edge); moved > 0)
+        said.push_back(fmt::format("its sheet ended less than {:.2g} mm below the surface at {} vertices: it is cut "
+                                   "through to the surface there",
+                                   1e3 * near_surface * edge, moved));
+      for (const std::string& remark : said)
+        remarks_.push_back(fmt::format("precut[{}]: {}", k + 1, remark));
       if (!topology::reaches_inside(sheet, *domain_))
         throw InputError(
             fmt::format("lies outside the organ: no point of its {} triangles is inside", sheet.triangles.size()));

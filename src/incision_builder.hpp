@@ -14,6 +14,8 @@ class IncisionBuilder {
   /// line of a sheet that cannot be used or lies outside the organ.
   IncisionBuilder(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double edge);
 
+  /// What was done to the sheets of the precuts to make them sound.
+  [[nodiscard]] const std::vector<std::string>& remarks() const { return remarks_; }
   [[nodiscard]] const topology::Wound& wound() const { return wound_->wound(); }
   /// Null while nothing is cut.
   [[nodiscard]] const std::shared_ptr<const topology::Incision>& incision() const { return incision_; }
@@ -74,6 +76,7 @@ class IncisionBuilder {
   void find_swept();
   void use(const std::vector<topology::SurfaceMesh>& sheets);
 
+  std::vector<std::string> remarks_;
   std::shared_ptr<const topology::Domain> domain_;
   std::optional<topology::Blade> blade_;
   topology::SweepOptions options_;

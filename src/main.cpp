@@ -197,6 +197,8 @@ int run(int argc, char** argv) {
 
   auto* check = commands.add_subcommand("check", "Check a scenario without running it");
   check->add_option("scenario", scenario, "TOML file")->required()->check(named);
+  check->add_option("--write", out, "Surface file (.obj, .ply) for the organ as it is mended, in the unit of its file")
+      ->check(named);
 
   app::HapticCommand haptic;
   auto* haptics = commands.add_subcommand("haptics", "Hold the tool of a scenario in real time, with a force at 1 kHz");
@@ -272,7 +274,7 @@ int run(int argc, char** argv) {
   if (serve->parsed())
     return status_of(app::serve(served, stdout));
   if (check->parsed())
-    app::check_scenario(scenario, stdout);
+    app::check_scenario(scenario, out, stdout);
   else if (list->parsed())
     list_experiments(names_only);
   else if (run_one->parsed())

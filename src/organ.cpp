@@ -1,6 +1,7 @@
 #include "src/organ.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/label_volume.hpp"
 #include "topology/organs.hpp"
 #include "topology/surface_check.hpp"
 
@@ -37,18 +38,42 @@ struct Maker {
     return {topology::make_organ_domain(topology::make_liver(liver.triangles), settings.voxel_size), {}};
   }
   Organ operator()(const FileOrgan& organ) const {
-    topology::CheckedSurface surface = topology::read_surface(organ.file, organ.scale);
+    topology::CheckedSurface surface = read_organ_surface(organ);
     std::vector<std::string> remarks = std::move(surface.mended);
     remarks.insert(remarks.end(), surface.warnings.begin(), surface.warnings.end());
     try {
       return {topology::make_organ_domain(std::move(surface.mesh), settings.voxel_size), std::move(remarks)};
     } catch (const InputError& error) {
-      throw InputError(fmt::format("{} (organ.scale = {:g}): {}", organ.file.string(), organ.scale, error.what()));
+      const std::string scale = organ.scale > 0 ? fmt::format(" (organ.scale = {:g})", organ.scale) : "";
+      throw InputError(fmt::format("{}{}: {}", organ.file.string(), scale, error.what()));
     }
   }
 };
 
 } // namespace
+
+topology::CheckedSurface read_organ_surface(const FileOrgan& organ) {
+  if (!topology::is_label_volume(organ.file))
+    return topology::read_surface(organ.file, organ.scale > 0 ? organ.scale : 1, organ.choices);
+  const std::string name = organ.file.string();
+  topology::LabelSurface made =
+      topology::label_surface(topology::read_label_volume(organ.file, organ.scale), organ.label, name);
+  topology::CheckedSurface surface = topology::check_surface(made.soup, name, organ.choices);
+  surface.mended.insert(surface.mended.begin(), made.remarks.begin(), made.remarks.end());
+  return surface;
+}
+
+void write_organ_surface(const OrganSettings& settings, const std::filesystem::path& file) {
+  if (std::filesystem::exists(file))
+    throw InputError(fmt::format("{}: is there already; allowed: a name that is not taken", file.string()));
+  const auto* from_file = std::get_if<FileOrgan>(&settings.shape);
+  topology::SurfaceMesh mesh =
+      from_file != nullptr ? read_organ_surface(*from_file).mesh : make_organ(settings).domain->surface();
+  if (from_file != nullptr && from_file->scale > 0 && !topology::is_label_volume(from_file->file))
+    for (Vector3& v : mesh.vertices)
+      v /= from_file->scale;
+  topology::write_surface(file, mesh);
+}
 
 Organ make_organ(const OrganSettings& settings) {
   // A liver is what its settings say and never changes: a session that is made beside another of the same (a reset)

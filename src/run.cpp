@@ -69,6 +69,19 @@ std::string findings_text(const Session& session, const RunOutput& output, const
   } else if (session.scenario().tool) {
     text += fmt::format("no contact: the force is zero in all {} steps\n", found.steps);
   }
+  if (!session.scenario().tool && !session.cuts()) {
+    double largest = 0;
+    Vector3 place = Vector3::Zero();
+    for (std::size_t i = 0; i < session.node_states().size(); ++i)
+      if (const double motion = session.node_states()[i].displacement.norm(); motion > largest) {
+        largest = motion;
+        place = session.sprinkling().nodes.positions[i];
+      }
+    text += fmt::format("under its loads it moves by up to {:.4g} mm, at [{:.4g}, {:.4g}, {:.4g}] m\n", 1e3 * largest,
+                        place.x(), place.y(), place.z());
+    text += fmt::format("  {} nodes, {}, largest residual {:.1e}\n", session.sprinkling().nodes.size(),
+                        solvers::to_string(session.scenario().method.method), found.largest_residual);
+  }
   if (session.cuts()) {
     const CutReport& cut = found.cut;
     if (session.scenario().blade && found.increments == 0)
@@ -191,13 +204,19 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
   return end;
 }
 
-void check_scenario(const std::filesystem::path& file, std::FILE* screen) {
+void check_scenario(const std::filesystem::path& file, const std::filesystem::path& mended, std::FILE* screen) {
   const InterruptWatch watch("interrupted: nothing is known about the scenario", status_of_interrupted);
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
-  const Session session(read_scenario(file), say);
+  Scenario scenario = read_scenario(file);
+  if (!mended.empty()) {
+    write_organ_surface(scenario.organ, mended);
+    say(fmt::format("the organ's surface is in {}", mended.string()));
+  }
+  const Session session(std::move(scenario), say);
   say(short_text(session));
-  if (session.touches() || session.cuts())
+  say(walls_text(session.walls()));
+  if (session.computes())
     say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
   say(fmt::format("{}: good, {} step{}", file.string(), session.steps().size(),

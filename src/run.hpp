@@ -16,8 +16,9 @@ enum class RunEnd { complete, interrupted, differs }; // differs: a replay from 
 /// written until then stays.
 RunEnd run_scenario(const std::filesystem::path& scenario, const std::filesystem::path& out, std::FILE* screen);
 
-/// Everything that run_scenario() does before the first step: organ, motion, precuts, nodes, fixed regions. Throws
+/// Everything that run_scenario() does before the first step: organ, motion, precuts, nodes, fixed regions, and what
+/// the run will take. The organ's surface as it is mended goes to `mended` first, unless that is empty. Throws
 /// InputError.
-void check_scenario(const std::filesystem::path& scenario, std::FILE* screen);
+void check_scenario(const std::filesystem::path& scenario, const std::filesystem::path& mended, std::FILE* screen);
 
 } // namespace spherecut::app

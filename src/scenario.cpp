@@ -3,6 +3,7 @@
 #include "src/cut_reader.hpp"
 #include "src/tear_reader.hpp"
 #include "topology/errors.hpp"
+#include "topology/label_volume.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -36,7 +37,24 @@ OrganSettings organ(const Section& section, const std::filesystem::path& scenari
                                std::filesystem::exists(file, ignored) ? "this is no file, but a folder or a device:"
                                                                       : "there is no file",
                                file.lexically_normal().string()));
-    organ.shape = FileOrgan{file, section.number("scale")};
+    FileOrgan from_file{file, section.optional_number("scale").value_or(0), std::nullopt, {}};
+    if (const auto label = section.optional_integer("label"))
+      from_file.label = static_cast<int>(*label);
+    const std::string pieces = section.text("pieces"), cavities = section.text("cavities");
+    using topology::CavityChoice;
+    using topology::PieceChoice;
+    from_file.choices.pieces = pieces == "largest" ? PieceChoice::largest
+                               : pieces == "all"   ? PieceChoice::all
+                                                   : PieceChoice::refuse;
+    from_file.choices.cavities = cavities == "fill"     ? CavityChoice::fill
+                                 : cavities == "refuse" ? CavityChoice::refuse
+                                                        : CavityChoice::keep;
+    if (from_file.label && !topology::is_label_volume(file))
+      offences.add(section.line("label"),
+                   fmt::format("organ.label = {}: {} is a surface, which has no labels; allowed: "
+                               "with a label volume (.nrrd, .nii, .nii.gz, .mha)",
+                               *from_file.label, section.text("file")));
+    organ.shape = from_file;
   }
   organ.edge = section.optional_number("edge").value_or(0);
   organ.voxel_size = section.optional_number("voxel_size").value_or(0);
@@ -340,8 +358,10 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
     check_blade_force(scenario, root, offences);
   check_tearing(scenario, root, offences);
   scenario.method.cut_ahead = scenario.blade || !scenario.precuts.empty();
-  if (!scenario.tool && !scenario.blade && scenario.precuts.empty() && !scenario.tearing.enabled)
-    offences.add(1, "there is no tool, no blade and no precut: nothing to compute; allowed: one of them or more");
+  if (!scenario.tool && !scenario.blade && scenario.precuts.empty() && !scenario.tearing.enabled && !scenario.gravity &&
+      scenario.pretension.isZero())
+    offences.add(1, "there is no tool, no blade, no precut and no load (gravity, material.pretension): nothing to "
+                    "compute; allowed: one of them or more");
   scenario.haptics = haptics(root.table("haptics"), file, offences);
   const Section output = root.table("output");
   scenario.output = {static_cast<int>(output.integer("vtp_every")), output.boolean("figures")};

@@ -6,6 +6,7 @@
 #include "src/cut_settings.hpp"
 #include "src/haptics/haptic_settings.hpp"
 #include "src/tear_settings.hpp"
+#include "topology/surface_check.hpp"
 #include "topology/tool.hpp"
 
 #include <cstdint>
@@ -31,8 +32,10 @@ struct LiverOrgan {
   int triangles = 20000;
 };
 struct FileOrgan {
-  std::filesystem::path file; // resolved against the scenario's folder
-  double scale = 1;           // m per unit of the file
+  std::filesystem::path file;         // resolved against the scenario's folder
+  double scale = 0;                   // m per unit of the file; 0: derived
+  std::optional<int> label;           // of a label volume; empty: its only one
+  topology::SurfaceChoices choices{}; // of pieces and cavities
 };
 
 struct OrganSettings {

@@ -42,12 +42,38 @@ constexpr std::array keys = {
                 text,
                 "",
                 "required",
-                "OBJ, PLY, STL or OFF file of a closed surface, relative to the scenario file.",
+                "OBJ, PLY, STL, OFF, legacy VTK or VTP file of a closed surface, or a label volume (NRRD, NIfTI or "
+                "MetaImage: .nrrd, .nii, .nii.gz, .mha), relative to the scenario file.",
                 {},
                 "",
                 "shape = file"},
-    ScenarioKey{"organ.scale", number, "", "1", "Metres per unit of the file (0.001 for millimetres).", from(1e-9, 1e6),
-                "", "shape = file"},
+    ScenarioKey{"organ.scale", number, "", "",
+                "Metres per unit of the file (0.001 for millimetres); left out: 1, for a label volume the unit of its "
+                "header, millimetres where that names none.",
+                from(1e-9, 1e6), "", "shape = file"},
+    ScenarioKey{"organ.label", integer, "", "",
+                "Value of the voxels of a label volume that are the organ; left out: its only one but 0.",
+                from(-32768, 65535), "", "shape = file"},
+    ScenarioKey{
+        "organ.pieces",
+        choice,
+        "",
+        "\"refuse\"",
+        "A surface in several pieces that hang together nowhere: an error, the one of the largest volume alone, or "
+        "all of them, each of which has to be held by a fixed region.",
+        {},
+        "refuse, largest, all",
+        "shape = file"},
+    ScenarioKey{
+        "organ.cavities",
+        choice,
+        "",
+        "\"keep\"",
+        "Closed cavities within the organ (a bladder, a ventricle, a cyst): they stay empty, they are filled with "
+        "tissue, or they are an error.",
+        {},
+        "keep, fill, refuse",
+        "shape = file"},
     ScenarioKey{"organ.voxel_size", number, "m", "", "Voxel of the level set; left out: 1/128 of the largest extent.",
                 from(2e-5, 1), "", "shape = liver, file"},
 
@@ -112,8 +138,10 @@ constexpr std::array keys = {
         "cut.front_spacing without a tool.",
         from(tiny, 1)},
     ScenarioKey{"nodes.coarse_spacing", number, "m", "",
-                "Largest node spacing, far from contact and cuts; left out: 1/10 of the largest extent, at least fine.",
-                from(tiny, 1)},
+                "Largest node spacing, far from contact and cuts; left out: 1/10 of the largest extent, at least fine, "
+                "and half the "
+                "thickness of thin walls as far as 8000 nodes go.",
+                above(0, 1)},
     ScenarioKey{"nodes.slope", number, "", "0.3", "Growth of the spacing per distance from the fine zone.",
                 from(1e-3, 1)},
     ScenarioKey{"nodes.fine_radius", number, "m", "",
@@ -149,7 +177,7 @@ constexpr std::array keys = {
                 from(-100, 100)},
 
     ScenarioKey{"tool", table, "", "",
-                "The rigid tool and its way; left out: none, then there is a blade or a precut."},
+                "The rigid tool and its way; left out: none, then there is a blade, a precut, gravity or pretension."},
     ScenarioKey{
         "tool.shape",
         choice,
@@ -238,7 +266,8 @@ constexpr std::array keys = {
                 text,
                 "",
                 "required",
-                "OBJ, PLY, STL or OFF file of a surface, open or closed, relative to the scenario file.",
+                "OBJ, PLY, STL, OFF, legacy VTK or VTP file of a surface, open or closed, relative to the scenario "
+                "file.",
                 {},
                 "",
                 "shape = file"},

@@ -25,6 +25,7 @@ constexpr double same_place = 1e-6;              // of the fine spacing: a blade
 constexpr double rest_delay = 0.1;               // s without motion after which it is at rest
 constexpr double stiffest_galerkin = 0.49;       // Poisson's ratio
 constexpr int few_in_contact = 3;                // nodes
+constexpr double least_nodes_through = 1;        // spacings through a wall, below which nothing is computed
 constexpr double deep_press = 0.25;              // of the tip radius
 constexpr double contact_crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a contact is put
 
@@ -56,6 +57,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
   for (const std::string& remark : organ_.remarks)
     warn(remark, remark);
   zone_ = fine_zone(scenario_, *organ_.domain);
+  follow_walls();
   std::vector<ToolSample> motion;
   if (scenario_.tool) {
     motion = tool_motion_of(scenario_, query_, organ_.domain->bounds());
@@ -75,22 +77,26 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
     const StageTimer timer(profile_.topology);
     incisions_ = std::make_unique<IncisionBuilder>(scenario_, organ_.domain, sheet_edge(zone_));
     model_.incision = incisions_->incision();
+    for (const std::string& remark : incisions_->remarks())
+      warn(remark, remark);
     incisions_->update_fields();
-    try {
-      require_pieces(incisions_->wound(), zone_.spacing);
-    } catch (const InputError& error) {
-      throw InputError(fmt::format("{}:{}: {}", scenario_.file.string(), scenario_.precuts.front().line, error.what()));
-    }
   }
   watch_blade_way();
   make_blade_force();
   toughness_ = toughness_field(scenario_.toughness, scenario_.layers);
-  if (!touch_ && !cuts())
+  if (!computes())
     return;
   if (touch_)
     zone_contact_ = first_zone_ = centre_of(touch_->contact, touch_->pose);
   model_.touched_from = facing();
   lay_out_zone();
+  if (!scenario_.precuts.empty())
+    try {
+      require_pieces(incisions_->wound(), zone_.spacing);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}:{}: {}", scenario_.file.string(), scenario_.precuts.front().line, error.what()));
+    }
+  judge_walls();
   try {
     sprinkle(nullptr, model_);
   } catch (const InputError& error) { // what was odd about the organ may be why
@@ -147,9 +153,34 @@ void Session::lay_out_zone() {
   if (scenario_.blade)
     tracks_ = blade_tracks(*scenario_.blade, *organ_.domain, 2 * zone_.spacing.fine);
   zone_.spacing.segments = model_.incision != nullptr ? fine_segments(*model_.incision) : tracks_;
+  if (!scenario_.precuts.empty())
+    refine_small_pieces(incisions_->wound(), zone_.spacing);
   if (scenario_.nodes.count > 0)
     zone_.spacing =
         solvers::spacing_for_count(*organ_.domain, zone_.spacing, scenario_.nodes.count, sprinkle_options(model_));
+}
+
+// Where neither the coarsest spacing nor a number of nodes is given, the derived one follows the walls.
+void Session::follow_walls() {
+  const double coarse = zone_.spacing.coarse;
+  walls_ = measure_walls(*organ_.domain, coarse / 3, coarse);
+  if (scenario_.nodes.coarse_spacing <= 0 && scenario_.nodes.count <= 0)
+    app::follow_walls(walls_, *organ_.domain, wall_budget, zone_.spacing);
+}
+
+void Session::judge_walls() {
+  const std::optional<CoarseWall> wall = coarsest_wall(walls_, zone_.spacing);
+  if (!wall)
+    return;
+  const std::string what = fmt::format(
+      "the wall at [{:.4g}, {:.4g}, {:.4g}] m is {:.3g} mm thick and the nodes there are {:.3g} mm apart: {}",
+      wall->place.x(), wall->place.y(), wall->place.z(), 1e3 * wall->thickness, 1e3 * wall->spacing,
+      bending_error(wall->nodes_through()));
+  const std::string remedy = fmt::format("nodes.coarse_spacing = {:.2g} m puts three nodes through it", wall->wanted);
+  if (wall->nodes_through() < least_nodes_through)
+    throw InputError(fmt::format("{}: [nodes]: {}; allowed: at most {:.2g} m there. {}", scenario_.file.string(), what,
+                                 wall->thickness / least_nodes_through, remedy));
+  warn("walls", fmt::format("{}. {}", what, remedy));
 }
 
 topology::SurfaceContact Session::find_contact(const topology::ToolPose& pose) const {
@@ -213,8 +244,8 @@ StepResult Session::step(const StepSample& sample) {
   // Without any load the organ keeps its rest shape until the tool is on it.
   const bool touched = touch_ && (scenario_.tool->grasp ? grasps() : result.contact.depth > 0);
   const bool loaded =
-      (touch_ || cuts()) && (touched || model_.body != nullptr || scenario_.gravity || !scenario_.pretension.isZero() ||
-                             model_.incision != nullptr || blade_enters(sample));
+      has_loads() ||
+      ((touch_ || cuts()) && (touched || model_.body != nullptr || model_.incision != nullptr || blade_enters(sample)));
   if (loaded) {
     if (model_.body == nullptr)
       build(model_);
@@ -268,7 +299,7 @@ std::optional<solvers::GripMemory> Session::remembered_grip() const {
 }
 
 void Session::prepare(const StepSample& sample) {
-  if ((!touch_ && !cuts()) || (model_.body != nullptr && !std::exchange(seen_hanging_, false)))
+  if (!computes() || (model_.body != nullptr && !std::exchange(seen_hanging_, false)))
     return;
   if (sample.tool)
     last_contact_ = find_contact(*sample.tool);

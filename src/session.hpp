@@ -7,6 +7,7 @@
 #include "src/cut_report.hpp"
 #include "src/incision_builder.hpp"
 #include "src/node_zone.hpp"
+#include "src/organ_walls.hpp"
 #include "src/schedule.hpp"
 #include "src/tear_report.hpp"
 
@@ -83,6 +84,10 @@ class Session {
   /// Whether there is a blade or a precut, or tissue that tears.
   [[nodiscard]] bool cuts() const { return scenario_.blade || !scenario_.precuts.empty() || tears(); }
   [[nodiscard]] bool tears() const { return scenario_.tearing.enabled; }
+  /// Whether the tissue has a load of its own, that of weight or pretension.
+  [[nodiscard]] bool has_loads() const { return scenario_.gravity || !scenario_.pretension.isZero(); }
+  /// Whether there is anything to compute: else every step leaves the organ at rest.
+  [[nodiscard]] bool computes() const { return touches() || cuts() || has_loads(); }
   /// Whether a grasper holds the tissue: its patch is bonded to it.
   [[nodiscard]] bool grasps() const { return grasp_.has_value(); }
 
@@ -93,7 +98,7 @@ class Session {
 
   /// Builds the body and condenses it onto the tool's candidates before the first touch, so that the first step in
   /// contact need not; with set_recondensing() so that it can follow the first cut, where the scenario's blade begins
-  /// near it and every step follows it. `sample`: where the tool is. Does nothing when nothing ever touches or cuts.
+  /// near it and every step follows it. `sample`: where the tool is. Does nothing when there is nothing to compute.
   void prepare(const StepSample& sample);
 
   /// Poses that the blade has passed since the last step, in order, before the one of the next: its way leads through
@@ -110,6 +115,7 @@ class Session {
   [[nodiscard]] const Organ& organ() const { return organ_; }
   [[nodiscard]] const solvers::Sprinkling& sprinkling() const { return model_.sprinkling; }
   [[nodiscard]] const FineZone& zone() const { return zone_; }
+  [[nodiscard]] const OrganWalls& walls() const { return walls_; }
   /// Null before the first step that needs it.
   [[nodiscard]] const solvers::Discretisation* body() const { return model_.body.get(); }
   /// Solution of the last step.
@@ -189,6 +195,8 @@ class Session {
  private:
   void lay_out_zone();
   void approach_hanging();
+  void follow_walls();
+  void judge_walls();
   void watch_blade_way();
   [[nodiscard]] std::vector<std::array<Vector3, 2>> fine_segments(const topology::Incision& incision) const;
   void make_precuts();
@@ -269,6 +277,7 @@ class Session {
   void drop_following();
   [[nodiscard]] Vector3 rest_position(const Vector3& x) const { return rest_position(x, model_); }
   [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
+  [[nodiscard]] std::vector<Vector3> nearest_moved(const Vector3& x, const BodyModel& model) const;
   void make_blade_force();
   [[nodiscard]] bool blade_enters(const StepSample& sample) const;
   [[nodiscard]] bool proposes_aside() const;
@@ -360,6 +369,7 @@ class Session {
   topology::ContactQuery query_;
   std::optional<FirstTouch> touch_;
   FineZone zone_;
+  OrganWalls walls_;
   double coarseness_ = 1;                            // of the spacings in zone_
   std::vector<std::array<Vector3, 2>> tracks_;       // of the blade, where fine nodes belong
   std::vector<std::array<Vector3, 2>> led_segments_; // of zone_ when it was last led ahead of a tear's front

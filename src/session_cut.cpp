@@ -13,6 +13,8 @@ namespace {
 constexpr double rest_tolerance = 1e-4;   // of the fine spacing: of a place carried back to rest
 constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a little, as ahead of a front
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
+constexpr double difference = 0.05;       // fine spacings, over which the displacement's derivative is taken
+constexpr double outside_reach = 1.5;     // spacings from the nearest node: farther a place is outside the body
 constexpr double on_path = 1e-6;          // of the fine spacing: nearer to its path a blade is on it
 constexpr double way_detail = 0.25;       // fine spacings from pose to pose of the way ahead
 
@@ -52,6 +54,24 @@ std::optional<Vector3> place_in_opening(const Vector3& x, const topology::Incisi
 
 } // namespace
 
+// The rest positions of the nodes that are now nearest to x, nearest first.
+std::vector<Vector3> Session::nearest_moved(const Vector3& x, const BodyModel& model) const {
+  constexpr std::size_t most = 4;
+  if (!model.state)
+    return {};
+  const VectorX displacements = model.body->nodal_displacements(model.field); // on any thread
+  const std::vector<Vector3>& nodes = model.sprinkling.nodes.positions;
+  std::vector<std::pair<double, std::size_t>> away;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    away.emplace_back((nodes[i] + displacements.segment<3>(3 * static_cast<Eigen::Index>(i)) - x).squaredNorm(), i);
+  const std::size_t count = std::min(most, away.size());
+  std::partial_sort(away.begin(), away.begin() + static_cast<std::ptrdiff_t>(count), away.end());
+  std::vector<Vector3> starts;
+  for (std::size_t k = 0; k < count; ++k)
+    starts.push_back(nodes[away[k].second]);
+  return starts;
+}
+
 // Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
 // its surface. A place in the opening of a cut, where there is no material, belongs to the sheet.
 Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
@@ -77,7 +97,14 @@ Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
       if (model.incision != nullptr)
         if (const auto on = model.incision->closest(guess, gap_reach * fine))
           return on->point;
-      if (domain.signed_distance(guess) <= 0) // outside no material is cut
+      // Tissue that has turned far: from the nodes that are now nearest.
+      const std::vector<Vector3> starts = nearest_moved(x, model);
+      if (const auto rest =
+              topology::rest_position_from(starts, x, displacement, coarse_tolerance * fine, difference * fine))
+        return *rest;
+      const bool is_outside = starts.empty() || (starts.front() + displacement(starts.front()) - x).norm() >
+                                                    outside_reach * zone_.spacing(starts.front());
+      if (domain.signed_distance(guess) <= 0 || !is_outside) // outside no material is cut
         throw;
       return guess;
     }

@@ -15,6 +15,15 @@ OrderedJson json(const Vector3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
+OrderedJson walls(const OrganWalls& walls) {
+  const auto at = [](const std::optional<WidthAt>& width) {
+    return width ? OrderedJson{{"width_m", width->width}, {"at_m", json(width->place)}} : OrderedJson(nullptr);
+  };
+  return {{"median_thickness_m", walls.median},
+          {"thinnest_wall", at(walls.thinnest)},
+          {"narrowest_gap", at(walls.narrowest)}};
+}
+
 OrderedJson inputs(const Session& session) {
   const Scenario& scenario = session.scenario();
   const topology::Domain& domain = *session.organ().domain;
@@ -26,11 +35,9 @@ OrderedJson inputs(const Session& session) {
   out["poisson_ratio"] = scenario.material.poisson_ratio;
   out["density_kg_m3"] = scenario.material.density;
   out["gravity_m_s2"] = scenario.gravity ? json(*scenario.gravity) : OrderedJson(nullptr);
-  out["organ"] = {{"triangles", domain.surface().triangles.size()},
-                  {"volume_m3", topology::volume(domain.surface())},
-                  {"area_m2", topology::area(domain.surface())},
-                  {"lower_m", json(domain.bounds().lower)},
-                  {"upper_m", json(domain.bounds().upper)}};
+  out["organ"] = {{"triangles", domain.surface().triangles.size()}, {"volume_m3", topology::volume(domain.surface())},
+                  {"area_m2", topology::area(domain.surface())},    {"lower_m", json(domain.bounds().lower)},
+                  {"upper_m", json(domain.bounds().upper)},         {"walls", walls(session.walls())}};
   return out;
 }
 

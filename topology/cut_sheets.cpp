@@ -2,8 +2,7 @@
 
 #include "topology/errors.hpp"
 #include "topology/sheet_front.hpp"
-#include "topology/surface_io.hpp"
-#include "topology/surface_mending.hpp"
+#include "topology/surface_check.hpp"
 
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Delaunay_mesh_face_base_2.h>
@@ -198,21 +197,13 @@ SurfaceMesh make_polygon_sheet(const std::vector<Vector3>& corners, double edge)
   return sheet;
 }
 
-SurfaceMesh read_sheet(const std::filesystem::path& file, double scale_to_metres) {
-  const PolygonSoup soup = read_polygons(file, scale_to_metres);
-  SurfaceMesh sheet;
-  sheet.vertices = soup.vertices;
-  for (const std::vector<int>& polygon : soup.polygons) {
-    std::vector<Vector3> corners;
-    for (const int v : polygon)
-      corners.push_back(soup.vertices[v]);
-    for (const Triangle& t : triangulate_polygon(corners))
-      sheet.triangles.push_back({polygon[t[0]], polygon[t[1]], polygon[t[2]]});
-  }
-  check_sheet(sheet, file.string());
-  remove_unused_vertices(sheet);
-  split_bridges(sheet);
-  return sheet;
+SurfaceMesh read_sheet(const std::filesystem::path& file, double scale_to_metres, std::vector<std::string>* mended) {
+  CheckedSurface checked = check_sheet_surface(read_polygons(file, scale_to_metres), file.string());
+  check_sheet(checked.mesh, file.string());
+  split_bridges(checked.mesh);
+  if (mended != nullptr)
+    mended->insert(mended->end(), checked.mended.begin(), checked.mended.end());
+  return std::move(checked.mesh);
 }
 
 int split_bridges(SurfaceMesh& sheet) {

@@ -4,6 +4,8 @@
 #include "topology/surface_mesh.hpp"
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace spherecut::topology {
 
@@ -25,10 +27,11 @@ SurfaceMesh make_rectangle_sheet(const Vector3& centre, const Vector3& normal, c
 /// side. Throws InputError also when corners coincide, lie off the plane, or sides cross.
 SurfaceMesh make_polygon_sheet(const std::vector<Vector3>& corners, double edge);
 
-/// Sheets from a surface file (surface_io.hpp), open or closed, taken as they are but for polygons of four or more
-/// corners, which are triangulated, unused vertices, and split_bridges. Throws InputError naming the file and the
-/// element when the sheet is not finite, not 2-manifold, not consistently oriented, or has degenerate triangles.
-SurfaceMesh read_sheet(const std::filesystem::path& file, double scale_to_metres = 1);
+/// Sheets from a surface file (surface_io.hpp), open or closed, mended as check_sheet_surface does, and split_bridges.
+/// One sentence for each kind of mending goes to `mended`, if there is one. Throws InputError naming the file and the
+/// element when the sheet cannot be mended or has degenerate triangles all the same.
+SurfaceMesh read_sheet(const std::filesystem::path& file, double scale_to_metres = 1,
+                       std::vector<std::string>* mended = nullptr);
 
 /// Splits, in the middle, every edge inside the sheet that joins two vertices of its border. Returns how many; existing
 /// vertices keep their places.

@@ -1,6 +1,7 @@
 #include "topology/level_set.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/surface_pieces.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -38,6 +39,47 @@ class IndexSpaceMesh {
   const SurfaceMesh& surface_;
   double scale_;
 };
+
+/// The triangles of the components that lie within `depth` others.
+SurfaceMesh nested_part(const SurfaceMesh& surface, const SurfaceComponents& found, std::size_t depth) {
+  SurfaceMesh part;
+  part.vertices = surface.vertices;
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+    if (found.components[found.of[t]].within.size() == depth)
+      part.triangles.push_back(surface.triangles[t]);
+  return part;
+}
+
+/// Distances by OpenVDB. It takes for inside whatever cannot be reached from without, cavities too and what floats in
+/// them: there the sign is turned. Walls within the outermost are to stay where there are such (a wall that passes
+/// through another would else leave a trace inside).
+openvdb::FloatGrid::Ptr sampled_distances(const SurfaceMesh& surface, double voxel_size,
+                                          const openvdb::math::Transform& transform, openvdb::Int32Grid& triangles) {
+  using namespace openvdb::tools;
+  const SurfaceComponents found = find_components(surface);
+  std::size_t deepest = 0;
+  for (const SurfaceComponent& component : found.components)
+    deepest = std::max(deepest, component.within.size());
+  constexpr float everywhere = std::numeric_limits<float>::max();
+  const auto distances = meshToVolume<openvdb::FloatGrid>(
+      IndexSpaceMesh(surface, voxel_size), transform, band_voxels, everywhere,
+      DISABLE_RENORMALIZATION | (deepest > 0 ? DISABLE_INTERSECTING_VOXEL_REMOVAL : 0), &triangles);
+  auto values = distances->getAccessor();
+  for (std::size_t depth = 1; depth <= deepest; ++depth) {
+    const SurfaceMesh part = nested_part(surface, found, depth);
+    const auto nested = meshToVolume<openvdb::FloatGrid>(IndexSpaceMesh(part, voxel_size), transform, band_voxels,
+                                                         everywhere, DISABLE_RENORMALIZATION);
+    for (auto it = nested->cbeginValueAll(); it; ++it) {
+      if (!(*it < 0))
+        continue;
+      for (const openvdb::Coord& voxel : it.getBoundingBox()) {
+        const float distance = std::abs(values.getValue(voxel));
+        values.setValue(voxel, depth % 2 == 1 ? std::min(distance, distances->background()) : -distance);
+      }
+    }
+  }
+  return distances;
+}
 
 double checked_voxel_size(const SurfaceMesh& surface, double voxel_size, std::size_t memory_limit) {
   if (surface.triangles.empty())
@@ -105,11 +147,8 @@ LevelSet::LevelSet(const SurfaceMesh& surface, double voxel_size, std::size_t me
   impl_->triangles = openvdb::Int32Grid::create(-1);
   // One thread: which of two equally near triangles a voxel keeps must not depend on the schedule.
   tbb::task_arena one_thread(1);
-  one_thread.execute([&] {
-    impl_->distances = openvdb::tools::meshToVolume<openvdb::FloatGrid>(
-        IndexSpaceMesh(surface, impl_->voxel_size), *transform, band_voxels, std::numeric_limits<float>::max(),
-        openvdb::tools::DISABLE_RENORMALIZATION, impl_->triangles.get());
-  });
+  one_thread.execute(
+      [&] { impl_->distances = sampled_distances(surface, impl_->voxel_size, *transform, *impl_->triangles); });
 }
 
 LevelSet::~LevelSet() = default;

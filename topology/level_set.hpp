@@ -9,12 +9,12 @@
 
 namespace spherecut::topology {
 
-/// Level set of a closed surface: distances at every voxel inside the body and in a band of outside_band() around it,
-/// trilinear between voxels. Errors are of the order of the voxel size squared where the distance is smooth and stay
-/// below a voxel near edges. Deep inside (over ten voxels), close to where several parts of the surface are equally
-/// far, the nearest triangle that OpenVDB passes from voxel to voxel can be a wrong one: there the depth is too great
-/// by up to a few voxels at about one point in a thousand. Queries are const and thread safe. The grid is built on one
-/// thread, so that the same surface gives the same bits.
+/// Level set of a closed surface, which may have several pieces and cavities: distances at every voxel inside the body
+/// and in a band of outside_band() around it, trilinear between voxels. Errors are of the order of the voxel size
+/// squared where the distance is smooth and stay below a voxel near edges. Deep inside (over ten voxels), close to
+/// where several parts of the surface are equally far, the nearest triangle that OpenVDB passes from voxel to voxel can
+/// be a wrong one: there the depth is too great by up to a few voxels at about one point in a thousand. Queries are
+/// const and thread safe. The grid is built on one thread, so that the same surface gives the same bits.
 class LevelSet {
  public:
   /// voxel_size in m; 0 derives 1/128 of the largest extent. Throws InputError when the surface is empty or not finite,

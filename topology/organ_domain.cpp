@@ -2,8 +2,10 @@
 #include "topology/domain.hpp"
 #include "topology/level_set.hpp"
 #include "topology/surface_distance.hpp"
+#include "topology/surface_facets.hpp"
 
 #include <cmath>
+#include <mutex>
 #include <utility>
 
 namespace spherecut::topology {
@@ -36,6 +38,10 @@ class OrganDomain final : public Domain {
   [[nodiscard]] const std::vector<Plane>& planes() const override { return planes_; }
   [[nodiscard]] const SurfaceMesh& surface() const override { return surface_; }
   [[nodiscard]] BoundingBox bounds() const override { return bounds_; }
+  [[nodiscard]] const SurfaceFacets& facets() const {
+    std::call_once(facets_made_, [&] { facets_ = std::make_unique<SurfaceFacets>(surface_); });
+    return *facets_;
+  }
 
  private:
   [[nodiscard]] NearestPoint nearest(const Vector3& x) const { return exact_.nearest(x, level_set_.near_triangle(x)); }
@@ -45,9 +51,16 @@ class OrganDomain final : public Domain {
   LevelSet level_set_;
   BoundingBox bounds_;
   std::vector<Plane> planes_;
+  mutable std::once_flag facets_made_; // one method of three asks for them
+  mutable std::unique_ptr<const SurfaceFacets> facets_;
 };
 
 } // namespace
+
+const SurfaceFacets* facets_of(const Domain& domain) {
+  const auto* organ = dynamic_cast<const OrganDomain*>(&domain);
+  return organ == nullptr ? nullptr : &organ->facets();
+}
 
 std::shared_ptr<const Domain> make_organ_domain(SurfaceMesh surface, double voxel_size) {
   return std::make_shared<OrganDomain>(std::move(surface), voxel_size);

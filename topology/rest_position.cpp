@@ -2,6 +2,7 @@
 
 #include "topology/errors.hpp"
 
+#include <Eigen/LU>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -24,6 +25,33 @@ Vector3 rest_position(const Vector3& x, const std::function<Vector3(const Vector
     throw NumericalError(fmt::format("no rest position found for ({}, {}, {}): {} m left after {} steps, {} m wanted",
                                      x.x(), x.y(), x.z(), residual.norm(), most_steps, tolerance));
   return rest;
+}
+
+std::optional<Vector3> rest_position_from(const std::vector<Vector3>& starts, const Vector3& x,
+                                          const std::function<Vector3(const Vector3&)>& displacement, double tolerance,
+                                          double difference) {
+  constexpr int most_steps = 20, most_halvings = 6;
+  const auto residual_at = [&](const Vector3& rest) -> Vector3 { return rest + displacement(rest) - x; };
+  for (Vector3 rest : starts) {
+    Vector3 residual = residual_at(rest);
+    for (int step = 0; step < most_steps && residual.norm() > tolerance; ++step) {
+      Matrix3 derivative;
+      for (int d = 0; d < 3; ++d)
+        derivative.col(d) = (residual_at(rest + difference * Vector3::Unit(d)) - residual) / difference;
+      Vector3 move = -derivative.fullPivLu().solve(residual), next = residual;
+      int halving = 0;
+      for (; halving < most_halvings; ++halving, move *= 0.5)
+        if (next = residual_at(rest + move); next.norm() < residual.norm())
+          break;
+      if (halving == most_halvings || !move.allFinite())
+        break;
+      rest += move;
+      residual = next;
+    }
+    if (residual.norm() <= tolerance)
+      return rest;
+  }
+  return std::nullopt;
 }
 
 } // namespace spherecut::topology

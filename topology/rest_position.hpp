@@ -4,6 +4,8 @@
 #include "topology/types.hpp"
 
 #include <functional>
+#include <optional>
+#include <vector>
 
 namespace spherecut::topology {
 
@@ -15,5 +17,12 @@ using RestMap = std::function<Vector3(const Vector3&)>;
 /// x and the residual, when it is not below `tolerance` m after `most_steps` evaluations.
 Vector3 rest_position(const Vector3& x, const std::function<Vector3(const Vector3&)>& displacement, double tolerance,
                       int most_steps = 60);
+
+/// The same by Newton's method from the first of several starts that leads there, for fields so steep that fixed-point
+/// steps leave the body: derivatives by differences over `difference` m, steps halved until the residual falls. Nothing
+/// when none does.
+std::optional<Vector3> rest_position_from(const std::vector<Vector3>& starts, const Vector3& x,
+                                          const std::function<Vector3(const Vector3&)>& displacement, double tolerance,
+                                          double difference);
 
 } // namespace spherecut::topology

@@ -3,6 +3,8 @@
 #include "topology/errors.hpp"
 #include "topology/self_intersections.hpp"
 #include "topology/surface_mending.hpp"
+#include "topology/surface_parting.hpp"
+#include "topology/surface_pieces.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -23,6 +25,7 @@ constexpr int shown_elements = 3; // offending elements that a message lists
 constexpr int filled = -1;        // source of triangles that close a hole
 constexpr int small_hole_edges = 12;
 constexpr double small_hole_perimeter = 0.2; // of the square root of the area
+constexpr double no_volume = 1e-9;           // of the cube of the size
 
 constexpr std::size_t parted_pairs = 20;  // pairs of triangles that may be parted
 constexpr double parted_movement = 0.005; // of the bounding box's diagonal, to part them
@@ -35,7 +38,8 @@ struct Side {
 
 class Checker {
  public:
-  Checker(const PolygonSoup& soup, std::string name) : soup_(soup), name_(std::move(name)) {
+  Checker(const PolygonSoup& soup, std::string name, const SurfaceChoices& choices = {})
+      : soup_(soup), name_(std::move(name)), choices_(choices) {
     mesh_.vertices = soup.vertices;
     diagonal_ = bounds(mesh_).extent().norm();
   }
@@ -47,16 +51,38 @@ class Checker {
     require_three_dimensions();
     make_triangles();
     remove_repeated_triangles();
-    std::vector<Side> sides = sorted_sides();
-    require_manifold_edges(sides);
-    require_manifold_vertices();
-    orient(sides);
+    part(PartedBy::material);
+    orient(sorted_sides());
+    choose_components();
+    say_turned();
     fill_small_holes();
     mend_slivers();
-    turn_outwards();
+    require_volume();
     part_self_intersections();
     remove_unused_vertices(mesh_);
     warn_about_size();
+    result_.mesh = std::move(mesh_);
+    return std::move(result_);
+  }
+
+  CheckedSurface run_sheet() {
+    require_readable(soup_, name_);
+    if (soup_.polygons.empty())
+      refuse("there are no faces");
+    if (!std::isfinite(diagonal_))
+      refuse("coordinates are too large to compute with: their squares are not finite");
+    make_triangles();
+    remove_repeated_triangles();
+    part(PartedBy::flatness);
+    orient(sorted_sides());
+    for (std::size_t t = 0; t < turn_.size(); ++t)
+      turned_ += turn_[t] == Turn::flip ? 1 : 0;
+    if (turned_ > 0)
+      result_.mended.push_back(
+          fmt::format("turned {} of {} triangles, whose orientation was inconsistent", turned_, turn_.size()));
+    if (const int operations = remove_slivers(mesh_, source_); operations > 0)
+      result_.mended.push_back(fmt::format("removed slivers by {} collapses and flips of edges", operations));
+    remove_unused_vertices(mesh_);
     result_.mesh = std::move(mesh_);
     return std::move(result_);
   }
@@ -199,56 +225,25 @@ class Checker {
     }
   }
 
-  void require_manifold_edges(const std::vector<Side>& sides) const {
+  void part(PartedBy by) {
+    const Parting parting = part_surface(mesh_, source_, by);
     std::vector<std::string> bad;
-    for_each_edge(sides, [&](std::size_t first, std::size_t last) {
-      if (last - first > 2)
-        bad.push_back(fmt::format("the edge from {} to {} has {} faces, among them {}", vertex(sides[first].low),
-                                  vertex(sides[first].high), last - first, source_[sides[first].triangle]));
-    });
+    for (const AmbiguousEdge& edge : parting.ambiguous)
+      bad.push_back(fmt::format("the edge from {} to {} has {} faces, among them {}", vertex(edge.low),
+                                vertex(edge.high), edge.faces, source_[edge.triangle]));
     if (!bad.empty())
-      refuse("not a 2-manifold: " + listed(bad));
+      refuse(
+          fmt::format("not a 2-manifold: {}; these faces do not bound material and void in turn, so that they cannot "
+                      "be parted",
+                      listed(bad)));
+    if (parting.edges > 0 || parting.vertices > 0)
+      result_.mended.push_back(
+          fmt::format("parted the surface at {} edges with more than two faces and at {} vertices where parts of it "
+                      "touched, by moving copies up to {:.2g} mm",
+                      parting.edges, parting.vertices, 1e3 * parting.movement));
   }
 
-  /// The triangles around every vertex must hang together by their edges at it.
-  void require_manifold_vertices() const {
-    std::vector<std::vector<int>> around(mesh_.vertices.size());
-    for (int t = 0; t < std::ssize(mesh_.triangles); ++t)
-      for (const int v : mesh_.triangles[t])
-        around[v].push_back(t);
-    std::vector<std::string> bad;
-    for (int v = 0; v < std::ssize(around); ++v) {
-      if (around[v].empty())
-        continue;
-      std::vector<bool> reached(around[v].size(), false);
-      std::vector<std::size_t> open = {0};
-      reached[0] = true;
-      std::size_t count = 1;
-      while (!open.empty()) {
-        const Triangle& t = mesh_.triangles[around[v][open.back()]];
-        open.pop_back();
-        for (std::size_t i = 0; i < around[v].size(); ++i) {
-          if (reached[i])
-            continue;
-          const Triangle& other = mesh_.triangles[around[v][i]];
-          const bool joined = std::any_of(t.begin(), t.end(), [&](int corner) {
-            return corner != v && std::find(other.begin(), other.end(), corner) != other.end();
-          });
-          if (joined) {
-            reached[i] = true;
-            ++count;
-            open.push_back(i);
-          }
-        }
-      }
-      if (count < around[v].size())
-        bad.push_back(fmt::format("at {} sheets of the surface touch in a point", vertex(v)));
-    }
-    if (!bad.empty())
-      refuse("not a 2-manifold: " + listed(bad));
-  }
-
-  /// Turns the triangles so that neighbours agree with the first triangle; the surface must be one piece.
+  /// Turns the triangles so that neighbours agree with the first triangle of their component.
   void orient(const std::vector<Side>& sides) {
     struct Link {
       int triangle;
@@ -262,20 +257,16 @@ class Checker {
       links[a.triangle].push_back({b.triangle, a.rising != b.rising});
       links[b.triangle].push_back({a.triangle, a.rising != b.rising});
     });
-    enum class Turn : std::uint8_t { unknown, keep, flip };
-    std::vector<Turn> turn(mesh_.triangles.size(), Turn::unknown);
-    std::vector<int> first_of_piece, size_of_piece;
+    std::vector<Turn>& turn = turn_;
+    turn.assign(mesh_.triangles.size(), Turn::unknown);
     for (int seed = 0; seed < std::ssize(turn); ++seed) {
       if (turn[seed] != Turn::unknown)
         continue;
-      first_of_piece.push_back(seed);
-      size_of_piece.push_back(0);
       turn[seed] = Turn::keep;
       std::vector<int> open = {seed};
       while (!open.empty()) {
         const int t = open.back();
         open.pop_back();
-        ++size_of_piece.back();
         for (const auto& [other, agrees] : links[t]) {
           const Turn wanted = agrees == (turn[t] == Turn::keep) ? Turn::keep : Turn::flip;
           if (turn[other] == Turn::unknown) {
@@ -288,18 +279,114 @@ class Checker {
         }
       }
     }
-    if (first_of_piece.size() > 1) {
-      std::vector<std::string> pieces;
-      for (std::size_t p = 0; p < first_of_piece.size(); ++p)
-        pieces.push_back(fmt::format("{} triangles from {}", size_of_piece[p], face(first_of_piece[p])));
-      refuse(fmt::format("the surface is in {} separate pieces: {}", first_of_piece.size(), listed(pieces)));
-    }
-    oriented_ = static_cast<int>(turn.size());
     for (std::size_t t = 0; t < turn.size(); ++t)
-      if (turn[t] == Turn::flip) {
+      if (turn[t] == Turn::flip)
         std::swap(mesh_.triangles[t][1], mesh_.triangles[t][2]);
-        ++turned_;
+  }
+
+  /// Keeps the pieces and cavities that are wanted, and turns them outwards and inwards.
+  void choose_components() {
+    const SurfaceComponents found = find_components(mesh_);
+    const std::vector<SurfaceComponent>& all = found.components;
+    std::vector<char> keep(all.size(), 1);
+    std::vector<int> pieces, cavities;
+    int flat = 0;
+    for (int c = 0; c < std::ssize(all); ++c) {
+      if (c > 0 && std::abs(all[c].volume) < no_volume * std::pow(all[c].box.extent().norm(), 3)) {
+        keep[c] = 0;
+        ++flat;
+      } else {
+        (all[c].is_cavity() ? cavities : pieces).push_back(c);
       }
+    }
+    if (flat > 0)
+      result_.mended.push_back(fmt::format("left out {} parts of the surface that enclose no volume", flat));
+    choose_pieces(all, pieces, keep);
+    std::erase_if(cavities, [&](int c) { return keep[all[c].within.front()] == 0; });
+    choose_cavities(all, cavities, keep);
+    for (int c = 0; c < std::ssize(all); ++c) // what floats in a cavity that is filled, or in a piece left out
+      for (const int outer : all[c].within)
+        keep[c] = keep[c] != 0 && keep[outer] != 0 ? 1 : 0;
+    turn_components(found, keep);
+  }
+
+  [[nodiscard]] std::string shown_component(const SurfaceComponent& component) const {
+    return fmt::format("{:.3g} ml, {} triangles, about ({:.4g}, {:.4g}, {:.4g})", 1e6 * std::abs(component.volume),
+                       component.triangles, component.middle.x(), component.middle.y(), component.middle.z());
+  }
+
+  void choose_pieces(const std::vector<SurfaceComponent>& all, const std::vector<int>& pieces,
+                     std::vector<char>& keep) {
+    if (pieces.size() < 2)
+      return;
+    double whole = 0, rest = 0;
+    std::vector<std::string> places;
+    for (const int c : pieces) {
+      whole += std::abs(all[c].volume);
+      rest += c == pieces.front() ? 0 : std::abs(all[c].volume);
+      places.push_back(shown_component(all[c]));
+    }
+    switch (choices_.pieces) {
+    case PieceChoice::refuse:
+      refuse(
+          fmt::format("the surface is in {} separate pieces: {}; organ.pieces = \"largest\" keeps the first, which has "
+                      "{:.3g} % of the volume, \"all\" keeps every one",
+                      pieces.size(), listed(places), 100 * (1 - rest / whole)));
+    case PieceChoice::largest:
+      for (std::size_t p = 1; p < pieces.size(); ++p)
+        keep[pieces[p]] = 0;
+      places.erase(places.begin());
+      result_.mended.push_back(fmt::format("left out {} of {} separate pieces, {:.3g} % of the volume: {}",
+                                           places.size(), pieces.size(), 100 * rest / whole, listed(places)));
+      return;
+    case PieceChoice::all:
+      result_.warnings.push_back(
+          fmt::format("{}: the body is in {} separate pieces: {}", name_, pieces.size(), listed(places)));
+    }
+  }
+
+  void choose_cavities(const std::vector<SurfaceComponent>& all, const std::vector<int>& cavities,
+                       std::vector<char>& keep) {
+    if (cavities.empty())
+      return;
+    std::vector<std::string> places;
+    places.reserve(cavities.size());
+    for (const int c : cavities)
+      places.push_back(shown_component(all[c]));
+    const std::string found =
+        fmt::format("{} closed {}: {}", cavities.size(), cavities.size() == 1 ? "cavity" : "cavities", listed(places));
+    switch (choices_.cavities) {
+    case CavityChoice::refuse:
+      refuse(fmt::format("the body has {}; organ.cavities = \"keep\" keeps, \"fill\" fills them", found));
+    case CavityChoice::fill:
+      for (const int c : cavities)
+        keep[c] = 0;
+      result_.mended.push_back("filled " + found);
+      return;
+    case CavityChoice::keep:
+      result_.warnings.push_back(fmt::format("{}: the body has {}", name_, found));
+    }
+  }
+
+  /// Removes the triangles of components that are not kept; counts what is turned against the soup.
+  void turn_components(const SurfaceComponents& found, const std::vector<char>& keep) {
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
+      const SurfaceComponent& component = found.components[found.of[t]];
+      if (keep[found.of[t]] == 0)
+        continue;
+      Triangle corners = mesh_.triangles[t];
+      const bool is_turned = (component.volume < 0) != component.is_cavity();
+      if (is_turned)
+        std::swap(corners[1], corners[2]);
+      const bool differs = is_turned != (turn_[t] == Turn::flip);
+      (component.is_cavity() ? turned_in_ : turned_) += differs ? 1 : 0;
+      oriented_ += component.is_cavity() ? 0 : 1;
+      source_[kept] = source_[t];
+      mesh_.triangles[kept++] = corners;
+    }
+    mesh_.triangles.resize(kept);
+    source_.resize(kept);
   }
 
   void fill_small_holes() {
@@ -357,20 +444,20 @@ class Checker {
       result_.warnings.push_back(fmt::format("{}: {} slivers remain", name_, slivers));
   }
 
-  void turn_outwards() {
+  void require_volume() const {
     const double enclosed = volume(mesh_);
-    if (std::abs(enclosed) < 1e-9 * std::pow(diagonal_, 3))
+    if (!(enclosed >= no_volume * std::pow(diagonal_, 3)))
       refuse(fmt::format("the surface encloses no volume ({:.3g} m3)", enclosed));
-    if (enclosed < 0) {
-      for (Triangle& t : mesh_.triangles)
-        std::swap(t[1], t[2]);
-      turned_ = oriented_ - turned_;
-    }
-    if (turned_ == oriented_)
+  }
+
+  void say_turned() {
+    if (turned_ > 0 && turned_ == oriented_)
       result_.mended.push_back("turned the whole surface outwards: it was inside out");
     else if (turned_ > 0)
       result_.mended.push_back(
           fmt::format("turned {} of {} triangles, whose orientation was inconsistent, outwards", turned_, oriented_));
+    if (turned_in_ > 0)
+      result_.mended.push_back(fmt::format("turned {} triangles towards the cavities that they bound", turned_in_));
   }
 
   /// Walls of a thin fold that just pass each other are parted by evening out their vertices; anything more is refused.
@@ -403,25 +490,34 @@ class Checker {
           fmt::format("{}: the surface is {:.4g} m across, small for an organ; is the scale right?", name_, extent));
   }
 
+  enum class Turn : std::uint8_t { unknown, keep, flip };
+
   const PolygonSoup& soup_;
   std::string name_;
+  SurfaceChoices choices_;
+  std::vector<Turn> turn_; // of each triangle to agree with the first of its component
   SurfaceMesh mesh_;
   std::vector<int> source_; // face of the soup that each triangle comes from
   double diagonal_ = 0;     // m, of the bounding box
-  int oriented_ = 0;        // triangles of the soup that were given an orientation
-  int turned_ = 0;          // triangles whose orientation differs from the soup's
+  int oriented_ = 0;        // triangles of pieces that were given an orientation
+  int turned_ = 0;          // of them, those whose orientation differs from the soup's
+  int turned_in_ = 0;       // the same of cavities
   CheckedSurface result_;
 };
 
 } // namespace
 
-CheckedSurface check_surface(const PolygonSoup& soup, const std::string& name) {
-  return Checker(soup, name).run();
+CheckedSurface check_surface(const PolygonSoup& soup, const std::string& name, const SurfaceChoices& choices) {
+  return Checker(soup, name, choices).run();
 }
 
-CheckedSurface read_surface(const std::filesystem::path& file, double scale_to_metres) {
+CheckedSurface check_sheet_surface(const PolygonSoup& soup, const std::string& name) {
+  return Checker(soup, name).run_sheet();
+}
+
+CheckedSurface read_surface(const std::filesystem::path& file, double scale_to_metres, const SurfaceChoices& choices) {
   const PolygonSoup soup = read_polygons(file, scale_to_metres);
-  CheckedSurface checked = check_surface(soup, file.string());
+  CheckedSurface checked = check_surface(soup, file.string(), choices);
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

@@ -60,26 +60,30 @@ std::string shown(std::string_view word) {
   return text;
 }
 
-/// Steps through lines, counting them, leaving out blank ones and '#' comments.
+std::string lower_case(std::string_view word) {
+  std::string lower(word);
+  for (char& c : lower)
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return lower;
+}
+
+/// Steps through lines, counting them, leaving out blank ones and all that follows a '#'.
 class Lines {
  public:
-  Lines(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+  /// `continued`: a line that ends in a backslash goes on in the next.
+  Lines(std::string_view text, const std::string& name, bool continued = false)
+      : text_(text), name_(name), continued_(continued) {}
 
   /// The words of the next line; none at the end of the text.
   Words next() {
     while (at_ < text_.size()) {
-      const std::size_t end = std::min(text_.find('\n', at_), text_.size());
-      line_ = text_.substr(at_, end - at_);
-      at_ = end + 1;
-      ++count_;
-      Words words = words_of(line_);
-      if (!words.empty() && words.front().front() != '#')
+      read_line();
+      Words words = words_of(line_.substr(0, line_.find('#')));
+      if (!words.empty())
         return words;
     }
     return {};
   }
-
-  [[nodiscard]] std::string_view line() const { return line_; }
 
   template <typename... Arguments>
   [[noreturn]] void fail(fmt::format_string<Arguments...> format, Arguments&&... arguments) const {
@@ -100,17 +104,65 @@ class Lines {
   }
 
  private:
+  void read_line() {
+    joined_.clear();
+    for (bool goes_on = true; goes_on && at_ < text_.size();) {
+      const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+      std::string_view line = text_.substr(at_, end - at_);
+      at_ = end + 1;
+      ++count_;
+      while (!line.empty() && is_space(line.back()))
+        line.remove_suffix(1);
+      goes_on = continued_ && line.ends_with('\\');
+      if (goes_on)
+        line.remove_suffix(1);
+      if (!goes_on && joined_.empty()) {
+        line_ = line;
+        return;
+      }
+      joined_ += line;
+      joined_ += ' ';
+    }
+    line_ = joined_;
+  }
+
   std::string_view text_;
   const std::string& name_;
+  bool continued_;
+  std::string joined_; // a line in parts
   std::string_view line_;
   std::size_t at_ = 0;
   int count_ = 0;
 };
 
+/// Words joined by blanks, as a line.
+template <typename Iterator>
+void append_line(std::string& text, Iterator first, Iterator last) {
+  for (; first != last; ++first) {
+    text += *first;
+    text += ' ';
+  }
+  text.back() = '\n';
+}
+
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+
+/// Text without a byte order mark and without what ends a file on some systems, in lines.
+std::string plain_text(std::string text) {
+  constexpr char end_of_file = 0x1A; // of CP/M and DOS
+  if (text.starts_with(byte_order_mark))
+    text.erase(0, byte_order_mark.size());
+  while (!text.empty() && (text.back() == '\0' || text.back() == end_of_file))
+    text.pop_back();
+  if (text.find('\n') == std::string::npos)
+    std::replace(text.begin(), text.end(), '\r', '\n');
+  return text;
+}
+
 std::string checked_obj(const std::string& text, const std::string& name) {
   std::string kept;
   kept.reserve(text.size());
-  Lines lines(text, name);
+  Lines lines(text, name, true);
   bool any_vertex = false;
   for (Words words = lines.next(); !words.empty(); words = lines.next()) {
     const std::string_view keyword = words.front();
@@ -130,15 +182,16 @@ std::string checked_obj(const std::string& text, const std::string& name) {
     } else {
       continue;
     }
-    kept += lines.line();
-    kept += '\n';
+    append_line(kept, words.begin(), words.end());
   }
   if (!any_vertex)
     throw InputError(fmt::format("{}: holds no vertices; is this an OBJ file?", name));
   return kept;
 }
 
-void check_off(const std::string& text, const std::string& name) {
+std::string checked_off(const std::string& text, const std::string& name) {
+  std::string kept = "OFF\n";
+  kept.reserve(text.size());
   Lines lines(text, name);
   Words words = lines.next();
   if (words.empty() || !words.front().ends_with("OFF"))
@@ -155,11 +208,13 @@ void check_off(const std::string& text, const std::string& name) {
       lines.fail("the numbers of vertices and faces are missing or cannot be true");
     counts[i] = *count;
   }
+  kept += fmt::format("{} {} 0\n", counts[0], counts[1]);
   for (std::int64_t v = 0; v < counts[0]; ++v) {
     words = lines.next();
     if (words.empty())
       lines.fail("the file is cut short: {} of {} vertices", v, counts[0]);
     lines.require_finite(words, 0, "vertex");
+    append_line(kept, words.begin(), words.begin() + 3);
   }
   for (std::int64_t f = 0; f < counts[1]; ++f) {
     words = lines.next();
@@ -173,25 +228,36 @@ void check_off(const std::string& text, const std::string& name) {
     for (int i = 1; i <= *corners; ++i)
       if (const auto index = number<std::int64_t>(words[i]); !index || *index < 0 || *index >= counts[0])
         lines.fail("index '{}': must be 0 to {}", shown(words[i]), counts[0] - 1);
+    append_line(kept, words.begin(), words.begin() + 1 + *corners);
   }
+  return kept;
 }
 
-void check_text_stl(const std::string& text, const std::string& name) {
+std::string checked_text_stl(const std::string& text, const std::string& name) {
+  std::string kept;
+  kept.reserve(text.size());
   Lines lines(text, name);
   bool open = false;
   for (Words words = lines.next(); !words.empty(); words = lines.next()) {
-    if (words.front() == "vertex")
+    const std::string keyword = lower_case(words.front());
+    if (keyword == "vertex") {
       lines.require_finite(words, 1, "vertex");
-    else if (words.front() == "solid")
+      kept += "vertex ";
+      append_line(kept, words.begin() + 1, words.begin() + 4);
+      continue;
+    }
+    if (keyword == "solid")
       open = true;
-    else if (words.front() == "endsolid")
+    else if (keyword == "endsolid")
       open = false;
-    else if (words.front() != "facet" && words.front() != "outer" && words.front() != "endloop" &&
-             words.front() != "endfacet")
+    else if (keyword != "facet" && keyword != "outer" && keyword != "endloop" && keyword != "endfacet")
       lines.fail("'{}' is no STL keyword; is the file cut short?", shown(words.front()));
+    kept += keyword == "facet" ? "facet normal 0 0 0" : keyword == "outer" ? "outer loop" : keyword;
+    kept += '\n';
   }
   if (open)
     lines.fail("the file is cut short: 'endsolid' is missing");
+  return kept;
 }
 
 void check_binary_stl(const std::string& text, const std::string& name) {
@@ -211,16 +277,20 @@ void check_binary_stl(const std::string& text, const std::string& name) {
   }
 }
 
-void check_stl(const std::string& text, const std::string& name) {
+std::string checked_stl(std::string text, const std::string& name) {
   constexpr std::size_t header = 84, facet_bytes = 50;
   std::uint32_t facets = 0;
   if (text.size() >= header)
     std::memcpy(&facets, text.data() + 80, sizeof(facets));
+  std::string_view start(text);
+  if (start.starts_with(byte_order_mark))
+    start.remove_prefix(byte_order_mark.size());
+  start.remove_prefix(std::min(start.find_first_not_of(" \t\r\n"), start.size()));
   // Some programs start binary files with "solid" too: the size tells.
-  if (text.starts_with("solid") && text.size() != header + facet_bytes * facets)
-    check_text_stl(text, name);
-  else
-    check_binary_stl(text, name);
+  if (lower_case(start.substr(0, 5)) == "solid" && text.size() != header + facet_bytes * facets)
+    return checked_text_stl(plain_text(std::move(text)), name);
+  check_binary_stl(text, name);
+  return text;
 }
 
 /// Numbers of a PLY body in any of its encodings.
@@ -359,16 +429,16 @@ void check_ply(const std::string& text, const std::string& name) {
 std::string checked_text(SurfaceFormat format, std::string text, const std::string& name) {
   switch (format) {
   case SurfaceFormat::obj:
-    return checked_obj(text, name);
+    return checked_obj(plain_text(std::move(text)), name);
   case SurfaceFormat::ply:
+    if (text.starts_with(byte_order_mark))
+      text.erase(0, byte_order_mark.size());
     check_ply(text, name);
     break;
   case SurfaceFormat::stl:
-    check_stl(text, name);
-    break;
+    return checked_stl(std::move(text), name);
   case SurfaceFormat::off:
-    check_off(text, name);
-    break;
+    return checked_off(plain_text(std::move(text)), name);
   }
   return text;
 }

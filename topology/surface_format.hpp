@@ -13,7 +13,9 @@ enum class SurfaceFormat { obj, ply, stl, off };
 inline constexpr int most_corners = 256;
 
 /// Throws InputError, starting with `name`, at the first line or element that cannot be what the format asks for. Gives
-/// back the text for CGAL to parse, which for OBJ is reduced to vertices and faces.
+/// back the text for CGAL to parse, which for OBJ, OFF and text STL is reduced to vertices and faces. Taken as they
+/// are: a byte order mark, comments, NUL and Ctrl-Z at the end, lines that end in CR alone, STL keywords in any case,
+/// lines of OBJ that a backslash continues.
 std::string checked_text(SurfaceFormat format, std::string text, const std::string& name);
 
 } // namespace spherecut::topology

@@ -2,6 +2,7 @@
 
 #include "topology/errors.hpp"
 #include "topology/surface_format.hpp"
+#include "topology/vtk_surface.hpp"
 
 #include <CGAL/IO/OBJ.h>
 #include <CGAL/IO/OFF.h>
@@ -47,30 +48,6 @@ std::optional<SurfaceFormat> format_of(const std::filesystem::path& file) {
   if (extension == ".off")
     return SurfaceFormat::off;
   return std::nullopt;
-}
-
-std::string contents(const std::filesystem::path& file) {
-  const std::string name = file.string();
-  std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status))
-    throw InputError(fmt::format("{}: no such file", name));
-  if (std::filesystem::is_directory(status))
-    throw InputError(fmt::format("{}: is a folder, not a file", name));
-  constexpr std::uintmax_t most_bytes = 2'000'000'000;
-  const std::uintmax_t size = std::filesystem::file_size(file, error);
-  if (error)
-    throw InputError(fmt::format("{}: cannot be read: {}", name, error.message()));
-  if (size == 0)
-    throw InputError(fmt::format("{}: the file is empty", name));
-  if (size > most_bytes)
-    throw InputError(fmt::format("{}: {:.1f} GB: at most {:.0f} GB", name, static_cast<double>(size) / 1e9,
-                                 static_cast<double>(most_bytes) / 1e9));
-  std::ifstream stream(file, std::ios::binary);
-  std::string text(size, '\0');
-  if (!stream.read(text.data(), static_cast<std::streamsize>(size)))
-    throw InputError(fmt::format("{}: cannot be read", name));
-  return text;
 }
 
 bool parse(SurfaceFormat format, std::istream& stream, std::vector<Point>& points,
@@ -123,6 +100,30 @@ std::string ply_bytes(const SurfaceMesh& mesh) {
 
 } // namespace
 
+std::string file_contents(const std::filesystem::path& file) {
+  const std::string name = file.string();
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(status))
+    throw InputError(fmt::format("{}: no such file", name));
+  if (std::filesystem::is_directory(status))
+    throw InputError(fmt::format("{}: is a folder, not a file", name));
+  constexpr std::uintmax_t most_bytes = 2'000'000'000;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error)
+    throw InputError(fmt::format("{}: cannot be read: {}", name, error.message()));
+  if (size == 0)
+    throw InputError(fmt::format("{}: the file is empty", name));
+  if (size > most_bytes)
+    throw InputError(fmt::format("{}: {:.1f} GB: at most {:.0f} GB", name, static_cast<double>(size) / 1e9,
+                                 static_cast<double>(most_bytes) / 1e9));
+  std::ifstream stream(file, std::ios::binary);
+  std::string text(size, '\0');
+  if (!stream.read(text.data(), static_cast<std::streamsize>(size)))
+    throw InputError(fmt::format("{}: cannot be read", name));
+  return text;
+}
+
 void require_readable(const PolygonSoup& soup, const std::string& name) {
   for (std::size_t v = 0; v < soup.vertices.size(); ++v)
     if (!soup.vertices[v].allFinite())
@@ -139,17 +140,15 @@ void require_readable(const PolygonSoup& soup, const std::string& name) {
   }
 }
 
-PolygonSoup read_polygons(const std::filesystem::path& file, double scale_to_metres) {
-  const std::string name = file.string();
-  if (!(std::isfinite(scale_to_metres) && scale_to_metres > 0))
-    throw InputError(
-        fmt::format("{}: scale = {}: must be a positive number of metres per unit of the file", name, scale_to_metres));
+namespace {
+
+/// Polygons of a file that CGAL parses, in its own unit.
+PolygonSoup parsed_polygons(const std::filesystem::path& file, const std::string& name) {
   const auto format = format_of(file);
   if (!format)
-    throw InputError(
-        fmt::format("{}: unknown extension '{}': must be .obj, .ply, .stl or .off", name, file.extension().string()));
-  const std::string text = checked_text(*format, contents(file), name);
-
+    throw InputError(fmt::format("{}: unknown extension '{}': must be .obj, .ply, .stl, .off, .vtk or .vtp", name,
+                                 file.extension().string()));
+  const std::string text = checked_text(*format, file_contents(file), name);
   std::vector<Point> points;
   PolygonSoup soup;
   std::string reason = "its contents do not follow the format";
@@ -162,12 +161,31 @@ PolygonSoup read_polygons(const std::filesystem::path& file, double scale_to_met
   }
   if (!parsed && !(points.empty() || soup.polygons.empty()))
     throw InputError(fmt::format("{}: cannot be read as {}: {}", name, file.extension().string(), reason));
-  if (points.empty() || soup.polygons.empty())
-    throw InputError(fmt::format("{}: holds {} vertices and {} faces: there is no surface", name, points.size(),
-                                 soup.polygons.size()));
   soup.vertices.reserve(points.size());
   for (const Point& p : points)
-    soup.vertices.emplace_back(scale_to_metres * Vector3(p.x(), p.y(), p.z()));
+    soup.vertices.emplace_back(p.x(), p.y(), p.z());
+  return soup;
+}
+
+} // namespace
+
+PolygonSoup read_polygons(const std::filesystem::path& file, double scale_to_metres) {
+  const std::string name = file.string();
+  if (!(std::isfinite(scale_to_metres) && scale_to_metres > 0))
+    throw InputError(
+        fmt::format("{}: scale = {}: must be a positive number of metres per unit of the file", name, scale_to_metres));
+  PolygonSoup soup;
+  if (const std::string extension = lower_case_extension(file); extension == ".vtk")
+    soup = vtk_polygons(file_contents(file), name);
+  else if (extension == ".vtp")
+    soup = vtp_polygons(file_contents(file), name);
+  else
+    soup = parsed_polygons(file, name);
+  if (soup.vertices.empty() || soup.polygons.empty())
+    throw InputError(fmt::format("{}: holds {} vertices and {} faces: there is no surface", name, soup.vertices.size(),
+                                 soup.polygons.size()));
+  for (Vector3& v : soup.vertices)
+    v *= scale_to_metres;
   require_readable(soup, name);
   return soup;
 }

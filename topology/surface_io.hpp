@@ -1,4 +1,4 @@
-// Reading and writing surface files: OBJ, PLY, STL, OFF.
+// Reading and writing surface files: OBJ, PLY, STL, OFF, VTK, VTP.
 #pragma once
 
 #include "topology/surface_mesh.hpp"
@@ -14,12 +14,17 @@ struct PolygonSoup {
   std::vector<std::vector<int>> polygons; // indices into vertices
 };
 
-/// Reads the polygons of a file through CGAL; the extension (.obj, .ply, .stl, .off, any case) tells the format. PLY
-/// and STL may be ASCII or binary. Every coordinate is multiplied by scale_to_metres. All indices are in range, all
-/// coordinates finite, every polygon has 3 to 256 corners. STL facets are joined where corners coincide exactly.
-/// Throws InputError, naming the file and the line, element or byte, when the file is missing, empty, cut short, not of
-/// the format its extension tells, or holds numbers that are not finite or indices out of range.
+/// Reads the polygons of a file, through CGAL but for VTK's; the extension (.obj, .ply, .stl, .off, .vtk, .vtp, any
+/// case) tells the format. PLY and STL may be ASCII or binary; of VTK files see vtk_surface.hpp. Every coordinate is
+/// multiplied by scale_to_metres. All indices are in range, all coordinates finite, every polygon has 3 to 256 corners.
+/// STL facets are joined where corners coincide exactly. Throws InputError, naming the file and the line, element or
+/// byte, when the file is missing, empty, cut short, not of the format its extension tells, or holds numbers that are
+/// not finite or indices out of range.
 PolygonSoup read_polygons(const std::filesystem::path& file, double scale_to_metres = 1);
+
+/// The bytes of a file of at most 2 GB. Throws InputError, naming it, when it is missing, no file, empty, larger, or
+/// cannot be read.
+std::string file_contents(const std::filesystem::path& file);
 
 /// Throws InputError, starting with `name`, unless all coordinates are finite, all indices in range, and every polygon
 /// has 3 to 256 corners.

@@ -74,6 +74,8 @@ class LocalEdits {
                           std::back_inserter(shared));
     if (shared.size() != 2 || keep_ring.size() + drop_ring.size() < 8)
       return false;
+    if (keep_ring.size() != around_[keep].size() && drop_ring.size() != around_[drop].size())
+      return false; // both on a border: a sheet would be pinched there
     for (const int other : shared)
       if (around_[other].size() <= 3)
         return false;

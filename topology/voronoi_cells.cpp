@@ -5,6 +5,7 @@
 
 #include "topology/cell_clipper.hpp"
 #include "topology/errors.hpp"
+#include "topology/facet_clipper.hpp"
 #include "topology/lip_lift.hpp"
 #include "topology/point_tree.hpp"
 
@@ -13,20 +14,23 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
+#include <optional>
 #include <voro++.hh>
 
 namespace spherecut::topology {
 
 namespace {
 
-constexpr double cell_reach = 6;    // half size of the initial box of a cell, in h
-constexpr double first_reach = 2.0; // from a node, within which others are looked for first, in h
-constexpr double beside = 1.5;      // a surface this near to a node cuts its cell before the neighbours do, in h
-constexpr double cap_height = 0.75; // how far outside the curved surface a cell is cut off, in h
-constexpr double lip_reach = 0.01;  // a node this near to a sheet lies on one of its faces, in h
-constexpr double lip_lift = 0.1;    // by which it is lifted to look for its neighbours, in h
-constexpr double sliver = 1e-3;     // a smaller part of a face is not split off it
-constexpr double half_way = 1.01;   // the cells of two nodes end half way between them; with slack
+constexpr double cell_reach = 6;        // half size of the initial box of a cell, in h
+constexpr double first_reach = 2.0;     // from a node, within which others are looked for first, in h
+constexpr double beside = 1.5;          // a surface this near to a node cuts its cell before the neighbours do, in h
+constexpr double cap_height = 0.75;     // how far outside the curved surface a cell is cut off, in h
+constexpr double notch = 1.2;           // a concave edge this near to a node leaves no cap above it, in h
+constexpr double lip_reach = 0.01;      // a node this near to a sheet lies on one of its faces, in h
+constexpr double lip_lift = 0.1;        // by which it is lifted to look for its neighbours, in h
+constexpr double smallest_face = 1e-12; // area of a face, in h2
+constexpr double sliver = 1e-3;         // a smaller part of a face is not split off it
+constexpr double half_way = 1.01;       // the cells of two nodes end half way between them; with slack
 constexpr int first_plane_id = -100;
 constexpr int cap_id = -50;
 
@@ -47,6 +51,7 @@ struct CellBuilder {
   const std::vector<Vector3>& lookouts; // of the nodes whose cells are made, when there is an incision
   const std::vector<char>& wanted;      // per node: its cell is made, and its faces with others that are
   bool curved;
+  const SurfaceFacets* surface; // null: it is curved
   std::vector<PointTree::Found> near;
   std::vector<double> vertices;
   std::vector<int> face_vertices, neighbours;
@@ -56,6 +61,11 @@ struct CellBuilder {
   void build(int i, CellComplex& cells, std::vector<Vector3>& closure);
 
  private:
+  /// A face of the cell of node i within the body, relative to it in units of its spacing.
+  void add_face(int i, int neighbour, const std::vector<Vector3>& polygon, CellComplex& cells,
+                std::vector<Vector3>& closure);
+  /// The parts of the surface in the cell of node i, smooth piece by smooth piece; false when there are none.
+  bool add_patches(int i, const FacetClipper& facets, CellComplex& cells);
   /// A face between nodes that do not see each other, a polygon relative to node i in units of its spacing: what lies
   /// ahead of the front is an ordinary face.
   void add_lip(int i, int j, const std::vector<Vector3>& polygon, const Vector3& outward, CellComplex& cells,
@@ -110,7 +120,8 @@ bool CellBuilder::cut_by_neighbours(int i) {
     return false;
   if (curved) {
     const double distance = -domain.curved_distance(x) / h;
-    if (distance < beside) {
+    // In a notch material lies above the surface that is nearest: there the surface itself has to end the cell.
+    if (distance < beside && !(surface != nullptr && surface->sharp_near(x, notch * h).concave)) {
       const Vector3 n = domain.curved_gradient(x);
       cell.nplane(n.x(), n.y(), n.z(), 2 * (distance + cap_height), cap_id);
     }
@@ -238,13 +249,21 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
   CurvedClipper clipper(domain, x, h);
   vertex_phi.assign(vertex_count, -1);
   bool near_surface = false;
+  std::optional<FacetClipper> facets; // of a cell at a sharp edge
   if (curved) {
     // phi is 1-Lipschitz: a cell whose radius is less than its depth below the surface cannot meet it.
-    const double depth = -domain.curved_distance(x) / h;
-    near_surface = depth < std::sqrt(0.25 * cell.max_radius_squared()) * 1.0001;
-    if (near_surface)
+    const double depth = -domain.curved_distance(x) / h, radius = std::sqrt(0.25 * cell.max_radius_squared());
+    near_surface = depth < radius * 1.0001;
+    if (near_surface) {
       for (int v = 0; v < vertex_count; ++v)
         vertex_phi[v] = clipper.phi(vertex(v));
+      if (surface != nullptr && surface->sharp_near(x, radius * h).any) {
+        std::vector<Vector3> corners;
+        for (int v = 0; v < vertex_count; ++v)
+          corners.push_back(vertex(v));
+        facets.emplace(*surface, x, h, corners);
+      }
+    }
   }
 
   std::size_t position = 0;
@@ -257,48 +276,32 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
     }
     polygon.vertices.clear();
     polygon.phi.clear();
-    Vector3 middle = Vector3::Zero();
     for (int k = 0; k < size; ++k) {
       const int v = face_vertices[position++];
       polygon.vertices.push_back(vertex(v));
       polygon.phi.push_back(vertex_phi[v]);
-      middle += polygon.vertices.back() / size;
     }
-    const bool planar_boundary = neighbour <= first_plane_id;
-    if (neighbour < 0 && !planar_boundary) {
+    if (neighbour < 0 && neighbour > first_plane_id) {
       if (neighbour > cap_id && (!near_surface || CurvedClipper(domain, x, h).clip(polygon)))
         throw InputError(fmt::format("the cell of node {} at ({:.6g}, {:.6g}, {:.6g}) m reaches farther than {} times "
                                      "its spacing {:.3g} m inside the body: the nodes leave a hole there",
                                      i, x.x(), x.y(), x.z(), cell_reach, h));
       continue; // the cap or the box: outside the body
     }
-    if (near_surface && !clipper.clip(polygon))
-      continue;
-    PolygonMeasure face = measure(polygon.vertices);
-    const double face_area = face.area.norm();
-    if (face_area < 1e-12)
-      continue;
-    // Outward from the node. A plane through the node itself is a part of the boundary: its own normal tells.
-    const Vector3 outward =
-        planar_boundary ? domain.planes()[first_plane_id - neighbour].normal : Vector3(nodes[neighbour] - x);
-    if (face.area.dot(outward) < 0)
-      face.area = -face.area;
-    const Vector3 area = face.area * h * h, centroid = x + h * face.centroid;
-    if (planar_boundary) {
-      cells.boundary.push_back({i, first_plane_id - neighbour, area, centroid});
-      append_corners(polygon.vertices, x, h, cells.boundary_corners, cells.boundary_start);
-      closure[i] += area;
-    } else if (neighbour < i || wanted[neighbour] == 0) {
-      continue; // had from there
-    } else if (hidden(i, neighbour)) {
-      add_lip(i, neighbour, polygon.vertices, outward, cells, closure);
-    } else {
-      cells.faces.push_back({i, neighbour, area, centroid});
-      append_corners(polygon.vertices, x, h, cells.face_corners, cells.face_start);
-      closure[i] += area;
-      closure[neighbour] -= area;
+    const Vector3 whole = measure(polygon.vertices).area;
+    const auto loops = facets && whole.norm() > smallest_face
+                           ? facets->inside(polygon.vertices, polygon.phi.front() < 0)
+                           : std::nullopt;
+    if (loops) {
+      for (const std::vector<Vector3>& loop : *loops)
+        if (loop.size() >= 3 && measure(loop).area.dot(whole) > 0) // not a hole within a face
+          add_face(i, neighbour, loop, cells, closure);
+    } else if (!near_surface || clipper.clip(polygon)) {
+      add_face(i, neighbour, polygon.vertices, cells, closure);
     }
   }
+  if (facets && add_patches(i, *facets, cells))
+    return;
   if (clipper.met_surface()) {
     // Area follows from closure, once every face is known; the place is the mean crossing projected on the surface.
     Vector3 point = x + h * clipper.surface_mean();
@@ -307,6 +310,66 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
     cells.boundary.push_back({i, -1, Vector3::Zero(), point});
     cells.boundary_start.push_back(static_cast<int>(cells.boundary_corners.size()));
   }
+}
+
+void CellBuilder::add_face(int i, int neighbour, const std::vector<Vector3>& polygon, CellComplex& cells,
+                           std::vector<Vector3>& closure) {
+  const Vector3& x = nodes[i];
+  const double h = spacings[i];
+  PolygonMeasure face = polygon.size() < 3 ? PolygonMeasure{} : measure(polygon);
+  if (face.area.norm() < smallest_face)
+    return;
+  const bool planar_boundary = neighbour <= first_plane_id;
+  // Outward from the node. A plane through the node itself is a part of the boundary: its own normal tells.
+  const Vector3 outward =
+      planar_boundary ? domain.planes()[first_plane_id - neighbour].normal : Vector3(nodes[neighbour] - x);
+  if (face.area.dot(outward) < 0)
+    face.area = -face.area;
+  const Vector3 area = face.area * h * h, centroid = x + h * face.centroid;
+  if (planar_boundary) {
+    cells.boundary.push_back({i, first_plane_id - neighbour, area, centroid});
+    append_corners(polygon, x, h, cells.boundary_corners, cells.boundary_start);
+    closure[i] += area;
+  } else if (neighbour < i || wanted[neighbour] == 0) {
+    return; // had from there
+  } else if (hidden(i, neighbour)) {
+    add_lip(i, neighbour, polygon, outward, cells, closure);
+  } else {
+    cells.faces.push_back({i, neighbour, area, centroid});
+    append_corners(polygon, x, h, cells.face_corners, cells.face_start);
+    closure[i] += area;
+    closure[neighbour] -= area;
+  }
+}
+
+bool CellBuilder::add_patches(int i, const FacetClipper& facets, CellComplex& cells) {
+  const Vector3& x = nodes[i];
+  const double h = spacings[i];
+  std::vector<Plane> planes;
+  std::size_t position = 0;
+  std::vector<Vector3> corners;
+  for (std::size_t f = 0; f < neighbours.size(); ++f) {
+    const int size = face_vertices[position++];
+    corners.clear();
+    for (int k = 0; k < size; ++k) {
+      const int v = face_vertices[position++];
+      corners.emplace_back(vertices[3 * v], vertices[3 * v + 1], vertices[3 * v + 2]);
+    }
+    const PolygonMeasure face = measure(corners);
+    const double area = face.area.norm();
+    if (area < smallest_face)
+      continue;
+    Vector3 normal = face.area / area;
+    if (normal.dot(face.centroid) < 0) // from the node, which lies within the cell
+      normal = -normal;
+    planes.push_back({normal, normal.dot(face.centroid)});
+  }
+  const std::vector<FacetPatch> patches = facets.within(planes);
+  for (const FacetPatch& patch : patches) {
+    cells.boundary.push_back({i, -1, patch.area * h * h, x + h * patch.centroid});
+    cells.boundary_start.push_back(static_cast<int>(cells.boundary_corners.size()));
+  }
+  return !patches.empty();
 }
 
 /// The two nodes of a lip pair as mirror images about the tangent plane of their sheet: on a surface that the sheet
@@ -444,15 +507,25 @@ void build_cells(const std::vector<Vector3>& places, const std::vector<double>& 
   const PointTree tree(nodes);
   const std::size_t known = cells.boundary.size();
   const bool curved = count > 0 && std::isfinite(domain.curved_distance(nodes.front()));
-  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, wanted, curved, {}, {}, {}, {}, {}, {}};
+  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, wanted, curved, facets_of(domain),
+                      {},    {},       {},     {},   {},       {}};
   for (int i = 0; i < count; ++i)
     if (wanted[i] != 0)
       builder.build(i, cells, closure);
   std::vector<char> on_curve(nodes.size(), 0);
+  // What is left open is the part on the curve; of parts that are known what their rounding leaves.
+  std::vector<Vector3> parts(nodes.size(), Vector3::Zero());
+  std::vector<double> sizes(nodes.size(), 0);
+  for (std::size_t b = known; b < cells.boundary.size(); ++b)
+    if (const BoundaryFace& face = cells.boundary[b]; face.plane < 0) {
+      parts[face.node] += face.area;
+      sizes[face.node] += face.area.norm();
+      on_curve[face.node] = 1;
+    }
   for (std::size_t b = known; b < cells.boundary.size(); ++b)
     if (BoundaryFace& face = cells.boundary[b]; face.plane < 0) {
-      face.area = -closure[face.node];
-      on_curve[face.node] = 1;
+      const double share = sizes[face.node] > 0 ? face.area.norm() / sizes[face.node] : 1;
+      face.area -= share * (closure[face.node] + parts[face.node]);
     }
   // The surface can leave a cell exactly through its edges, without a crossing: closure still tells.
   for (int i = 0; curved && i < count; ++i)

@@ -405,13 +405,13 @@ TEST_CASE("Precuts that cannot be made are refused with file and line") {
                                       cut_block + disc_precut + "[[precut]]\nshape = \"file\"\nfile = \"plate.obj\"\n");
   CHECK_THROWS_WITH(Session(read_scenario(overlapping)),
                     Contains("precut[2]") && Contains("of its area lie on the precuts before it"));
-  topology::SurfaceMesh fin; // three triangles on one edge
-  fin.vertices = {{0, 0, 0.01}, {0, 0, 0.02}, {0.01, 0, 0.015}, {-0.01, 0.001, 0.015}, {0, 0.01, 0.015}};
-  fin.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
-  topology::write_surface(folder.path() / "fin.obj", fin);
+  topology::SurfaceMesh band; // of one side
+  band.vertices = {{0, 0, 0.01}, {0, 0, 0.02}, {0.01, 0, 0.015}, {-0.01, 0.001, 0.015}, {0, 0.01, 0.015}};
+  band.triangles = {{0, 1, 2}, {1, 2, 3}, {2, 3, 4}, {3, 4, 0}, {4, 0, 1}};
+  topology::write_surface(folder.path() / "band.obj", band);
   const auto scenario =
-      write_file(folder.path() / "case.toml", cut_block + "[[precut]]\nshape = \"file\"\nfile = \"fin.obj\"\n");
-  CHECK_THROWS_WITH(Session(read_scenario(scenario)), Contains("case.toml:15") && Contains("fin.obj"));
+      write_file(folder.path() / "case.toml", cut_block + "[[precut]]\nshape = \"file\"\nfile = \"band.obj\"\n");
+  CHECK_THROWS_WITH(Session(read_scenario(scenario)), Contains("case.toml:15") && Contains("band.obj"));
 }
 
 TEST_CASE("More increments than memory allows are refused before the run") {

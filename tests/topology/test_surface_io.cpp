@@ -4,7 +4,9 @@
 #include "topology/errors.hpp"
 #include "topology/organs.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
+#include <cctype>
 #include <cstdint>
 #include <cstring>
 #include <fmt/format.h>
@@ -136,7 +138,7 @@ TEST_CASE("Files that are missing, empty, folders or of another kind are refused
   CHECK_THROWS_WITH(read_polygons(save(folder, "empty.ply", "")), Catch::Contains("empty"));
   std::filesystem::create_directory(folder.path() / "folder.obj");
   CHECK_THROWS_WITH(read_polygons(folder.path() / "folder.obj"), Catch::Contains("folder"));
-  CHECK_THROWS_WITH(read_polygons(save(folder, "a.vtk", "x")), Catch::Contains(".vtk") && Catch::Contains(".stl"));
+  CHECK_THROWS_WITH(read_polygons(save(folder, "a.xyz", "x")), Catch::Contains(".xyz") && Catch::Contains(".stl"));
   CHECK_THROWS_WITH(read_polygons(save(folder, "noextension", "x")), Catch::Contains("extension"));
   const SurfaceMesh mesh = make_block(Vector3(1, 1, 1), 1);
   // The wrong extension for the contents.
@@ -243,4 +245,50 @@ TEST_CASE("Indices out of range are refused with face and index", "[surface_io]"
   mesh.triangles[2] = {0, 1, 77};
   write_surface(folder.path() / "i.ply", mesh);
   CHECK_THROWS_WITH(read_polygons(folder.path() / "i.ply"), Catch::Contains("face 2") && Catch::Contains("77"));
+}
+
+TEST_CASE("Files are read as programs leave them", "[surface_io]") {
+  const TemporaryFolder folder;
+  const SurfaceMesh mesh = make_block(Vector3(4, 4, 4), 2);
+  const std::string mark = "\xEF\xBB\xBF";
+  std::string upper = text_stl(mesh);
+  for (char& c : upper)
+    c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  std::string obj = "# a cube\n", continued = obj, old_mac;
+  for (const Vector3& v : mesh.vertices) {
+    obj += fmt::format("v {} {} {} # a corner\n", v.x(), v.y(), v.z());
+    continued += fmt::format("v {} \\\r\n{} {}\r\n", v.x(), v.y(), v.z());
+  }
+  for (const Triangle& t : mesh.triangles) {
+    obj += fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+    continued += fmt::format("f {} {}\\\n {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+  }
+  old_mac = obj;
+  for (std::size_t at = 0; (at = old_mac.find(" # a corner", at)) != std::string::npos;)
+    old_mac.erase(at, 11);
+  std::replace(old_mac.begin(), old_mac.end(), '\n', '\r');
+  std::string commented = off(mesh);
+  commented.replace(0, 4, "OFF # made by hand\n# and more\n");
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {"upper.stl", upper},
+      {"mark.stl", mark + text_stl(mesh)},
+      {"blank.stl", "\n " + text_stl(mesh) + std::string(3, '\0')},
+      {"nan.stl", std::string(text_stl(mesh)).replace(text_stl(mesh).find("normal 0 0 0"), 12, "normal nan nan nan")},
+      {"comments.obj", obj},
+      {"mark.obj", mark + obj},
+      {"continued.obj", continued},
+      {"nul.obj", obj + '\0'},
+      {"end.obj", obj + "\x1A"},
+      {"mac.obj", old_mac.substr(old_mac.find('\r') + 1)},
+      {"comment.off", commented},
+      {"mark.off", mark + commented},
+      {"mark.ply", mark + text_ply(mesh)}};
+  for (const auto& [name, text] : files) {
+    INFO(name);
+    const SurfaceMesh back = as_mesh(read_polygons(save(folder, name, text)));
+    CHECK(back.triangles.size() == mesh.triangles.size());
+    CHECK(volume(back) == Approx(64));
+  }
+  // A fault after a continued line is told with its own line.
+  CHECK_THROWS_WITH(read_polygons(save(folder, "bad.obj", "v 0 \\\n0 0\nv 1 x 0\n")), Catch::Contains("line 3"));
 }
