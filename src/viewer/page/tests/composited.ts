@@ -206,7 +206,13 @@ export async function see(tab: Tab, wait = 10): Promise<Seen> {
   };
 }
 
-/** The organ is where the camera sees it, whole, and nowhere else. */
+/** The organ is where the camera sees it, in whatever colours and however much shines through it. */
+export function organIsThere({ expected, missing, picture }: Seen, when: string): void {
+  assert.ok(expected > 3000 * picture.ratio ** 2, `${when}: the organ should cover more than ${expected} px`);
+  assert.ok(missing < 0.1 * expected, `${when}: ${missing} of ${expected} px of the organ show what is behind it`);
+}
+
+/** The organ is where the camera sees it, whole, in its own colours, and nowhere else. */
 export function organIsSeen(seen: Seen, when: string): void {
   const { expected, missing, tissue, strays } = seen;
   const all = JSON.stringify({ ...seen, picture: undefined, open: undefined });
