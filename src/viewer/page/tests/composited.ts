@@ -153,7 +153,7 @@ export interface Seen {
   wall: number; // px of the wound's colours
   lip: number;
   hand: number; // px of the hand and its spring
-  chart: number; // px of the curve
+  chart: number; // px of the curve above its zero
   toolPixels: number; // px that the front half of a ball of the tool's radius has; 0: the tip is not in the picture
 }
 
@@ -161,6 +161,7 @@ export interface Seen {
 export async function see(tab: Tab, wait = 10): Promise<Seen> {
   const picture = await composited(tab, wait);
   const told = await scene(tab);
+  const chart = await box(tab, 'chart');
   const { ratio, width } = picture;
   const project = (x: number, y: number, z: number): [number, number] => {
     const m = told.camera;
@@ -201,7 +202,7 @@ export async function see(tab: Tab, wait = 10): Promise<Seen> {
     wall: count(picture, 'wall', organ),
     lip: count(picture, 'lip', organ),
     hand: count(picture, 'hand', open),
-    chart: count(picture, 'arrow', await box(tab, 'chart')),
+    chart: count(picture, 'arrow', { ...chart, bottom: chart.bottom - 24 }),
     toolPixels: inside ? 0.5 * Math.PI * radius * radius : 0,
   };
 }
