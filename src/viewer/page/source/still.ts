@@ -19,12 +19,20 @@ export class Still {
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly canvas: HTMLCanvasElement,
+    changed: () => void, // what was kept is gone
   ) {
     this.gl = renderer.getContext() as WebGL2RenderingContext;
     this.under = document.createElement('canvas');
     this.under.className = 'still';
     this.under.setAttribute('aria-hidden', 'true');
     canvas.before(this.under);
+    // A process of the browser that dies can take this canvas with it, before or after the other one.
+    for (const event of ['contextlost', 'contextrestored']) {
+      this.under.addEventListener(event, () => {
+        this.width = this.height = 0;
+        changed();
+      });
+    }
   }
 
   /** This browser cannot keep depths: everything is drawn in every picture. */
@@ -41,7 +49,7 @@ export class Still {
   keep(): boolean {
     const { gl } = this;
     const context = this.under.getContext('2d', { alpha: false });
-    if (this.cannot || !context || gl.isContextLost()) return false;
+    if (this.cannot || !context || context.isContextLost() || gl.isContextLost()) return false;
     const first = this.framebuffer === null;
     if (first) while (gl.getError() !== gl.NO_ERROR); // those of others
     if (first || !this.kept) this.resize();

@@ -55,7 +55,7 @@ export class View {
     // What is kept of a picture lies below the canvas and is seen through it.
     this.renderer = new WebGLRenderer({ canvas, alpha: this.software, antialias: !this.software, powerPreference: 'high-performance' });
     this.gl = this.renderer.getContext() as WebGL2RenderingContext;
-    this.still = this.software ? new Still(this.renderer, canvas) : null;
+    this.still = this.software ? new Still(this.renderer, canvas, () => this.change()) : null;
     this.scene.background = backdrop;
     this.mark = new Mesh(
       new RingGeometry(0.72, 1, 32),
@@ -151,7 +151,7 @@ export class View {
     gl.deleteSync(done);
     this.ordered = null;
     this.drawSeconds += 0.2 * ((performance.now() - since) / 1000 - this.drawSeconds);
-    if (this.sharpness <= 1) this.adapt();
+    this.adapt();
     return false;
   }
 
@@ -237,12 +237,7 @@ export class View {
     else if (this.drawSeconds < 0.02) wanted = Math.min(1, wanted + 0.25);
     if (wanted === this.sharpness) return;
     this.drawSeconds = 0.045;
-    this.sharpen(wanted);
-  }
-
-  /** Draws `sharpness` pixels per pixel of the page; above 1 edges are smooth without multisampling. */
-  sharpen(sharpness: number): void {
-    this.sharpness = sharpness;
+    this.sharpness = wanted;
     this.resize();
   }
 

@@ -35,6 +35,7 @@ test('The page loads without a complaint and takes the tool', async () => {
   const seen = await look(first.tab);
   assert.equal(seen.role, 'you hold the tool');
   assert.equal(seen.force, 0);
+  organIsSeen(await see(first.tab), 'as the page opens');
   await photograph(first.tab, out, 'load');
   assert.equal(await first.tab.title(), `spherecut ${/\d+\.\d+\.\d+/.exec(await first.tab.title())?.[0]}`);
 });
@@ -50,6 +51,10 @@ test('A press is felt, and the readout is the force of the frame', async () => {
   pressed = await look(tab);
   assert.ok(pressed.depth > 0.003, `depth ${pressed.depth}`);
   assert.ok(Math.abs(pressed.readout - pressed.force) < 6e-4, `reads ${pressed.readout}, frame ${pressed.force}`);
+  const picture = await see(tab);
+  organIsSeen(picture, 'pressed');
+  assert.ok(picture.arrow > picture.arrowLength && picture.arrowLength > 20, `${picture.arrow} px of an arrow of ${picture.arrowLength} px`);
+  assert.ok(picture.chart > 20, `${picture.chart} px of a curve`);
   await tab.mouse.up();
   await until(tab, 'it has withdrawn', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
 });
@@ -87,6 +92,7 @@ test('A cut across the liver opens: the lips part in the geometry and in the pic
   const ahead = tab.waitForFunction(() => globalThis.spherecut!.view.trace.length > 0.003, undefined, { polling: 20 });
   await stroke(tab, [[-0.055, 0.004], [0.01, 0.0]], 1.5);
   await ahead;
+  organIsSeen(await see(tab), 'while the cut is solved');
   await until(tab, 'the cut opens', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4);
   await until(tab, 'the wound has caught up with the blade', () => globalThis.spherecut!.view.trace.length === 0);
   await tab.mouse.up();
@@ -120,6 +126,7 @@ test('A second viewer watches and cannot drive until the tool is let go', async 
   await until(second.tab, 'it sees frames', () => globalThis.spherecut?.frame != null);
   await until(second.tab, 'it sees the wound', () => globalThis.spherecut!.view.body.lipsApart() > 2e-4);
   assert.match((await look(second.tab)).role, /^watching/);
+  organIsSeen(await see(second.tab), 'for the second viewer');
   assert.ok(await second.tab.isDisabled('#take'));
   if (out) await sideBySide(browser, [await shot(first.tab), await shot(second.tab)], out, 'two');
   assert.ok(await second.tab.isDisabled('#reset'));
@@ -140,6 +147,9 @@ test('Reset makes the organ whole', async () => {
   await tab.keyboard.press('r');
   await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch > old, epoch, { timeout: 1000 * patience });
   await until(tab, 'it is whole', () => globalThis.spherecut!.frame!.cutArea === 0 && globalThis.spherecut!.view.body.lipsApart() === 0);
+  const whole = await see(tab);
+  organIsSeen(whole, 'made whole');
+  assert.ok(whole.lip < 10, `${whole.lip} px of lips stay`);
   if (out) await sideBySide(browser, [wounded, await shot(tab)], out, 'reset');
 });
 
@@ -170,7 +180,7 @@ test('Everything goes by keyboard', async () => {
   await tab.keyboard.press('?');
   await until(tab, 'the help', () => (document.getElementById('help') as HTMLDialogElement).open);
   assert.match((await tab.textContent('#help-body')) ?? '', /turn the blade/);
-  await photograph(tab, out, 'keyboard');
+  await photograph(tab, out, 'keyboard', true);
   await tab.keyboard.press('Escape');
   // Every control has a name, and Tab reaches them.
   const nameless = await tab.evaluate(() =>
@@ -192,6 +202,7 @@ test('It works in a window of a telephone', async () => {
   await until(first.tab, 'it has let go', () => !globalThis.spherecut!.holding);
   const { tab, complaints, context } = await openPage(browser, served.address, { width: 390, height: 844, touch: true });
   await ready(tab);
+  organIsSeen(await see(tab), 'on a telephone');
   const wide = await tab.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
   assert.ok(wide <= 0, `${wide} pixels too wide`);
   assert.ok(!(await tab.isVisible('#panels')));

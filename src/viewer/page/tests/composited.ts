@@ -153,7 +153,7 @@ export interface Seen {
   wall: number; // px of the wound's colours
   lip: number;
   hand: number; // px of the hand and its spring
-  chart: number; // px of the curve
+  chart: number; // px of the curve above its zero
   toolPixels: number; // px that the front half of a ball of the tool's radius has; 0: the tip is not in the picture
 }
 
@@ -161,6 +161,7 @@ export interface Seen {
 export async function see(tab: Tab, wait = 10): Promise<Seen> {
   const picture = await composited(tab, wait);
   const told = await scene(tab);
+  const chart = await box(tab, 'chart');
   const { ratio, width } = picture;
   const project = (x: number, y: number, z: number): [number, number] => {
     const m = told.camera;
@@ -201,12 +202,18 @@ export async function see(tab: Tab, wait = 10): Promise<Seen> {
     wall: count(picture, 'wall', organ),
     lip: count(picture, 'lip', organ),
     hand: count(picture, 'hand', open),
-    chart: count(picture, 'arrow', await box(tab, 'chart')),
+    chart: count(picture, 'arrow', { ...chart, bottom: chart.bottom - 24 }),
     toolPixels: inside ? 0.5 * Math.PI * radius * radius : 0,
   };
 }
 
-/** The organ is where the camera sees it, whole, and nowhere else. */
+/** The organ is where the camera sees it, in whatever colours and however much shines through it. */
+export function organIsThere({ expected, missing, picture }: Seen, when: string): void {
+  assert.ok(expected > 3000 * picture.ratio ** 2, `${when}: the organ should cover more than ${expected} px`);
+  assert.ok(missing < 0.1 * expected, `${when}: ${missing} of ${expected} px of the organ show what is behind it`);
+}
+
+/** The organ is where the camera sees it, whole, in its own colours, and nowhere else. */
 export function organIsSeen(seen: Seen, when: string): void {
   const { expected, missing, tissue, strays } = seen;
   const all = JSON.stringify({ ...seen, picture: undefined, open: undefined });

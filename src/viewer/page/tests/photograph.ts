@@ -1,28 +1,26 @@
-// Pictures that tests and docs/images keep: JPEG with smooth edges, small.
+// Pictures that tests and docs/images keep: what the browser has composited, as small JPEG.
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Browser, Page as Tab } from 'playwright-core';
+import { capture, organIsThere, see } from './composited';
 
 const most = 150_000; // bytes
 
-/** The window as a JPEG of at most `bytes`, its messages taken away. */
-export async function shot(tab: Tab, bytes = most): Promise<Buffer> {
-  await tab.evaluate(() => {
-    document.getElementById('messages')!.replaceChildren();
-    globalThis.spherecut!.view.sharpen(2);
-  });
+/** What the browser has composited as a JPEG of at most `bytes`, messages taken away. `covered`: a dialog lies over the organ. */
+export async function shot(tab: Tab, covered = false, bytes = most): Promise<Buffer> {
+  await tab.evaluate(() => document.getElementById('messages')!.replaceChildren());
+  if (!covered) organIsThere(await see(tab), 'photographed');
   let picture: Buffer = Buffer.alloc(0);
   for (const quality of [84, 74, 62, 50]) {
-    picture = await tab.screenshot({ type: 'jpeg', quality });
+    picture = await capture(tab, 'jpeg', quality);
     if (picture.length < bytes) break;
   }
-  await tab.evaluate(() => globalThis.spherecut!.view.sharpen(1));
   return picture;
 }
 
 /** Keeps a picture as viewer_NAME.jpg; nothing without a folder. */
-export async function photograph(tab: Tab, folder: string, name: string): Promise<void> {
-  if (folder) keep(folder, name, await shot(tab));
+export async function photograph(tab: Tab, folder: string, name: string, covered = false): Promise<void> {
+  if (folder) keep(folder, name, await shot(tab, covered));
 }
 
 export function keep(folder: string, name: string, picture: Buffer): void {

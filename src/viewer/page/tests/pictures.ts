@@ -47,6 +47,7 @@ async function liver(): Promise<void> {
     await hover(tab, -0.06, 0.004);
     await stroke(tab, [[-0.06, 0.004], [-0.035, 0.004], [-0.01, 0.001], [0.012, -0.002]], 2.5);
     await until(tab, 'there is a cut', () => globalThis.spherecut!.frame!.cutArea > 1e-4);
+    await until(tab, 'the wound has caught up with the blade', () => globalThis.spherecut!.view.trace.length === 0);
     // Until the solver has caught up with the hand.
     for (let area = -1, seen = await look(tab); seen.cutArea > area; seen = await look(tab)) {
       area = seen.cutArea;

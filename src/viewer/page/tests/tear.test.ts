@@ -4,6 +4,7 @@ import { join } from 'node:path';
 import test, { after, before } from 'node:test';
 import type { Browser } from 'playwright-core';
 import { launch, type Opened, openPage, patience, until } from './browser';
+import { organIsSeen, see } from './composited';
 import { hover, look, ready } from './hand';
 import { coarserFlap, serve, type Served, withValues } from './server';
 
@@ -33,6 +34,7 @@ test('The grasper is what this scenario offers, beside no probe and no blade', a
   assert.equal(seen.mode, 'grasper');
   assert.ok(seen.cutArea > 1e-3, `the precut has ${seen.cutArea} m2`);
   assert.equal(seen.force, 0);
+  organIsSeen(await see(tab), 'as the page opens');
 });
 
 test('By mouse: it takes hold, pulls, and the tissue pulls back', async () => {
@@ -41,6 +43,9 @@ test('By mouse: it takes hold, pulls, and the tissue pulls back', async () => {
   await tab.mouse.down();
   await until(tab, 'it pulls', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.01);
   await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3);
+  const pulled = await see(tab);
+  organIsSeen(pulled, 'pulled');
+  assert.ok(pulled.arrow > 20, `${pulled.arrow} px of an arrow`);
 });
 
 test('Pulled further it tears: the cut grows and its sides part', async () => {
@@ -60,6 +65,9 @@ test('Pulled further it tears: the cut grows and its sides part', async () => {
   assert.ok(torn.lips > before.lips + 5e-4, `${before.lips} m became ${torn.lips}`);
   await until(tab, 'the page says what the tear is at', () => (globalThis.spherecut!.tear?.area ?? 0) > 0);
   assert.match((await tab.textContent('#tear-state')) ?? '', /^(Tearing,|The tear) .*cm²/);
+  const open = await see(tab);
+  organIsSeen(open, 'torn');
+  assert.ok(open.lip > 20, `${open.lip} px of lips`);
 });
 
 test('Let go, it is without force, and what is torn stays torn', async () => {
