@@ -168,10 +168,6 @@ TEST_CASE("Quick remeshing ledger: every back end opens the penny as it should, 
   require_quick_run_passes("remeshing_ledger");
 }
 
-TEST_CASE("Quick real world: what people bring gives the right answer or a clear word") {
-  require_quick_run_passes("real_world");
-}
-
 TEST_CASE("Quick solve rate: the steps that are timed give forces") {
   require_quick_run_passes("solve_rate");
 }
