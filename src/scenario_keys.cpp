@@ -141,7 +141,7 @@ constexpr std::array keys = {
                 "Largest node spacing, far from contact and cuts; left out: 1/10 of the largest extent, at least fine, "
                 "and half the "
                 "thickness of thin walls as far as 8000 nodes go.",
-                above(0, 1)},
+                from(tiny, 1)},
     ScenarioKey{"nodes.slope", number, "", "0.3", "Growth of the spacing per distance from the fine zone.",
                 from(1e-3, 1)},
     ScenarioKey{"nodes.fine_radius", number, "m", "",

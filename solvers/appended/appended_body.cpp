@@ -302,7 +302,7 @@ const AppendedBody::Contact& AppendedBody::contact(int node) const {
     return known->second;
   if (patches_ == nullptr)
     patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
-  const DisplacementMean mean = patches_->mean(node, uncut_->spheres(), problem_.prescribed_region);
+  const DisplacementMean mean = patches_->contact_mean(node, uncut_->spheres(), problem_);
   return contacts_.emplace(node, Contact{mean_over(mean.share), mean.centroid}).first->second;
 }
 

@@ -57,7 +57,7 @@ bool UncutBody::fits(const Problem& problem, int base) const {
   if (base != size() || problem.domain != problem_.domain ||
       problem.material.young_modulus != problem_.material.young_modulus ||
       problem.material.poisson_ratio != problem_.material.poisson_ratio ||
-      (problem.prescribed_region != nullptr) != (problem_.prescribed_region != nullptr))
+      static_cast<bool>(problem.prescribed_region) != static_cast<bool>(problem_.prescribed_region))
     return false;
   const NodeCloud &own = problem_.nodes, &other = problem.nodes;
   for (int i = 0; i < base; ++i)
@@ -78,14 +78,11 @@ bool UncutBody::fits(const Problem& problem, int base) const {
 
 void UncutBody::assemble() {
   const SurfacePatches patches(*problem_.domain, problem_.nodes);
-  std::vector<int> held_nodes;
-  for (const Prescribed& entry : problem_.prescribed)
-    held_nodes.push_back(entry.node);
   if (problem_.prescribed_region)
-    held_ = patches.means(held_nodes, spheres_, problem_.prescribed_region);
+    held_ = patches.means(problem_.prescribed, spheres_, problem_.prescribed_region);
   else
-    for (const int node : held_nodes)
-      held_.push_back(value_at(spheres_, problem_.nodes.positions[node]));
+    for (const Prescribed& entry : problem_.prescribed)
+      held_.push_back(value_at(spheres_, problem_.nodes.positions[entry.node]));
 
   StiffnessTiles tiles(problem_.nodes.positions);
   CellCluster cluster(tiles.groups());
