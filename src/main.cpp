@@ -15,6 +15,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdlib>
 #include <exception>
@@ -71,10 +72,10 @@ std::string what_failed() {
 
 void list_experiments(bool names_only) {
   for (const experiments::Experiment& experiment : experiments::all_experiments())
-    if (names_only)
-      fmt::print("{}\n", experiment.name);
-    else
-      fmt::print("{:<24} {}\n", experiment.name, experiment.purpose);
+    std::fputs((names_only ? fmt::format("{}\n", experiment.name)
+                           : fmt::format("{:<24} {}\n", experiment.name, experiment.purpose))
+                   .c_str(),
+               stdout); // whether that could be written is asked at the end
 }
 
 std::string interrupted_text(const std::string& out) {
@@ -163,9 +164,17 @@ int ended(int status) {
   return status == 0 ? failed : status;
 }
 
+/// The stack of this thread grows where it is used: without memory that ends the program by a signal.
+[[gnu::noinline]] void touch_stack() {
+  std::array<volatile char, std::size_t{1} << 20U> pages; // of the 8 MB that there may be
+  for (std::size_t at = 0; at < pages.size(); at += 4096)
+    pages[at] = 0;
+}
+
 /// What libraries below would wait for for ever, or end the program by: told before there is anything to lose. Bodies
 /// that are made beside the steps of a loop have threads of their own.
 void require_resources(bool is_real_time) {
+  touch_stack();
   std::thread([] {}).join();
   app::reserve_blas_memory(solvers::thread_count() + (is_real_time ? 4 : 1));
 }
@@ -280,7 +289,7 @@ int run(int argc, char** argv) {
   else if (run_one->parsed())
     return run_experiment(name, out, quick);
   else
-    fmt::print("{}", markdown ? app::scenario_reference() : app::scenario_help());
+    std::fputs((markdown ? app::scenario_reference() : app::scenario_help()).c_str(), stdout);
   return ended(0);
 }
 

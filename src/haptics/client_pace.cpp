@@ -12,6 +12,7 @@ constexpr double remembered = 0.5;                     // s, over which the rate
 constexpr double leads_from = 1.5, leads_until = 1.25; // ticks between two poses
 constexpr double fades_from = slowest_client - 1;      // poses a second: one lost in fifty does not count
 constexpr double fade = 0.1;                           // s
+constexpr double settled = 0.2;                        // s
 constexpr std::size_t known_from = 4;                  // poses
 
 } // namespace
@@ -55,7 +56,9 @@ void ClientPace::measure(std::uint64_t tick) noexcept {
   measured_ = rate_ / period;
   length_ = std::max(1.0, std::round(mean));
   leads_ = leads_ ? mean > leads_until : mean > leads_from;
-  const bool slow = measured_ < (kind_ == PaceKind::too_slow ? slowest_client : std::min(fades_from, rate_ - 1));
+  const bool is_settled = span + silence >= settled * rate_; // a few poses may come late by chance
+  const bool slow =
+      is_settled && measured_ < (kind_ == PaceKind::too_slow ? slowest_client : std::min(fades_from, rate_ - 1));
   kind_ = count_ < known_from ? PaceKind::unknown
           : slow              ? PaceKind::too_slow
           : leads_            ? PaceKind::interpolated

@@ -284,12 +284,8 @@ TEST_CASE("What a client sends within its messages is counted in bytes, and in w
   WebSocketClient good(server.port());
   WebSocketClient heavy(server.port());
   const std::string nested(4000, '[');
-  int heard = 0;
-  for (int i = 0; i < 300 && heavy.open(); ++i) { // as many messages as are allowed at once, 1.2 MB
+  for (int i = 0; i < 300; ++i) // as many messages as are allowed at once, 1.2 MB
     heavy.send(nested);
-    while (heavy.receive(0))
-      ++heard;
-  }
   CHECK(heavy.wait_for_close());
   CHECK((heavy.close_code() == 1008 || heavy.close_code() == 1006));
   CHECK(server.refused < 40);
