@@ -38,6 +38,7 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
         CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0, 0.4)}, 1.5, 0.35,
                         size,         static_cast<std::uint64_t>(seed)};
         cut.method = method.method;
+        cut.sight = method.sight;
         CutBody body = cut_body(cut);
         body.problem.material = material;
         hold_strip(body.problem, strip);

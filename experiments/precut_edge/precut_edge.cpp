@@ -48,6 +48,7 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
         CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0.07, 0.1)}, 4, 0.35,
                         size,         static_cast<std::uint64_t>(seed)};
         cut.method = method.method;
+        cut.sight = method.sight;
         CutBody body = cut_body(cut);
         body.problem.material = {1, run.sides == StripSides::free ? 0.0 : 0.3, 0};
         hold_strip(body.problem, strip);
