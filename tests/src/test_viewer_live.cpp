@@ -571,7 +571,7 @@ TEST_CASE("A second server is refused the folder that another records into") {
   REQUIRE(one.until([&] { return !one.recording.is_null(); }));
   two.say({{"type", "record"}, {"on", true}});
   REQUIRE(two.until([&] { return !two.errors.empty(); }));
-  CHECK_THAT(two.errors.back()["text"].get<std::string>(), Contains("another run writes into it"));
+  CHECK_THAT(two.errors.back()["text"].get<std::string>(), Catch::Contains("another run writes into it"));
 }
 
 TEST_CASE("Serving with --open shows the page in the user's browser") {
