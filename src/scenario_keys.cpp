@@ -306,8 +306,8 @@ constexpr std::array keys = {
     ScenarioKey{
         "cut.front_spacing", number, "m", "",
         "Node spacing at the fronts of the cuts (a precut that parts the organ has none) and along the way of the "
-        "blade, where it is finer than nodes.fine_spacing; left out: that, or without it and without a tool a sixth of "
-        "the root of the smallest precut's area, for a "
+        "blade, where it is finer than nodes.fine_spacing; left out: that, or without it and without a tool 0.15 "
+        "radii of the smallest disc or a sixth of the root of another precut's area, for a "
         "blade a twelfth of its edge.",
         from(tiny, 1)},
 
