@@ -1,6 +1,7 @@
 #include "src/cut_report.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/splinters.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -80,59 +81,12 @@ double opening_volume(const topology::Wound& wound, const BodyModel& model) {
   return volume;
 }
 
-namespace {
-
-// Area, m2, and centre of area times it, of every piece.
-struct PieceArea {
-  double area = 0;
-  Vector3 moment = Vector3::Zero();
-};
-
-std::vector<PieceArea> piece_areas(const topology::Wound& wound) {
-  std::vector<PieceArea> areas(wound.pieces.size());
-  for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
-    const Triangle& triangle = wound.surface.triangles[t];
-    PieceArea& of = areas[static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)))];
-    const double part = area_vector(wound.surface, triangle).norm();
-    of.area += part;
-    for (const int vertex : triangle)
-      of.moment += part / 3 * wound.surface.vertices[vertex];
-  }
-  return areas;
-}
-
-// m; the diameter of a ball of the same volume over area. 0 for what has come to nothing.
-double size_of(const topology::WoundPiece& piece, const PieceArea& of) {
-  return of.area > 0 ? 6 * piece.volume / of.area : 0;
-}
-
-std::vector<int> tissue_pieces(const topology::Wound& wound, const std::vector<PieceArea>& areas) {
-  constexpr double thinnest = 2e-4; // of the largest piece's size
-  double largest = 0;
-  for (std::size_t piece = 0; piece < areas.size(); ++piece)
-    largest = std::max(largest, size_of(wound.pieces[piece], areas[piece]));
-  std::vector<int> pieces;
-  for (std::size_t piece = 0; piece < areas.size(); ++piece)
-    if (size_of(wound.pieces[piece], areas[piece]) >= thinnest * largest)
-      pieces.push_back(static_cast<int>(piece));
-  return pieces;
-}
-
-} // namespace
-
-std::vector<int> tissue_pieces(const topology::Wound& wound) {
-  if (wound.pieces.size() < 2)
-    return {0};
-  return tissue_pieces(wound, piece_areas(wound));
-}
-
 void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing) {
   if (wound.pieces.size() < 2)
     return;
-  const std::vector<PieceArea> areas = piece_areas(wound);
-  for (const int piece : tissue_pieces(wound, areas)) {
-    const Vector3 middle = areas[piece].moment / areas[piece].area;
-    const double size = size_of(wound.pieces[piece], areas[piece]);
+  const std::vector<topology::PieceShape> shapes = topology::piece_shapes(wound);
+  for (std::size_t piece = 0; piece < shapes.size(); ++piece) {
+    const auto& [size, middle] = shapes[piece];
     if (const double h = spacing(middle); size < h)
       throw InputError(fmt::format("the cut leaves a piece of {:.3g} m3 at [{:.4g}, {:.4g}, {:.4g}] m that is smaller "
                                    "than the node spacing: {:.3g} m across; allowed: at least {:.3g} m",
@@ -152,9 +106,9 @@ std::vector<int> unheld_pieces(const topology::Wound& wound, const std::vector<F
     mark = std::any_of(fixed.begin(), fixed.end(), [&](const FixedRegion& region) { return region.holds(middle); });
   }
   std::vector<int> unheld;
-  for (const int piece : tissue_pieces(wound))
-    if (held[static_cast<std::size_t>(piece)] == 0)
-      unheld.push_back(piece);
+  for (std::size_t piece = 0; piece < held.size(); ++piece)
+    if (held[piece] == 0)
+      unheld.push_back(static_cast<int>(piece));
   return unheld;
 }
 

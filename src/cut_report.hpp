@@ -36,13 +36,8 @@ void report_body(const BodyModel& body, double sight, BodyUpdate& report);
 /// material on its own side.
 double opening_volume(const topology::Wound& wound, const BodyModel& model);
 
-/// The pieces of tissue: all but splinters, what rounding leaves between strips of a cut that all but coincide, whose 6
-/// volume / area is below 2e-4 of the largest piece's.
-std::vector<int> tissue_pieces(const topology::Wound& wound);
-
 /// Throws InputError naming the first piece that is smaller than the node spacing there: 6 volume / area, the diameter
-/// of a ball of that ratio, below it. Splinters are left out here
-/// and below.
+/// of a ball of that ratio, below it.
 void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing);
 
 /// Pieces no part of whose surface lies in a fixed region.
