@@ -1,6 +1,7 @@
 #include "src/cut_report.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/splinters.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -89,6 +90,7 @@ Opening opening_of(const topology::Wound& wound, const BodyModel& model) {
   return opening;
 }
 
+<<<<<<< HEAD
 namespace {
 
 // Area, m2, and centre of area times it, of every piece.
@@ -162,13 +164,14 @@ void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& sp
   }
 }
 
+=======
+>>>>>>> viewer
 void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing) {
   if (wound.pieces.size() < 2)
     return;
-  const std::vector<PieceArea> areas = piece_areas(wound);
-  for (const int piece : tissue_pieces(wound, areas)) {
-    const Vector3 middle = areas[piece].moment / areas[piece].area;
-    const double size = size_of(wound.pieces[piece], areas[piece]);
+  const std::vector<topology::PieceShape> shapes = topology::piece_shapes(wound);
+  for (std::size_t piece = 0; piece < shapes.size(); ++piece) {
+    const auto& [size, middle] = shapes[piece];
     if (const double h = spacing(middle); size < h)
       throw InputError(
           fmt::format("the cut leaves a piece of {:.3g} m3 at [{:.4g}, {:.4g}, {:.4g}] m that is smaller "
@@ -190,9 +193,9 @@ std::vector<int> unheld_pieces(const topology::Wound& wound, const std::vector<F
     mark = std::any_of(fixed.begin(), fixed.end(), [&](const FixedRegion& region) { return region.holds(middle); });
   }
   std::vector<int> unheld;
-  for (const int piece : tissue_pieces(wound))
-    if (held[static_cast<std::size_t>(piece)] == 0)
-      unheld.push_back(piece);
+  for (std::size_t piece = 0; piece < held.size(); ++piece)
+    if (held[piece] == 0)
+      unheld.push_back(static_cast<int>(piece));
   return unheld;
 }
 

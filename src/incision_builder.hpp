@@ -14,9 +14,14 @@ class IncisionBuilder {
   /// line of a sheet that cannot be used or lies outside the organ.
   IncisionBuilder(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double edge);
 
+<<<<<<< HEAD
   /// What was done to the sheets of the precuts to make them sound.
   [[nodiscard]] const std::vector<std::string>& remarks() const { return remarks_; }
   [[nodiscard]] const topology::Wound& wound() const { return wound_->wound(); }
+=======
+  /// Without splinters (topology/splinters.hpp).
+  [[nodiscard]] const topology::Wound& wound() const { return mended_ ? *mended_ : wound_->wound(); }
+>>>>>>> viewer
   /// Null while nothing is cut.
   [[nodiscard]] const std::shared_ptr<const topology::Incision>& incision() const { return incision_; }
 
@@ -75,6 +80,7 @@ class IncisionBuilder {
   void add_own(topology::SurfaceMesh sheet);
   void find_swept();
   void use(const std::vector<topology::SurfaceMesh>& sheets);
+  void grow(const std::vector<topology::SurfaceMesh>& sheets);
 
   std::vector<std::string> remarks_;
   std::shared_ptr<const topology::Domain> domain_;
@@ -85,6 +91,7 @@ class IncisionBuilder {
   int swept_ = 0;                          // sheets of sweep_ in it
   std::optional<topology::BladeSweep> sweep_;
   std::unique_ptr<topology::IncrementalWound> wound_;
+  std::optional<topology::Wound> mended_; // that wound without its splinters, where it has some
   std::unique_ptr<topology::CutFields> fields_;
   std::shared_ptr<const topology::Incision> incision_;
   int revision_ = 0;

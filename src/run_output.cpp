@@ -244,7 +244,7 @@ void RunOutput::check_pieces(const Session& session, double time) {
   const double voxel = level_set_->voxel_size();
   const topology::VoxelPieces voxels = topology::count_pieces(*level_set_, *session.incision(), 27, true);
   const auto difference = topology::component_difference(wound);
-  const auto pieces = static_cast<int>(tissue_pieces(wound).size());
+  const auto pieces = static_cast<int>(wound.pieces.size());
   findings_.piece_checks.push_back({time, pieces, voxels.volumes, voxel,
                                     topology::hausdorff_distance(wound, voxels, voxel), !difference.has_value()});
   if (difference)

@@ -321,9 +321,8 @@ void Session::check_held(double time) {
   if (unheld.empty())
     return;
   const double volume = wound.pieces[static_cast<std::size_t>(unheld.front())].volume;
-  const std::string what =
-      fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region", unheld.size(),
-                  tissue_pieces(wound).size(), volume, unheld.size() == 1 ? "is" : "are");
+  const std::string what = fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region",
+                                       unheld.size(), wound.pieces.size(), volume, unheld.size() == 1 ? "is" : "are");
   if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
     throw InputError(fmt::format("{}{}; cut.unheld = \"refuse\" allows none",
                                  scenario_.blade || scenario_.precuts.empty()
@@ -367,8 +366,8 @@ void Session::report_cut(CutReport& report) const {
     report.front_length = model_.incision->front_length();
     report.sheets = static_cast<int>(model_.incision->sheets().size());
   }
-  for (const int piece : tissue_pieces(wound))
-    report.volumes.push_back(wound.pieces[piece].volume);
+  for (const topology::WoundPiece& piece : wound.pieces)
+    report.volumes.push_back(piece.volume);
   report.pieces = static_cast<int>(report.volumes.size());
   std::sort(report.volumes.rbegin(), report.volumes.rend());
   report.unheld = static_cast<int>(unheld_pieces(wound, scenario_.fixed).size());

@@ -259,7 +259,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
   const TearSettings& settings = scenario_.tearing;
   const double fine = zone_.spacing.fine, stride = settings.step * fine;
   const int most = tear_gradually_ ? 1 : settings.most_increments;
-  const std::size_t pieces = tissue_pieces(*wound()).size();
+  const std::size_t pieces = wound()->pieces.size();
   const bool proposed = mark_.has_value();
   using States = std::optional<std::vector<solvers::FrontState>>;
   double intensity_seconds = 0;
@@ -432,7 +432,7 @@ void Session::tear(const StepSample& sample, const Loading& loading, StepResult&
       if (!std::exchange(tears_->told, true))
         say_(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample.time));
     }
-    if (tissue_pieces(incisions_->wound()).size() > pieces)
+    if (incisions_->wound().pieces.size() > pieces)
       report.severed = true;
   }
   if (share < 1)

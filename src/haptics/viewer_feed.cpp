@@ -1,5 +1,7 @@
 #include "src/haptics/viewer_feed.hpp"
 
+#include "src/haptics/shown_opening.hpp"
+
 #include "src/cut_output.hpp"
 
 #include <algorithm>
@@ -97,8 +99,6 @@ void ViewerFeed::offer(const HapticSimulation& simulation, const SolveRecord& so
   if (result.cut) {
     last_.cut_area = result.cut->area;
     last_.front_length = result.cut->front_length;
-    last_.opening = result.cut->opening;
-    last_.opening_volume = result.cut->opening_volume;
   }
   last_.tear = tear_status(result, last_.tear);
   last_.solve_seconds = solve.seconds;
@@ -137,6 +137,9 @@ void ViewerFeed::make(const HapticSimulation& simulation) {
   frame.number = ++number_;
   frame.topology = follower_.topology();
   follower_.deform(session, frame.vertices);
+  const ShownOpening open = shown_opening(*frame.topology, frame.vertices);
+  frame.opening = open.largest;
+  frame.opening_volume = open.volume;
   float largest = 0;
   for (std::size_t v = 0; v < frame.vertices.size(); ++v)
     largest = std::max(largest, (frame.vertices[v] - frame.topology->vertices[v]).squaredNorm());

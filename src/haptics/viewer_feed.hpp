@@ -56,7 +56,7 @@ struct ViewerFrame {
   double contact_radius = 0;             // m
   int nodes = 0, active = 0, degradation = 0;
   double cut_area = 0, front_length = 0;  // m2, m
-  double opening = 0, opening_volume = 0; // m, m3
+  double opening = 0, opening_volume = 0; // m, m3, of the picture
   TearStatus tear;
   double solve_seconds = 0;                   // wall clock of the solve
   SessionProfile profile;                     // of the whole session

@@ -46,7 +46,7 @@ struct Outcome {
   double measured = 0;
 };
 
-Outcome press(const SlowClientSettings& client, double stiffness, bool controlled, double seconds = 8) {
+Outcome press_as_client(const SlowClientSettings& client, double stiffness, bool controlled, double seconds = 8) {
   HapticSettings settings;
   settings.passivity = controlled;
   settings.limits.slew = 1e5;
@@ -89,7 +89,7 @@ TEST_CASE("A client of any rate, with jitter, loss and reordering, gets no energ
         SlowClientSettings client;
         client.rate = rate;
         client.seed = seed;
-        const Outcome outcome = press(client, stiffness, true);
+        const Outcome outcome = press_as_client(client, stiffness, true);
         INFO(rate << " poses a second, " << stiffness << " N/m, seed " << seed << ": lowest " << 1e3 * outcome.lowest
                   << " mJ, steps " << 1e3 * outcome.step << " mN, exact " << 1e3 * outcome.exact_step << " mN, peak "
                   << outcome.peak << " N, in the last second " << outcome.late_peak << " N");
@@ -106,14 +106,14 @@ TEST_CASE("A client of any rate, with jitter, loss and reordering, gets no energ
 TEST_CASE("Without the controller a slow client's hand takes energy out of a wall") {
   SlowClientSettings client;
   client.rate = 60;
-  CHECK(press(client, 500, false).lowest < -5e-3);
+  CHECK(press_as_client(client, 500, false).lowest < -5e-3);
 }
 
 TEST_CASE("Below 50 poses a second the force fades, and the reason is told") {
   SlowClientSettings client;
   client.rate = 40;
   client.jitter = 0;
-  const Outcome outcome = press(client, 500, true, 4);
+  const Outcome outcome = press_as_client(client, 500, true, 4);
   CHECK(outcome.late_peak == 0);
   CHECK(outcome.measured == Approx(40).epsilon(0.05));
   CHECK_THAT(pace_text({PaceKind::too_slow, 40}),

@@ -45,10 +45,11 @@ export class Still {
     return this.width === this.gl.drawingBufferWidth && this.height === this.gl.drawingBufferHeight;
   }
 
-  /** Keeps what has just been drawn; false: this browser cannot, or has lost the canvas. */
+  /** Keeps what has just been drawn; false: this browser cannot, or not now. */
   keep(): boolean {
     const { gl } = this;
-    const context = this.under.getContext('2d', { alpha: false });
+    // In memory, where no process that dies takes it away.
+    const context = this.under.getContext('2d', { alpha: false, willReadFrequently: true });
     if (this.cannot || !context || context.isContextLost() || gl.isContextLost()) return false;
     const first = this.framebuffer === null;
     if (first) while (gl.getError() !== gl.NO_ERROR); // those of others
@@ -56,8 +57,11 @@ export class Still {
     this.copyDepth(null, this.framebuffer, [0, 0, this.width, this.height]);
     // Depths are copied between buffers of one format alone; of the canvas's it is not told.
     if (first) this.cannot = gl.getError() !== gl.NO_ERROR;
-    if (!this.cannot) context.drawImage(this.canvas, 0, 0);
-    return !this.cannot;
+    if (this.cannot) return false;
+    context.drawImage(this.canvas, 0, 0);
+    // Black is no colour of a picture: while a process that draws is started again nothing is copied, and nobody says so.
+    const [red, green, blue] = context.getImageData(0, 0, 1, 1).data;
+    return red !== 0 || green !== 0 || blue !== 0;
   }
 
   /**
