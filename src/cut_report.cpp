@@ -90,7 +90,6 @@ Opening opening_of(const topology::Wound& wound, const BodyModel& model) {
   return opening;
 }
 
-<<<<<<< HEAD
 namespace {
 
 // Area, m2, and centre of area times it, of every piece.
@@ -117,31 +116,15 @@ double size_of(const topology::WoundPiece& piece, const PieceArea& of) {
   return of.area > 0 ? 6 * piece.volume / of.area : 0;
 }
 
-std::vector<int> tissue_pieces(const topology::Wound& wound, const std::vector<PieceArea>& areas) {
-  constexpr double thinnest = 2e-4; // of the largest piece's size
-  double largest = 0;
-  for (std::size_t piece = 0; piece < areas.size(); ++piece)
-    largest = std::max(largest, size_of(wound.pieces[piece], areas[piece]));
-  std::vector<int> pieces;
-  for (std::size_t piece = 0; piece < areas.size(); ++piece)
-    if (size_of(wound.pieces[piece], areas[piece]) >= thinnest * largest)
-      pieces.push_back(static_cast<int>(piece));
-  return pieces;
-}
-
 } // namespace
-
-std::vector<int> tissue_pieces(const topology::Wound& wound) {
-  if (wound.pieces.size() < 2)
-    return {0};
-  return tissue_pieces(wound, piece_areas(wound));
-}
 
 void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& spacing) {
   if (wound.pieces.size() < 2)
     return;
   const std::vector<PieceArea> areas = piece_areas(wound);
-  for (const int piece : tissue_pieces(wound, areas)) {
+  for (std::size_t piece = 0; piece < wound.pieces.size(); ++piece) {
+    if (areas[piece].area <= 0)
+      continue;
     const Vector3 middle = areas[piece].moment / areas[piece].area;
     const double size = size_of(wound.pieces[piece], areas[piece]);
     if (size >= spacing(middle) || size < spacing.fine)
@@ -149,7 +132,7 @@ void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& sp
     Matrix3 spread = Matrix3::Zero();
     std::vector<Vector3> corners;
     for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t)
-      if (wound.piece_of(static_cast<int>(t)) == piece)
+      if (wound.piece_of(static_cast<int>(t)) == static_cast<int>(piece))
         for (const int vertex : wound.surface.triangles[t]) {
           corners.push_back(wound.surface.vertices[vertex] - middle);
           spread += corners.back() * corners.back().transpose();
@@ -164,8 +147,6 @@ void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& sp
   }
 }
 
-=======
->>>>>>> viewer
 void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing) {
   if (wound.pieces.size() < 2)
     return;

@@ -39,16 +39,9 @@ struct Opening {
 };
 Opening opening_of(const topology::Wound& wound, const BodyModel& model);
 
-<<<<<<< HEAD
-/// The pieces of tissue: all but splinters, what rounding leaves between strips of a cut that all but coincide, whose 6
-/// volume / area is below 2e-4 of the largest piece's.
-std::vector<int> tissue_pieces(const topology::Wound& wound);
-
 /// Makes nodes fine along every piece that would be too small for the spacing there but not for the fine one.
 void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& spacing);
 
-=======
->>>>>>> viewer
 /// Throws InputError naming the first piece that is smaller than the node spacing there: 6 volume / area, the diameter
 /// of a ball of that ratio, below it.
 void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing);

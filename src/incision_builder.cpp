@@ -15,13 +15,10 @@ namespace {
 
 constexpr double same_edge_place = 1e-6; // edges: nearer to the pose before it a pose is the same
 constexpr double straight = 2e-3;        // edges: a way is, where no pose put off is farther from it
-<<<<<<< HEAD
 constexpr double near_surface = 0.02;    // edges, two of which are a spacing: a sheet's end so near to it is on it
-=======
 // Edges: strips whose distance is below a quarter are one place to a sweep. What such strips leave between them in wavy
 // strokes of 59 seeds, the body moving by up to 0.2 edges between two increments, had up to 0.126.
 constexpr double thinnest = 0.25;
->>>>>>> viewer
 constexpr double least_overlap = 1e-3; // of a sheet on another: less may be a triangle beside the line where they cross
 
 /// Part of a sheet's area that lies on the cut so far, 0 to 1, looked at every `edge` m.

@@ -14,14 +14,10 @@ class IncisionBuilder {
   /// line of a sheet that cannot be used or lies outside the organ.
   IncisionBuilder(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double edge);
 
-<<<<<<< HEAD
   /// What was done to the sheets of the precuts to make them sound.
   [[nodiscard]] const std::vector<std::string>& remarks() const { return remarks_; }
-  [[nodiscard]] const topology::Wound& wound() const { return wound_->wound(); }
-=======
   /// Without splinters (topology/splinters.hpp).
   [[nodiscard]] const topology::Wound& wound() const { return mended_ ? *mended_ : wound_->wound(); }
->>>>>>> viewer
   /// Null while nothing is cut.
   [[nodiscard]] const std::shared_ptr<const topology::Incision>& incision() const { return incision_; }
 
