@@ -57,8 +57,8 @@ struct Problem {
   HeldRegion prescribed_region;
   /// Prescribed displacement anywhere on that part, m. Null: Prescribed::value, constant over a node's share.
   std::function<Vector3(const Vector3& x)> prescribed_field;
-  /// Unit vector out of the body towards the tool that is going to touch it. Forces on a node at a sharp edge act on the
-  /// side of its share that faces the tool; where none does alone, on the edge. Empty: on the whole share.
+  /// Unit vector out of the body towards the tool that is going to touch it. Forces on a node at a sharp edge act on
+  /// the side of its share that faces the tool; where none does alone, on the edge. Empty: on the whole share.
   std::optional<Vector3> touched_from;
 };
 

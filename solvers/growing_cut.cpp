@@ -96,9 +96,7 @@ const DisplacementMean& GrowingCut::State::mean(int node) const {
       known_shares = std::make_unique<Shares>(problem, removed, std::nullopt,
                                               of_lip ? SurfacePatches::Of::faces : SurfacePatches::Of::skin_and_faces);
     known =
-        means
-            .emplace(node, known_shares->patches.contact_mean(known_shares->compact[node], *spheres, problem))
-            .first;
+        means.emplace(node, known_shares->patches.contact_mean(known_shares->compact[node], *spheres, problem)).first;
   }
   return known->second;
 }

@@ -37,20 +37,20 @@ struct BodyModel {
     double spacing = 0;              // m, of the node there
   };
   PassedThrough passed_through;
-  std::unique_ptr<solvers::Discretisation> body;  // null before the first load, touch or cut
+  std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut
   std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
-  const char* not_following = "";                 // why the body cannot follow a cut; empty: it can
-  topology::SurfaceMesh window_way;               // of the cut, for which a body that follows it was condensed
-  int added_nodes = 0;                            // by updates since then
-  std::optional<topology::BladePose> window_seen; // where the blade was when the window was last seen to cover its way
-  solvers::Field base;                            // without tool and contact
-  solvers::ContactPatch patch;                    // no nodes: the tool is far
-  std::optional<SurfaceWatch> watch;              // of the surface about the patch; empty: not looked at yet
-  int presses = 0;                                // since it was condensed
-  std::optional<solvers::LipPatch> lips;          // pairs, then banks; empty: none has had to be held yet
-  std::optional<solvers::CutContactState> state;  // empty: not solved yet
-  solvers::Field field;                           // solution
-  mutable solvers::FrontRules front_rules{};      // of these nodes and this cut, found as they are asked for
+  const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
+  topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
+  int added_nodes = 0;                             // by updates since then
+  std::optional<topology::BladePose> window_seen;  // where the blade was when the window was last seen to cover its way
+  solvers::Field base;                             // without tool and contact
+  solvers::ContactPatch patch;                     // no nodes: the tool is far
+  std::optional<SurfaceWatch> watch;               // of the surface about the patch; empty: not looked at yet
+  int presses = 0;                                 // since it was condensed
+  std::optional<solvers::LipPatch> lips;           // pairs, then banks; empty: none has had to be held yet
+  std::optional<solvers::CutContactState> state;   // empty: not solved yet
+  solvers::Field field;                            // solution
+  mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
 
   /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
   /// rest before the first solution.

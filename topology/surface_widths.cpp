@@ -16,7 +16,7 @@ constexpr double most_rays = 40000;
 constexpr double parallel = 0.906;   // cosine of 25 degrees
 constexpr double off_surface = 1e-7; // of the body's size, where a ray starts
 constexpr double mostly = 0.75;      // of the surface about a thin place
-constexpr double surroundings = 4; // widths about it
+constexpr double surroundings = 4;   // widths about it
 
 /// Place along the segment a b where it meets the triangle, 0 to 1; infinity where it does not.
 double meeting_place(const Vector3& a, const Vector3& b, const std::array<Vector3, 3>& p) {

@@ -1,6 +1,6 @@
 // Problem:   what people bring: organs as segmentations and programs leave them, thin walls, loads without a tool, cuts
-//            that reach out of the body; hardware at its own rate, hands that go where they like, files and messages that
-//            nobody has vouched for. Every input is made here.
+//            that reach out of the body; hardware at its own rate, hands that go where they like, files and messages
+//            that nobody has vouched for. Every input is made here.
 // Reference: closed forms, the same answer by another way of this program, or a clear word.
 // Command:   spherecut experiment run real_world --out DIR
 #include "experiments/real_world/live_situations.hpp"
