@@ -30,6 +30,9 @@ class HeldRegion {
 
   explicit operator bool() const { return fully_ || along_; }
 
+  /// Whether it is told axis by axis.
+  [[nodiscard]] bool by_axis() const { return static_cast<bool>(along_); }
+
   /// Whether the point is held along each of these axes.
   [[nodiscard]] bool holds(const Vector3& x, const Vector3& normal, const std::array<bool, 3>& axes) const {
     if (fully_)

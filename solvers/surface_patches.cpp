@@ -247,6 +247,12 @@ SurfacePatches::means(const std::vector<int>& nodes, const Spheres& spheres,
 
 std::vector<DisplacementMean> SurfacePatches::means(const std::vector<Prescribed>& entries, const Spheres& spheres,
                                                     const HeldRegion& held) const {
+  if (!held.by_axis()) { // one region, shared out among all, whatever axes each holds its share along
+    std::vector<int> nodes;
+    for (const Prescribed& entry : entries)
+      nodes.push_back(entry.node);
+    return means(nodes, spheres, [&](const Vector3& x, const Vector3& normal) { return held(x, normal); });
+  }
   std::vector<DisplacementMean> result(entries.size());
   std::vector<char> found(entries.size(), 0);
   for (std::size_t first = 0; first < entries.size(); ++first) {

@@ -74,7 +74,9 @@ std::vector<int> Session::press_surface(const ToolSettings* tool, const topology
     return {};
   if (std::vector<int> missed = penetrated_outside_patch(*pose, model); !missed.empty())
     return missed;
-  if (scenario_.method.method == solvers::Method::published) // it has no surface between its nodes
+  // The published scheme has no surface between its nodes, and a haptic tick knows the candidates alone: a solution
+  // that looked farther would not be the one that the tick goes on from.
+  if (scenario_.method.method == solvers::Method::published || force_only_)
     return {};
   if (!model.watch)
     model.watch.emplace(model, *organ_.domain, zone_.spacing.fine, dropped_nodes(scenario_, *model.body));

@@ -342,7 +342,7 @@ void Session::report_opening(const topology::Wound& wound, CutReport& report) co
   double apart = 0;
   for (const double mean : normal_openings(model_))
     apart = std::max(apart, mean);
-  const auto tell = [&](double largest) { report.opening = apart > touching ? std::max(largest, touching) : apart; };
+  const auto tell = [&](double largest) { report.opening = apart > touching && largest > touching ? largest : apart; };
   if (!force_only_) {
     const Opening opening = opening_of(wound, model_);
     report.opening_volume = opening.volume;

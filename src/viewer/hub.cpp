@@ -338,6 +338,7 @@ std::vector<ScenarioEntry> Hub::scenarios(std::size_t& left_out) const {
   left_out = names.size() - std::min(names.size(), most_listed);
   names.resize(names.size() - left_out);
   std::vector<ScenarioEntry> list;
+  list.reserve(names.size());
   for (const std::string& name : names)
     list.push_back({name, title_of(scenario_folder() / name)});
   return list;

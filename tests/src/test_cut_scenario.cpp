@@ -105,7 +105,7 @@ TEST_CASE("Every offence of a cut names file, line, key, value and what is allow
     std::vector<std::string> expected;
   };
   const std::vector<Case> cases = {
-      {"", {"no tool, no blade and no precut"}},
+      {"", {"no tool, no blade, no precut and no load"}},
       {"[[precut]]\nshape = \"disc\"\n", {"precut[1].centre is missing", "precut[1].radius is missing"}},
       {"[[precut]]\nshape = \"cone\"\n", {":16:", "precut[1].shape", "cone", "polygon"}},
       {replaced(disc_precut, "radius = 0.01", "radius = 0"), {":19:", "precut[1].radius", "<= value"}},

@@ -55,6 +55,7 @@ LoopRecords record(const Scenario& scenario, const std::filesystem::path& file, 
 
 /// A recording that was not computed: `ticks` ticks, a solve every ten that is taken over three later.
 void write_made_up(const std::filesystem::path& file, std::uint64_t ticks, bool finish) {
+  std::filesystem::remove(file); // a recording never replaces a file
   RecordingWriter writer(file, {"build", "processor", "/s.toml", "text", 3, 5, 1000});
   for (std::uint64_t t = 0; t < ticks; ++t) {
     if (t % 10 == 0) {
