@@ -35,7 +35,6 @@ class FacetClipper {
   struct Facet {
     std::array<Vector3, 3> corners;
     Triangle vertices;
-    Vector3 normal;
     int piece;
   };
   std::vector<Facet> facets_;
