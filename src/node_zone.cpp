@@ -37,15 +37,17 @@ double size_of(const PrecutSettings& precut, double extent) {
   return extent / 2; // a file: a sheet about as large as the organ
 }
 
-// Root of the share of a precut's area that lies in the body.
-double root_share_inside(const PrecutSettings& precut, const topology::Domain& domain) {
+// Root of the area of a precut that lies in the body, m; of a file's its size is a guess.
+double size_inside(const PrecutSettings& precut, const topology::Domain& domain) {
+  const double extent = domain.bounds().extent().maxCoeff(), whole = size_of(precut, extent);
+  if (std::holds_alternative<SheetFile>(precut.shape))
+    return whole;
   try {
-    const topology::SurfaceMesh sheet =
-        precut_sheet(precut, domain, whole_across * domain.bounds().extent().maxCoeff());
-    const double whole = topology::area(sheet), inside = topology::area_inside(sheet, domain);
-    return inside < (1 - 1e-9) * whole ? std::sqrt(std::max(inside, 0.0) / whole) : 1;
+    const topology::SurfaceMesh sheet = precut_sheet(precut, domain, whole_across * extent);
+    const double inside = topology::area_inside(sheet, domain);
+    return inside > 0 && inside < (1 - 1e-9) * topology::area(sheet) ? std::sqrt(inside) : whole;
   } catch (const InputError&) { // told where the sheets are made, with the line
-    return 1;
+    return whole;
   }
 }
 
@@ -53,12 +55,8 @@ double root_share_inside(const PrecutSettings& precut, const topology::Domain& d
 double derived_front_spacing(const Scenario& scenario, const topology::Domain& domain) {
   const double extent = domain.bounds().extent().maxCoeff();
   double spacing = std::numeric_limits<double>::infinity();
-  for (const PrecutSettings& precut : scenario.precuts) {
-    const double size = std::min(size_of(precut, extent), extent);
-    const bool is_file = std::holds_alternative<SheetFile>(precut.shape);
-    const double share = is_file ? 1 : root_share_inside(precut, domain);
-    spacing = std::min(spacing, (share > 0 ? std::min(share * size_of(precut, extent), size) : size) / across_precut);
-  }
+  for (const PrecutSettings& precut : scenario.precuts)
+    spacing = std::min(spacing, std::min(size_inside(precut, domain), extent) / across_precut);
   if (scenario.blade)
     spacing = std::min(spacing, std::min(edge_length(*scenario.blade), extent) / across_blade);
   return spacing;

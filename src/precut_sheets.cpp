@@ -35,12 +35,20 @@ topology::SurfaceMesh rectangle_sheet(const RectangleSheet& rectangle, const top
   const Vector3 up = (rectangle.up - rectangle.up.dot(normal) * normal).normalized(), along = up.cross(normal);
   if (!up.allFinite() || !along.allFinite())
     return make(rectangle.centre, rectangle.width, rectangle.height);
+  // Places on the plane in numbers that do not depend, by rounding, on where the centre of the rectangle is.
+  const Vector3 middle = domain.bounds().centre();
+  const double grain = 1e-9 * domain.bounds().extent().norm();
+  const auto settled = [&](double place) { return std::round(place / grain) * grain; };
   const auto [left, right] = part_near(domain, rectangle.centre, along, 0.5 * rectangle.width, beside * edge);
   const auto [bottom, top] = part_near(domain, rectangle.centre, up, 0.5 * rectangle.height, beside * edge);
   const bool is_whole = right - left >= rectangle.width && top - bottom >= rectangle.height;
   if (is_whole || !(right > left && top > bottom))
     return make(rectangle.centre, rectangle.width, rectangle.height);
-  return make(rectangle.centre + 0.5 * (left + right) * along + 0.5 * (bottom + top) * up, right - left, top - bottom);
+  const Vector3 from_middle = rectangle.centre - middle;
+  const double off = settled(from_middle.dot(normal));
+  const double l = settled(left + from_middle.dot(along)), r = settled(right + from_middle.dot(along));
+  const double b = settled(bottom + from_middle.dot(up)), t = settled(top + from_middle.dot(up));
+  return make(middle + off * normal + 0.5 * (l + r) * along + 0.5 * (b + t) * up, r - l, t - b);
 }
 
 } // namespace

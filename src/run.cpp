@@ -9,6 +9,7 @@
 #include "topology/errors.hpp"
 #include "topology/interruption.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -120,6 +121,31 @@ std::string findings_text(const Session& session, const RunOutput& output, const
   return text;
 }
 
+/// What a run will take, from what one body takes: measured on blocks of 746, 2597 and 6119 nodes under a ball (99, 317
+/// and 1035 MB; 0.2, 1.8 and 8.9 s on one core; collocation at 2597 nodes 358 MB and 2.6 s).
+std::string estimate_text(const Session& session) {
+  constexpr double reference = 2597, memory = 277e6, program = 40e6, seconds = 1.8;
+  constexpr double memory_growth = 1.5, time_growth = 1.9; // powers of the number of nodes
+  constexpr double many_nodes = 10000, long_time = 600;    // s
+  const int nodes = session.sprinkling().nodes.size();
+  const bool is_balance = session.scenario().method.method == solvers::Method::collocation;
+  const double bytes =
+      program + (is_balance ? 1.15 : 1.0) * memory * std::pow(static_cast<double>(nodes) / reference, memory_growth);
+  const double one = (is_balance ? 1.5 : 1.0) * seconds * std::pow(static_cast<double>(nodes) / reference, time_growth);
+  const auto cuts = std::count_if(session.steps().begin(), session.steps().end(),
+                                  [](const StepSample& step) { return step.blade.has_value(); });
+  const double all = one * static_cast<double>(1 + cuts);
+  std::string text = fmt::format("estimate: {:.2g} GB; {:.2g} s of one core to make the body", bytes / 1e9, one);
+  if (cuts > 0)
+    text += fmt::format(", up to {:.2g} s for the {} steps of the blade", all, cuts);
+  if (nodes > many_nodes || all > long_time)
+    text +=
+        fmt::format("\nthis is heavy: {} nodes; a larger nodes.fine_spacing or nodes.coarse_spacing, or nodes.count, "
+                    "make it lighter",
+                    nodes);
+  return text;
+}
+
 std::string step_text(const StepResult& step) {
   std::string text = fmt::format("t = {:.3g} s", step.time);
   if (step.candidates > 0 || !step.cut)
@@ -216,9 +242,11 @@ void check_scenario(const std::filesystem::path& file, const std::filesystem::pa
   const Session session(std::move(scenario), say);
   say(short_text(session));
   say(walls_text(session.walls()));
-  if (session.computes())
+  if (session.computes()) {
     say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
+    say(estimate_text(session));
+  }
   say(fmt::format("{}: good, {} step{}", file.string(), session.steps().size(),
                   session.steps().size() == 1 ? "" : "s"));
 }

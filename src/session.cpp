@@ -5,6 +5,7 @@
 #include "src/dropped_nodes.hpp"
 #include "src/process_settings.hpp"
 #include "src/stage_timer.hpp"
+#include "src/wall_bending.hpp"
 #include "topology/errors.hpp"
 #include "topology/interruption.hpp"
 
@@ -175,7 +176,7 @@ void Session::judge_walls() {
   const std::string what = fmt::format(
       "the wall at [{:.4g}, {:.4g}, {:.4g}] m is {:.3g} mm thick and the nodes there are {:.3g} mm apart: {}",
       wall->place.x(), wall->place.y(), wall->place.z(), 1e3 * wall->thickness, 1e3 * wall->spacing,
-      bending_error(wall->nodes_through()));
+      bending_error(wall->nodes_through(), scenario_.method.method));
   const std::string remedy = fmt::format("nodes.coarse_spacing = {:.2g} m puts three nodes through it", wall->wanted);
   if (wall->nodes_through() < least_nodes_through)
     throw InputError(fmt::format("{}: [nodes]: {}; allowed: at most {:.2g} m there. {}", scenario_.file.string(), what,

@@ -11,6 +11,21 @@ namespace spherecut::topology {
 namespace {
 
 constexpr double no_area = 1e-14; // of a polygon, in units of the spacing squared
+constexpr double nudge = 1e-6;    // of the spacing: see nudged
+
+/// A little way for each vertex of the mesh, always the same: nodes that lie evenly on a box put planes between them
+/// through its edges and corners, and what is crossed there would be told by rounding.
+Vector3 nudged(int vertex) {
+  std::uint64_t state = static_cast<std::uint64_t>(vertex) + 1;
+  Vector3 way;
+  for (int d = 0; d < 3; ++d) { // splitmix64 [Steele, Lea and Flood 2014]
+    state += 0x9E3779B97F4A7C15ULL;
+    std::uint64_t mixed = (state ^ state >> 30U) * 0xBF58476D1CE4E5B9ULL;
+    mixed = (mixed ^ mixed >> 27U) * 0x94D049BB133111EBULL;
+    way[d] = nudge * (static_cast<double>((mixed ^ mixed >> 31U) >> 11U) * 0x1p-53 - 0.5);
+  }
+  return way;
+}
 
 /// Where the surface runs through a polygon: the body lies to its left.
 struct SectionPiece {
@@ -166,8 +181,7 @@ FacetClipper::FacetClipper(const SurfaceFacets& facets, const Vector3& node, dou
     Facet& facet = facets_.emplace_back();
     facet.vertices = mesh.triangles[static_cast<std::size_t>(t)];
     for (int k = 0; k < 3; ++k)
-      facet.corners[k] = (mesh.vertices[facet.vertices[k]] - node) / spacing;
-    facet.normal = triangle_normal(mesh, t);
+      facet.corners[k] = (mesh.vertices[facet.vertices[k]] - node) / spacing + nudged(facet.vertices[k]);
     facet.piece = facets.piece(t);
   }
 }
@@ -194,7 +208,8 @@ std::optional<std::vector<std::vector<Vector3>>> FacetClipper::inside(const std:
       const Vector3 x =
           facet.corners[low] + height[low] / (height[low] - height[high]) * (facet.corners[high] - facet.corners[low]);
       const std::pair<int, int> edge(facet.vertices[low], facet.vertices[high]);
-      // Seen against the polygon's normal, the body lies to the left where the way goes down over the edge.
+      // Around a triangle that is seen from without, from where it goes down through the plane to where it comes up
+      // again: the body lies to the left, seen against the polygon's normal.
       if (height[a] >= 0) {
         piece.from = x;
         piece.from_edge = edge;
@@ -202,10 +217,6 @@ std::optional<std::vector<std::vector<Vector3>>> FacetClipper::inside(const std:
         piece.to = x;
         piece.to_edge = edge;
       }
-    }
-    if ((piece.to - piece.from).dot(frame.normal().cross(facet.normal)) < 0) {
-      std::swap(piece.from, piece.to);
-      std::swap(piece.from_edge, piece.to_edge);
     }
     if (frame.clip(piece))
       pieces.push_back(piece);

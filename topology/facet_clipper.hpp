@@ -24,7 +24,8 @@ class FacetClipper {
   FacetClipper(const SurfaceFacets& facets, const Vector3& node, double spacing, const std::vector<Vector3>& corners);
 
   /// Parts of a convex polygon inside the body, as loops that turn as the polygon does (holes the other way).
-  /// `is_inside` tells of its first corner. Nothing where the surface does not leave closed loops, by rounding.
+  /// `is_inside` tells of a polygon whose border the surface does not cross, by its corner farthest from that: others
+  /// may lie on it. Nothing where the surface does not leave closed loops, by rounding.
   [[nodiscard]] std::optional<std::vector<std::vector<Vector3>>> inside(const std::vector<Vector3>& polygon,
                                                                         bool is_inside) const;
 
@@ -35,7 +36,6 @@ class FacetClipper {
   struct Facet {
     std::array<Vector3, 3> corners;
     Triangle vertices;
-    Vector3 normal;
     int piece;
   };
   std::vector<Facet> facets_;

@@ -289,9 +289,10 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
       continue; // the cap or the box: outside the body
     }
     const Vector3 whole = measure(polygon.vertices).area;
-    const auto loops = facets && whole.norm() > smallest_face
-                           ? facets->inside(polygon.vertices, polygon.phi.front() < 0)
-                           : std::nullopt;
+    const double deepest = *std::min_element(polygon.phi.begin(), polygon.phi.end());
+    const double highest = *std::max_element(polygon.phi.begin(), polygon.phi.end());
+    const auto loops =
+        facets && whole.norm() > smallest_face ? facets->inside(polygon.vertices, deepest + highest < 0) : std::nullopt;
     if (loops) {
       for (const std::vector<Vector3>& loop : *loops)
         if (loop.size() >= 3 && measure(loop).area.dot(whole) > 0) // not a hole within a face

@@ -7,11 +7,11 @@ namespace spherecut::experiments::real_world {
 
 namespace {
 
-/// A column under its own weight, held at its foot so that it can widen: it sinks by rho g L^2 / (2 E).
+/// A column that does not widen (nu = 0) under its own weight: its top sinks by rho g L^2 / (2 E).
 Check weight_alone(const ExperimentContext& context) {
   constexpr double height = 0.05, modulus = 5000, density = 1000, gravity = 9.81;
   const std::string text = fmt::format(
-      "[organ]\nshape = \"block\"\nsize = [0.02, 0.02, {}]\n[material]\nyoung_modulus = {}\npoisson_ratio = 0.3\n"
+      "[organ]\nshape = \"block\"\nsize = [0.02, 0.02, {}]\n[material]\nyoung_modulus = {}\npoisson_ratio = 0.0\n"
       "density = {}\n[gravity]\nacceleration = [0, 0, -{}]\n[nodes]\ncoarse_spacing = 0.005\n"
       "[[fixed]]\nregion = \"half_space\"\npoint = [0, 0, 1e-4]\nnormal = [0, 0, 1]\naxes = [\"z\"]\n"
       "[[fixed]]\nregion = \"half_space\"\npoint = [-0.0099, 0, 0]\nnormal = [1, 0, 0]\naxes = [\"x\"]\n"

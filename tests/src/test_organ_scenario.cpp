@@ -190,3 +190,14 @@ TEST_CASE("The summary and the check tell of walls and gaps") {
   CHECK(walls.at("thinnest_wall").at("width_m").get<double>() == Approx(0.03));
   CHECK(walls.at("narrowest_gap").is_null());
 }
+
+TEST_CASE("A check estimates nodes, memory and time, and says when a scenario is heavy") {
+  const TemporaryFolder folder;
+  const auto checked = [&](const std::string& text) {
+    return run_spherecut({"check", write_file(folder.path() / "case.toml", text).string()}).out;
+  };
+  CHECK_THAT(checked(small_scenario), Contains("estimate: 0.") && Contains("GB") && !Contains("heavy"));
+  const std::string fine = replaced(replaced(small_scenario, "fine_spacing = 0.004", "fine_spacing = 0.0018"),
+                                    "coarse_spacing = 0.012", "coarse_spacing = 0.0018");
+  CHECK_THAT(checked(fine), Contains("this is heavy") && Contains("nodes.count"));
+}

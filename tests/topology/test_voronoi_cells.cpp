@@ -5,6 +5,7 @@
 #include "topology/point_tree.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numbers>
@@ -293,4 +294,80 @@ TEST_CASE("Cells that would reach beyond the search box are refused instead of b
   const auto domain = topology::make_box_domain(Vector3::Zero(), Vector3::Ones(), 0.25);
   const std::vector<Vector3> nodes{{0.1, 0.5, 0.5}, {0.9, 0.5, 0.5}};
   CHECK_THROWS_AS(voronoi_cells(nodes, {0.01, 0.01}, *domain), InputError);
+}
+
+TEST_CASE("At the sharp edges of a mesh cells end as they do at planes") {
+  const Vector3 upper(0.02, 0.024, 0.016);
+  const auto planes = topology::make_box_domain(Vector3::Zero(), upper, 0.002);
+  const auto mesh = topology::make_organ_domain(topology::make_block(Vector3::Zero(), upper, 0.004));
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Nodes nodes = filled(*planes, 0.0025, seed);
+    const CellComplex exact = voronoi_cells(nodes.positions, nodes.spacings, *planes);
+    const CellComplex cells = voronoi_cells(nodes.positions, nodes.spacings, *mesh);
+    CHECK(cells.empty_cells == 0);
+    CHECK(cells.faces.size() >= exact.faces.size());
+    CHECK(worst_closure(cells, nodes) < 1e-9);
+    double off = 0;
+    for (std::size_t i = 0; i < nodes.positions.size(); ++i)
+      off = std::max(off, std::abs(cells.volumes[i] - exact.volumes[i]) / std::pow(0.0025, 3));
+    CHECK(off < 2e-3);
+    CHECK(total_volume(cells) == Approx(upper.prod()).epsilon(1e-4));
+    // Edge nodes have a part of the surface on each side of the edge.
+    std::vector<int> parts(nodes.positions.size(), 0);
+    for (const BoundaryFace& face : cells.boundary)
+      ++parts[face.node];
+    for (std::size_t i = 0; i < nodes.positions.size(); ++i) {
+      const Vector3& x = nodes.positions[i];
+      int sides = 0;
+      for (int d = 0; d < 3; ++d)
+        sides += x[d] < 1e-9 || x[d] > upper[d] - 1e-9 ? 1 : 0;
+      CHECK(parts[i] >= sides);
+    }
+  }
+}
+
+TEST_CASE("A notch in a mesh takes nothing from the cells beside it") {
+  // An L of three cubes of 8 mm, from quads of 2 mm.
+  topology::SurfaceMesh mesh;
+  const double step = 0.002;
+  const auto full = [](int i, int j, int k) {
+    return i >= 0 && j >= 0 && k >= 0 && i < 8 && j < 4 && k < 8 && (i < 4 || k < 4);
+  };
+  for (int i = 0; i < 8; ++i)
+    for (int j = 0; j < 4; ++j)
+      for (int k = 0; k < 8; ++k)
+        for (int d = 0; d < 3 && full(i, j, k); ++d)
+          for (const int side : {0, 1}) {
+            std::array<int, 3> beside{i, j, k};
+            beside[d] += side == 0 ? -1 : 1;
+            if (full(beside[0], beside[1], beside[2]))
+              continue;
+            std::array<int, 4> corners{};
+            int n = 0;
+            for (const auto& [a, b] : {std::pair(0, 0), std::pair(1, 0), std::pair(1, 1), std::pair(0, 1)}) {
+              Vector3 x(i, j, k);
+              x[d] += side;
+              x[(d + 1) % 3] += a;
+              x[(d + 2) % 3] += b;
+              x *= step;
+              const auto known = std::find(mesh.vertices.begin(), mesh.vertices.end(), x);
+              corners[n++] = static_cast<int>(known - mesh.vertices.begin());
+              if (known == mesh.vertices.end())
+                mesh.vertices.push_back(x);
+            }
+            if (side == 0)
+              std::swap(corners[1], corners[3]);
+            mesh.triangles.push_back({corners[0], corners[1], corners[2]});
+            mesh.triangles.push_back({corners[0], corners[2], corners[3]});
+          }
+  const double exact = 3 * std::pow(0.008, 3);
+  REQUIRE(topology::volume(mesh) == Approx(exact));
+  const auto domain = topology::make_organ_domain(mesh);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Nodes nodes = filled(*domain, 0.0018, seed);
+    const CellComplex cells = voronoi_cells(nodes.positions, nodes.spacings, *domain);
+    CHECK(cells.empty_cells == 0);
+    CHECK(worst_closure(cells, nodes) < 1e-9);
+    CHECK(total_volume(cells) == Approx(exact).epsilon(2e-3));
+  }
 }
