@@ -73,7 +73,9 @@ std::vector<int> Session::press_surface(const ToolSettings* tool, const topology
     return {};
   if (std::vector<int> missed = penetrated_outside_patch(*pose, model); !missed.empty())
     return missed;
-  if (scenario_.method.method == solvers::Method::published) // it has no surface between its nodes
+  // The published method has no surface between its nodes. In the haptic loop the ticks between two solves have the
+  // same contact as these, on the means alone: a lift that each solve finds anew would be a step of the force.
+  if (scenario_.method.method == solvers::Method::published || force_only_)
     return {};
   if (!model.watch)
     model.watch.emplace(model, *organ_.domain, zone_.spacing.fine, dropped_nodes(scenario_, *model.body));
