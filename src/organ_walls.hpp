@@ -46,7 +46,4 @@ struct CoarseWall {
 };
 std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::SpacingField& spacing);
 
-/// By how much such a wall bends too little or too much, as was measured, in words.
-std::string bending_error(double nodes_through);
-
 } // namespace spherecut::app

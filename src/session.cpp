@@ -97,8 +97,8 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}:{}: {}", scenario_.file.string(), scenario_.precuts.front().line, error.what()));
     }
-  judge_walls();
   try {
+    judge_walls();
     sprinkle(nullptr, model_);
   } catch (const InputError& error) { // what was odd about the organ may be why
     std::string all =
@@ -179,8 +179,8 @@ void Session::judge_walls() {
       bending_error(wall->nodes_through(), scenario_.method.method));
   const std::string remedy = fmt::format("nodes.coarse_spacing = {:.2g} m puts three nodes through it", wall->wanted);
   if (wall->nodes_through() < least_nodes_through)
-    throw InputError(fmt::format("{}: [nodes]: {}; allowed: at most {:.2g} m there. {}", scenario_.file.string(), what,
-                                 wall->thickness / least_nodes_through, remedy));
+    throw InputError(
+        fmt::format("{}; allowed: at most {:.2g} m there. {}", what, wall->thickness / least_nodes_through, remedy));
   warn("walls", fmt::format("{}. {}", what, remedy));
 }
 

@@ -25,7 +25,6 @@ bool is_any_closed(const solvers::LipState& lips) {
 } // namespace
 
 void Session::solve(const StepSample& sample, BodyModel& model) {
-  interruption_point();
   displaced_body_ = nullptr;
   if (tool_in_reach() && model.patch.nodes.empty())
     condense(candidates(model), model);
@@ -74,8 +73,8 @@ std::vector<int> Session::press_surface(const ToolSettings* tool, const topology
     return {};
   if (std::vector<int> missed = penetrated_outside_patch(*pose, model); !missed.empty())
     return missed;
-  // The published scheme has no surface between its nodes, and a haptic tick knows the candidates alone: a solution
-  // that looked farther would not be the one that the tick goes on from.
+  // The published method has no surface between its nodes. In the haptic loop the ticks between two solves have the
+  // same contact as these, on the means alone: a lift that each solve finds anew would be a step of the force.
   if (scenario_.method.method == solvers::Method::published || force_only_)
     return {};
   if (!model.watch)
