@@ -62,10 +62,10 @@ int refused_numbers() {
 }
 
 int refused_texts() {
-  const std::vector<std::string> texts{many_times("a.", 40'000) + "a = 1\n",
-                                       "[" + many_times("a.", 40'000) + "a]\n",
-                                       "a = { " + many_times("b.", 40'000) + "b = 1 }\n",
-                                       "a = " + many_times("[", 100'000) + "\n",
+  const std::vector<std::string> texts{fmt::format("{}a = 1\n", many_times("a.", 40'000)),
+                                       fmt::format("[{}a]\n", many_times("a.", 40'000)),
+                                       fmt::format("a = {{ {}b = 1 }}\n", many_times("b.", 40'000)),
+                                       fmt::format("a = {}\n", many_times("[", 100'000)),
                                        many_times("[[fixed]]\n", 20'000),
                                        many_times("#\n", 3'000'000)};
   int count = 0;
