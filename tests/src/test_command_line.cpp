@@ -393,7 +393,7 @@ TEST_CASE("Scenarios that cannot be run exit with 2, a line that says why, and l
       {"too few nodes",
        replaced(replaced(small_scenario, "fine_spacing = 0.004", "fine_spacing = 0.5"), "coarse_spacing = 0.012",
                 "coarse_spacing = 0.5"),
-       "case.toml: [nodes]: the wall at"},
+       "case.toml: [nodes] fine_spacing and coarse_spacing: the wall at"},
       {"inside the organ", inside, "case.toml:24: tool.path[1].position = [0, 0, 0.02] m: the tool starts inside"},
       {"incompressible", replaced(small_scenario, "poisson_ratio = 0.3", "poisson_ratio = 0.5"), "poisson_ratio"},
       {"without stiffness", replaced(small_scenario, "young_modulus = 1e4", "young_modulus = -1"), "young_modulus"},
