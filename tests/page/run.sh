@@ -2,6 +2,7 @@
 # The page of `spherecut serve` under test: run.sh BUILD_FOLDER KIND [ARGUMENTS]
 #   unit             the protocol's decoder and the surface, under node
 #   browser [FOLDER] the page in Chromium against the server; pictures of it into a folder
+#   seen             likewise: what it composites, however it draws, after resizing, hiding, a lost context
 #   controls         likewise: every control of the page, on a small block
 #   tear             likewise: the grasper lifts a flap that tears
 #   pictures FOLDER  pictures of the page, JPEG below 150 kB, for docs/images
@@ -24,5 +25,5 @@ if [ "$kind" = unit ]; then
   exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs" "$build/page-tests/trace.test.mjs"
 fi
 command -v chromium >/dev/null || skip "the Debian package chromium is not installed"
-case $kind in browser | controls | tear) kind=$kind.test ;; esac
+case $kind in browser | seen | controls | tear) kind=$kind.test ;; esac
 exec "$node" "$build/page-tests/$kind.mjs" "$build" "$source" "$@"

@@ -79,6 +79,9 @@ export class Page {
       changed: () => this.view.change(),
     });
     this.attachButtons();
+    this.view.watchContext((lost) =>
+      this.messages.say(lost ? 'warning' : 'info', lost ? 'The browser has taken the picture away; it is drawn again when the browser gives it back.' : 'The picture is back.'),
+    );
     this.connection = new Connection(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`, {
       onState: (state, reason) => this.linkChanged(state, reason),
       onText: (message) => this.read(message),
@@ -483,7 +486,7 @@ export class Page {
   }
 
   screenshot(): void {
-    this.view.drawNow();
+    this.view.drawWhole();
     const { frame, session } = this;
     const force = frame ? `${Math.hypot(...frame.force).toFixed(3)} N, ` : '';
     savePicture(this.view.canvas, `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);

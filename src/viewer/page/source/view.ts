@@ -17,7 +17,7 @@ import { Body } from './body';
 import { Orbit } from './orbit';
 import { Overlays } from './overlays';
 import type { Frame, SessionStart, Vec3 } from './protocol';
-import { Still } from './still';
+import { Still, windowOf } from './still';
 import type { Ray } from './stylus';
 import type { Hit } from './surface';
 import { ToolModel } from './tool_model';
@@ -43,6 +43,7 @@ export class View {
   private readonly lamp = new DirectionalLight('#fff4ea', 2.3);
   private readonly mark: Mesh;
   private readonly still: Still | null; // the picture without the tool, where the processor draws
+  private readonly gl: WebGL2RenderingContext;
   private stale: 'no' | 'tool' | 'all' = 'all'; // what has to be drawn again
   private sharpness = 1; // drawn pixels per pixel of the page, where the processor draws
   private drawSeconds = 0; // of a picture, smoothed
@@ -51,9 +52,10 @@ export class View {
   /** Throws Error in words when the browser has no WebGL 2. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.software = drawsInSoftware();
-    this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, powerPreference: 'high-performance' });
-    this.renderer.setPixelRatio(this.software ? 1 : Math.min(globalThis.devicePixelRatio, 2));
-    this.still = this.software ? new Still(this.renderer.getContext() as WebGL2RenderingContext) : null;
+    // What is kept of a picture lies below the canvas and is seen through it.
+    this.renderer = new WebGLRenderer({ canvas, alpha: this.software, antialias: !this.software, powerPreference: 'high-performance' });
+    this.gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.still = this.software ? new Still(this.renderer, canvas) : null;
     this.scene.background = backdrop;
     this.mark = new Mesh(
       new RingGeometry(0.72, 1, 32),
@@ -71,7 +73,23 @@ export class View {
     this.standing.add(this.body.group, this.overlays.group);
     this.moving.add(this.trace.mesh, this.tool.group, this.mark);
     new ResizeObserver(() => this.resize()).observe(canvas);
+    // What a browser does with the canvas of a window that is not seen is its own affair.
+    document.addEventListener('visibilitychange', () => this.change());
     this.resize();
+  }
+
+  /** Calls `told` with true when the browser takes the canvas's contents away, with false when it gives the canvas back. */
+  watchContext(told: (lost: boolean) => void): void {
+    this.canvas.addEventListener('webglcontextlost', () => {
+      this.ordered = null;
+      this.kept = false;
+      told(true);
+    });
+    this.canvas.addEventListener('webglcontextrestored', () => {
+      this.still?.lose();
+      this.change();
+      told(false);
+    });
   }
 
   /** `same`: the organ is the one of before, and the camera stays. */
@@ -117,7 +135,7 @@ export class View {
     this.since = since;
     this.drawNow();
     if (!this.software) return true;
-    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    const { gl } = this;
     const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
     if (done) this.ordered = { done, since };
@@ -127,7 +145,7 @@ export class View {
   /** Whether the processor is still at the last picture. The hand and the messages go on meanwhile. */
   busy(): boolean {
     if (!this.ordered) return false;
-    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    const { gl } = this;
     const { done, since } = this.ordered;
     if (gl.clientWaitSync(done, 0, 0) === gl.TIMEOUT_EXPIRED) return true;
     gl.deleteSync(done);
@@ -154,20 +172,34 @@ export class View {
     this.kept = this.kept && this.same > 0;
     this.stale = 'no';
     // What shines through the organ cannot be drawn after it.
-    if (!this.still || this.body.transparent || this.same < 2) return this.drawAll(camera);
-    if (this.kept && this.still.kept) this.still.show();
-    else {
+    if (!this.still || this.still.fails || this.body.transparent || this.same < 2) return this.drawAll(camera);
+    if (!this.kept || !this.still.kept) {
       this.showing(true, false);
       this.drawAll(camera);
       this.kept = this.still.keep();
+      this.showing(true, true);
+      if (!this.kept) return this.drawAll(camera);
     }
+    this.drawTool(this.still, camera);
+  }
+
+  /** Draws the tool over what is kept. */
+  private drawTool(still: Still, camera: PerspectiveCamera): void {
     this.showing(false, true);
+    this.moving.updateMatrixWorld();
+    still.show(windowOf(this.moving, camera, this.gl.drawingBufferWidth, this.gl.drawingBufferHeight));
     this.scene.background = null; // or the canvas is cleared
     this.renderer.autoClear = false;
     this.renderer.render(this.scene, camera);
     this.renderer.autoClear = true;
     this.scene.background = backdrop;
     this.showing(true, true);
+  }
+
+  /** Draws everything into the canvas itself, for who reads it at once. */
+  drawWhole(): void {
+    this.change();
+    this.drawNow();
   }
 
   private drawAll(camera: PerspectiveCamera): void {
@@ -211,13 +243,13 @@ export class View {
   /** Draws `sharpness` pixels per pixel of the page; above 1 edges are smooth without multisampling. */
   sharpen(sharpness: number): void {
     this.sharpness = sharpness;
-    this.renderer.setPixelRatio(sharpness);
     this.resize();
   }
 
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
     if (clientWidth === 0 || clientHeight === 0) return;
+    this.renderer.setPixelRatio(this.software ? this.sharpness : Math.min(globalThis.devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
     const size = this.renderer.getDrawingBufferSize(new Vector2());
     this.overlays.setViewport(size.x, size.y);

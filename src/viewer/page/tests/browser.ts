@@ -4,12 +4,12 @@ import { type Browser, type BrowserContext, chromium, type Page as Tab } from 'p
 
 export const chromiumPath = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find((path) => existsSync(path)) ?? '';
 
-export async function launch(): Promise<Browser> {
+export async function launch(args = ['--enable-unsafe-swiftshader']): Promise<Browser> {
   return chromium.launch({
     executablePath: chromiumPath,
     // Without graphics hardware Chromium puts the page together itself and leaves WebGL to SwiftShader. Asked for ANGLE on
     // SwiftShader by name it also puts the page together that way, which costs three times as much.
-    args: ['--no-sandbox', '--enable-unsafe-swiftshader'],
+    args: ['--no-sandbox', ...args],
   });
 }
 
@@ -22,13 +22,14 @@ export interface Opened {
 export async function openPage(
   browser: Browser,
   address: string,
-  size: { width: number; height: number; touch?: boolean } = { width: 1280, height: 800 },
+  size: { width: number; height: number; touch?: boolean; ratio?: number } = { width: 1280, height: 800 },
   prepare?: (tab: Tab) => Promise<void>,
 ): Promise<Opened> {
   const context = await browser.newContext({
     viewport: { width: size.width, height: size.height },
     acceptDownloads: true,
     hasTouch: size.touch ?? false,
+    deviceScaleFactor: size.ratio ?? 1,
   });
   context.setDefaultTimeout(1000 * patience);
   const tab = await context.newPage();

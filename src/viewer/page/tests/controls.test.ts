@@ -6,6 +6,8 @@ import test, { after, before } from 'node:test';
 import type { Browser, Page as Tab } from 'playwright-core';
 import { launch, type Opened, openPage, until } from './browser';
 import { above, chooseMode, hover, look, ready } from './hand';
+import { block, press, withdraw } from './block';
+import { box, composited, organIsSeen, see, shadesIn } from './composited';
 import { serve, type Served } from './server';
 
 const [build = '.', source = '.'] = process.argv.slice(2);
@@ -13,57 +15,6 @@ let served: Served;
 let browser: Browser;
 let opened: Opened;
 
-/** A block of 60 x 60 x 30 mm held at two sides; about 150 nodes. `more` precuts. */
-const block = (title: string, more = ''): string => `title = "${title}"
-[organ]
-shape = "block"
-size = [0.06, 0.06, 0.03]
-edge = 0.006
-[material]
-young_modulus = 1e4
-poisson_ratio = 0.3
-[[fixed]]
-name = "left"
-region = "half_space"
-point = [-0.029, 0, 0]
-normal = [1, 0, 0]
-[[fixed]]
-name = "right"
-region = "half_space"
-point = [0.029, 0, 0]
-normal = [-1, 0, 0]
-[nodes]
-fine_spacing = 0.007
-coarse_spacing = 0.014
-fine_radius = 0.008
-${more}
-[tool]
-shape = "sphere_tip"
-radius = 0.01
-step = 0.25
-[tool.approach]
-target = [0, 0, 0.03]
-direction = [0, 0, -1]
-depth = 0.002
-clearance = 0.005
-[blade]
-edge = [[0, 0, 0], [0, 0, 0.03]]
-edge_radius = 1e-4
-[[blade.path]]
-time = 0
-position = [0, -0.05, 0.02]
-[[blade.path]]
-time = 1
-position = [0, -0.04, 0.02]
-[haptics]
-budget = 5.0
-[haptics.hand]
-mass = 0.1
-stiffness = 300.0
-damping = 8.0
-[output]
-figures = false
-`;
 const through = '[[precut]]\nshape = "rectangle"\ncentre = [0.003, 0, 0.015]\nnormal = [1, 0, 0]\nup = [0, 0, 1]\nwidth = 0.1\nheight = 0.1\n';
 
 before(async () => {
@@ -80,32 +31,6 @@ after(async () => {
   await served?.stop();
 });
 
-type Colour = readonly [number, number, number];
-const yellow: Colour = [242, 193, 78]; // of the force
-const blue: Colour = [98, 182, 203]; // of the hand
-
-/** Pixels of a canvas that are nearly of a colour. */
-function pixels(tab: Tab, canvas: string, colour: Colour): Promise<number> {
-  return tab.evaluate(
-    ([id, wanted]) => {
-      const { view } = globalThis.spherecut!;
-      const shown = document.getElementById(id) as HTMLCanvasElement;
-      if (shown === view.canvas) view.drawNow();
-      const copy = document.createElement('canvas');
-      [copy.width, copy.height] = [shown.width, shown.height];
-      const context = copy.getContext('2d')!;
-      context.drawImage(shown, 0, 0);
-      const { data } = context.getImageData(0, 0, copy.width, copy.height);
-      let count = 0;
-      for (let i = 0; i < data.length; i += 4) {
-        if (data[i + 3]! > 200 && [0, 1, 2].every((k) => Math.abs(data[i + k]! - wanted[k]!) < 30)) count += 1;
-      }
-      return count;
-    },
-    [canvas, colour] as const,
-  );
-}
-
 const camera = (tab: Tab): Promise<{ eye: number[]; far: number }> =>
   tab.evaluate(() => {
     const { camera } = globalThis.spherecut!.view.orbit;
@@ -113,28 +38,6 @@ const camera = (tab: Tab): Promise<{ eye: number[]; far: number }> =>
   });
 
 const moved = (a: readonly number[], b: readonly number[]): number => Math.hypot(...a.map((x, d) => x - (b[d] ?? 0)));
-
-/** Presses at the middle and waits for the tool to come to rest in the body's newest solve. */
-async function press(tab: Tab): Promise<{ force: number; depth: number }> {
-  await hover(tab, 0.001, 0.001);
-  await tab.mouse.down();
-  await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
-  await until(tab, 'it is at rest', () => {
-    const { frame } = globalThis.spherecut!;
-    const memory = globalThis as unknown as { pose?: number; tip?: number[]; same?: number };
-    const still = memory.pose === frame!.poseInTick && Math.hypot(...frame!.tip.map((x, d) => x - (memory.tip?.[d] ?? 0))) < 2e-5;
-    memory.same = still && frame!.poseInSolve === frame!.poseInTick && frame!.depth > 0.003 ? (memory.same ?? 0) + 1 : 0;
-    if (!still) [memory.pose, memory.tip] = [frame!.poseInTick, [...frame!.tip]];
-    return memory.same >= 10; // times on end, 50 ms apart
-  });
-  const { force, depth } = await look(tab);
-  return { force, depth };
-}
-
-async function withdraw(tab: Tab): Promise<void> {
-  await tab.mouse.up();
-  await until(tab, 'it has withdrawn', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
-}
 
 /** Waits for the session that `ask` brings about. */
 async function anew(tab: Tab, ask: () => Promise<unknown>): Promise<void> {
@@ -147,65 +50,35 @@ async function anew(tab: Tab, ask: () => Promise<unknown>): Promise<void> {
 test('A press shows an arrow at the tip, the spring to the hand, the readout in newtons and the chart', async () => {
   const { tab } = opened;
   await hover(tab, 0.001, 0.001);
-  const before = await pixels(tab, 'scene', yellow);
-  const flat = await pixels(tab, 'chart', yellow);
+  const before = await see(tab);
+  organIsSeen(before, 'before the press');
+  assert.ok(before.arrow < 20, `${before.arrow} px of an arrow without a force`);
   await press(tab);
-  assert.ok((await pixels(tab, 'scene', yellow)) > before + 40, 'no arrow');
+  const pressed = await see(tab);
+  organIsSeen(pressed, 'pressed');
+  assert.ok(pressed.arrow > pressed.arrowLength && pressed.arrowLength > 20, `${pressed.arrow} px of an arrow of ${pressed.arrowLength} px`);
   assert.match((await tab.textContent('.readout .force')) ?? '', /^Force\s*\d\.\d{3} N$/);
   await until(tab, 'the readout is the force', () => {
     const { frame } = globalThis.spherecut!;
     return Math.abs(Number(document.getElementById('force')!.textContent) - Math.hypot(...frame!.force)) < 6e-4;
   });
   await tab.waitForTimeout(600);
-  assert.ok((await pixels(tab, 'chart', yellow)) > flat + 20, 'the chart does not rise');
+  assert.ok((await see(tab)).chart > before.chart + 20, 'the chart does not rise');
   // The spring is as long as the force divided by its stiffness, and can be switched off.
   const { apart, force } = await tab.evaluate(() => {
     const { frame, session } = globalThis.spherecut!;
     return { apart: Math.hypot(...frame!.hand.map((x, d) => x - frame!.tip[d]!)) * session!.spring, force: Math.hypot(...frame!.force) };
   });
   assert.ok(Math.abs(apart - force) < 0.05 * force, `${apart} N in the spring, ${force} N on the tool`);
-  const coil = await pixels(tab, 'scene', blue);
   await tab.keyboard.press('u'); // the mouse has to stay where it is
-  assert.ok(coil > (await pixels(tab, 'scene', blue)) + 4, 'no spring');
+  const without = await see(tab);
+  assert.ok(pressed.hand > without.hand + 4, `no spring: ${pressed.hand} px with it, ${without.hand} without`);
+  organIsSeen(without, 'without the spring');
   await tab.keyboard.press('u');
   await withdraw(tab);
-  await until(tab, 'a picture without force', () => globalThis.spherecut!.frame!.force[2] === 0);
-  assert.ok((await pixels(tab, 'scene', yellow)) <= before + 10, 'the arrow stays');
-});
-
-test('A picture for a tool that moves is the one that is drawn as a whole', async () => {
-  const { tab } = opened;
-  await press(tab);
-  const most = await tab.evaluate(() => {
-    const { view } = globalThis.spherecut!;
-    const inside = view as unknown as { still: unknown };
-    const { still } = inside;
-    const drawn = (): Uint8ClampedArray => {
-      view.drawNow();
-      const copy = document.createElement('canvas');
-      [copy.width, copy.height] = [view.canvas.width, view.canvas.height];
-      const context = copy.getContext('2d')!;
-      context.drawImage(view.canvas, 0, 0);
-      return context.getImageData(0, 0, copy.width, copy.height).data;
-    };
-    view.change();
-    drawn();
-    let quick = drawn();
-    for (let i = 0; i < 3; ++i) {
-      view.moved();
-      quick = drawn();
-    }
-    const { kept } = view;
-    inside.still = null;
-    view.change();
-    const whole = drawn();
-    inside.still = still;
-    view.change();
-    return { kept, difference: quick.reduce((worst, value, i) => Math.max(worst, Math.abs(value - whole[i]!)), 0) };
-  });
-  assert.ok(most.kept, 'the picture without the tool could not be kept');
-  assert.ok(most.difference <= 2, `${most.difference} of 255`);
-  await withdraw(tab);
+  const after = await see(tab);
+  organIsSeen(after, 'withdrawn');
+  assert.ok(after.arrow < 20, `${after.arrow} px of an arrow stay`);
 });
 
 test('Wheel and pen pressure set the depth while pressing', async () => {
@@ -311,7 +184,8 @@ test('Displacement and stress are coloured, with a scale bar and units', async (
     await tab.selectOption('#colours', colours);
     await tab.waitForFunction((wanted) => document.getElementById('scale-name')!.textContent === wanted && !document.getElementById('scale')!.hidden, name);
     assert.match((await tab.textContent('#scale-high')) ?? '', new RegExp(`^[\\d.]+ [kmµ]?${unit}$`));
-    assert.ok((await pixels(tab, 'scale-bar', [0, 0, 0])) < 1000);
+    const shades = shadesIn(await composited(tab), await box(tab, 'scale-bar'));
+    assert.ok(shades > 40, `${shades} colours in the scale bar`);
     const shown = await tab.evaluate(() => {
       const { frame, view } = globalThis.spherecut!;
       const { positions } = view.body.snapshot()!;
