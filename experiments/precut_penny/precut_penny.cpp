@@ -187,7 +187,7 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
                fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", e.volume), fmt::format("{:.5f}", e.displacement),
                fmt::format("{:.5f}", e.k_correlation), fmt::format("{:.5f}", e.k_interaction)});
   };
-  const std::vector<PrecutMethod> methods = precut_methods(context.quick);
+  const std::vector<PrecutMethod> methods = precut_methods(context.quick, true);
   for (const PrecutMethod& method : methods) {
     for (double nu : method.judged ? ratios : std::vector<double>{0.3}) {
       app::Series series{fmt::format("{}, nu = {}", method.name(), nu), {}, {}};

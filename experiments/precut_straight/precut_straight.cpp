@@ -66,7 +66,7 @@ std::vector<Check> run_precut_straight(const ExperimentContext& context) {
                      false,
                      false,
                      {}};
-  for (const PrecutMethod& method : precut_methods(context.quick)) {
+  for (const PrecutMethod& method : precut_methods(context.quick, true)) {
     std::array<ErrorSeries, 3> errors;
     for (int seed = 1; seed <= seeds; ++seed) {
       CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.3, method.method, method.sight);

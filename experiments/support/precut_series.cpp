@@ -37,11 +37,12 @@ double PrecutMethod::bound(double tight, double loose) const {
   return method == solvers::DiscretisationOptions{}.method ? tight : loose;
 }
 
-std::vector<PrecutMethod> precut_methods(bool quick) {
+std::vector<PrecutMethod> precut_methods(bool quick, bool with_appended) {
   using solvers::Method, solvers::SightRule;
-  std::vector<PrecutMethod> methods{{Method::galerkin, SightRule::appended, true},
-                                    {Method::galerkin, SightRule::enriched, true},
+  std::vector<PrecutMethod> methods{{Method::galerkin, SightRule::enriched, true},
                                     {Method::collocation, SightRule::enriched, true}};
+  if (with_appended)
+    methods.push_back({Method::galerkin, SightRule::appended, true});
   if (!quick)
     for (const SightRule rule : {SightRule::diffraction, SightRule::visibility})
       for (const Method method : {Method::galerkin, Method::collocation})

@@ -38,7 +38,7 @@ struct PrecutMethod {
 };
 
 /// The two methods with the enriched basis, which are judged; in a full run also their other sight rules and
-/// `published`, which are reported.
-std::vector<PrecutMethod> precut_methods(bool quick);
+/// `published`, which are reported. `with_appended`: a cut that only appends, too, which is judged.
+std::vector<PrecutMethod> precut_methods(bool quick, bool with_appended = false);
 
 } // namespace spherecut::experiments

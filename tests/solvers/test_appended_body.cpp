@@ -10,7 +10,6 @@
 
 using namespace spherecut;
 using namespace spherecut::solvers;
-using namespace spherecut::experiments;
 
 namespace {
 
@@ -22,26 +21,27 @@ DiscretisationOptions appending(UnheldPieces unheld = UnheldPieces::refuse) {
   return options;
 }
 
-const CutFrame cut_plane = tilted_frame({0.02, -0.03, 0.04}, {0.15, -0.1, 0.2});
+const experiments::CutFrame appended_plane = experiments::tilted_frame({0.02, -0.03, 0.04}, {0.15, -0.1, 0.2});
 
-bool is_above(const Vector3& x) {
-  return cut_plane.local(x)[1] > 0;
+bool is_above_cut(const Vector3& x) {
+  return appended_plane.local(x)[1] > 0;
 }
 
 /// A cube of 1 m that a tilted plane cuts in two.
-CutBody severed_cube(int nodes = 350) {
-  CutBodyCase cut;
+experiments::CutBody appended_cube(int nodes = 350) {
+  experiments::CutBodyCase cut;
   cut.domain = topology::make_box_domain({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, 0.2);
-  cut.sheets = {topology::make_rectangle_sheet(cut_plane.origin, cut_plane.normal, cut_plane.ahead, 2, 2, 0.25)};
+  cut.sheets = {
+      topology::make_rectangle_sheet(appended_plane.origin, appended_plane.normal, appended_plane.ahead, 2, 2, 0.25)};
   cut.coarse = 1;
   cut.nodes = nodes;
   cut.sight = SightRule::appended;
-  CutBody body = cut_body(cut);
+  experiments::CutBody body = experiments::cut_body(cut);
   body.problem.material = {1, 0.3, 0};
   return body;
 }
 
-Vector3 sum_of(const std::vector<Vector3>& forces) {
+Vector3 total_of(const std::vector<Vector3>& forces) {
   Vector3 total = Vector3::Zero();
   for (const Vector3& force : forces)
     total += force;
@@ -56,7 +56,7 @@ struct AppendingScene : tests::GrowingScene {
   }
 };
 
-std::vector<int> top_nodes(const NodeCloud& nodes, int count) {
+std::vector<int> nodes_on_top(const NodeCloud& nodes, int count) {
   std::vector<int> top;
   for (int i = 0; i < nodes.size() && std::ssize(top) < count; ++i)
     if (nodes.kinds[i] == NodeKind::surface && nodes.normals[i].z() > 0.9)
@@ -67,11 +67,12 @@ std::vector<int> top_nodes(const NodeCloud& nodes, int count) {
 } // namespace
 
 TEST_CASE("A cut that appends parts a body completely") {
-  CutBody body = severed_cube();
+  experiments::CutBody body = appended_cube();
   const auto motion = [](const Vector3& x) -> Vector3 {
-    return is_above(x) ? Vector3(Vector3(0.1, -0.2, 0.3) + Vector3(0.4, 0.1, -0.5).cross(x)) : Vector3(Vector3::Zero());
+    return is_above_cut(x) ? Vector3(Vector3(0.1, -0.2, 0.3) + Vector3(0.4, 0.1, -0.5).cross(x))
+                           : Vector3(Vector3::Zero());
   };
-  hold_surface(
+  experiments::hold_surface(
       body.problem, [](const Vector3& x, const Vector3& n) { return std::abs(n.z()) > 0.5 && std::abs(x.z()) > 0.49; },
       motion);
   const auto cut = discretise(body.problem, appending());
@@ -80,7 +81,7 @@ TEST_CASE("A cut that appends parts a body completely") {
   double moved = 0, still = 0;
   for (int i = 0; i < body.problem.nodes.size(); ++i) {
     const Vector3& x = body.problem.nodes.positions[i];
-    double& error = is_above(x) ? moved : still;
+    double& error = is_above_cut(x) ? moved : still;
     error = std::max(error, (u.segment<3>(3 * i) - motion(x)).norm());
   }
   CHECK(moved < 1e-9);
@@ -90,7 +91,7 @@ TEST_CASE("A cut that appends parts a body completely") {
   std::vector<int> above, below;
   for (int i = 0; i < body.problem.nodes.size(); ++i)
     if (body.problem.nodes.kinds[i] == NodeKind::surface && std::abs(body.problem.nodes.normals[i].z()) < 0.5)
-      (is_above(body.problem.nodes.positions[i]) ? above : below).push_back(i);
+      (is_above_cut(body.problem.nodes.positions[i]) ? above : below).push_back(i);
   REQUIRE(above.size() > 20);
   REQUIRE(below.size() > 20);
   const MatrixX own = cut->contact_compliance(above);
@@ -99,12 +100,13 @@ TEST_CASE("A cut that appends parts a body completely") {
 }
 
 TEST_CASE("A straight crack that is appended opens as it should") {
-  const CutFrame& crack = straight_crack_frame();
-  CutBody body = straight_crack_body(1, 0.3, Method::galerkin, SightRule::appended);
+  const experiments::CutFrame& crack = experiments::straight_crack_frame();
+  experiments::CutBody body = experiments::straight_crack_body(1, 0.3, Method::galerkin, SightRule::appended);
   const Material material = body.problem.material;
   Intensities acting = Vector3::Zero();
-  hold_whole_surface(body.problem,
-                     [&](const Vector3& x) { return straight_crack_displacement(material, crack, acting, x); });
+  experiments::hold_whole_surface(body.problem, [&](const Vector3& x) {
+    return experiments::straight_crack_displacement(material, crack, acting, x);
+  });
   const auto cut = discretise(body.problem, appending());
   const auto& appended = dynamic_cast<const AppendedBody&>(*cut);
   const std::array<int, 3> component{1, 0, 2};            // in the axes ahead, normal, along
@@ -118,8 +120,8 @@ TEST_CASE("A straight crack that is appended opens as it should") {
       for (const double along : {-0.3, 0.0, 0.3}) {
         const double s = 0.8 * std::pow((i + 0.5) / 30, 2);
         const Vector3 x = crack.origin - s * crack.ahead + along * crack.tangent;
-        const double opening =
-            crack.local(crack.origin + opening_at(*cut, field, x, crack.normal, body.fine))[component[mode]];
+        const double opening = crack.local(
+            crack.origin + experiments::opening_at(*cut, field, x, crack.normal, body.fine))[component[mode]];
         const double exact = 2 * tip_field(material, acting, -s, 1e-15 * s).displacement[component[mode]];
         error += (opening - exact) * (opening - exact);
         size += exact * exact;
@@ -140,17 +142,18 @@ TEST_CASE("A straight crack that is appended opens as it should") {
 
 TEST_CASE("A pressurised penny that is appended opens by the right volume") {
   const double nu = GENERATE(0.3, 0.49);
-  const CutFrame crack = tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
-  CutBodyCase cut;
+  const experiments::CutFrame crack = experiments::tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
+  experiments::CutBodyCase cut;
   cut.domain = topology::make_box_domain(Vector3(-2, -2, -2), Vector3(2, 2, 2), 0.5);
   cut.sheets = {topology::make_disc_sheet(crack.origin, crack.normal, 1, 0.1)};
   cut.slope = 0.25 * std::cbrt(2400.0 / 800);
   cut.nodes = 800;
   cut.sight = SightRule::appended;
-  CutBody body = cut_body(cut);
+  experiments::CutBody body = experiments::cut_body(cut);
   body.problem.material = {1, nu, 0};
   const Material material = body.problem.material;
-  hold_whole_surface(body.problem, [&](const Vector3& x) { return penny_displacement(material, crack, 1, 1, x); });
+  experiments::hold_whole_surface(
+      body.problem, [&](const Vector3& x) { return experiments::penny_displacement(material, crack, 1, 1, x); });
   body.problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -n; };
   const auto penny = discretise(body.problem, appending());
   const Field field = penny->solve();
@@ -162,9 +165,9 @@ TEST_CASE("A pressurised penny that is appended opens by the right volume") {
                    r = std::sin(t);
       const double area = r * std::cos(t) * (0.5 * std::numbers::pi / rings) * (2 * std::numbers::pi / sectors);
       const Vector3 x = crack.origin + r * (std::cos(w) * crack.ahead + std::sin(w) * crack.tangent);
-      volume += area * opening_at(*penny, field, x, crack.normal, body.fine).dot(crack.normal);
+      volume += area * experiments::opening_at(*penny, field, x, crack.normal, body.fine).dot(crack.normal);
     }
-  CHECK(volume == Approx(penny_opening_volume(material, 1, 1)).epsilon(0.015));
+  CHECK(volume == Approx(experiments::penny_opening_volume(material, 1, 1)).epsilon(0.015));
 }
 
 TEST_CASE("A body whose cut has grown by appending equals one that was cut at once") {
@@ -184,7 +187,7 @@ TEST_CASE("A body whose cut has grown by appending equals one that was cut at on
     const Field expected = at_once.solve();
     const VectorX grown = body.nodal_displacements(field), fresh = at_once.nodal_displacements(expected);
     CHECK((grown - fresh).norm() < 1e-3 * fresh.norm());
-    const std::vector<int> top = top_nodes(scene.nodes, 12);
+    const std::vector<int> top = nodes_on_top(scene.nodes, 12);
     const MatrixX compliance = body.contact_compliance(top);
     CHECK((compliance - at_once.contact_compliance(top)).norm() < 1e-3 * compliance.norm());
   }
@@ -193,7 +196,7 @@ TEST_CASE("A body whose cut has grown by appending equals one that was cut at on
 TEST_CASE("Forces on an appended cut's body act as they should") {
   AppendingScene scene;
   const auto body = discretise(scene.problem(), appending());
-  std::vector<int> nodes = top_nodes(scene.nodes, 4);
+  std::vector<int> nodes = nodes_on_top(scene.nodes, 4);
   nodes.push_back(scene.first(NodeKind::lip));
   const std::vector<Field> responses = body->force_responses(nodes);
   const MatrixX compliance = body->contact_compliance(nodes);
@@ -203,7 +206,7 @@ TEST_CASE("Forces on an appended cut's body act as they should") {
     for (int axis = 0; axis < 3; ++axis) {
       const Field& field = responses[3 * c + axis];
       CHECK(body->residual(field, {nodes[c]}, {Vector3::Unit(axis)}) < 1e-8);
-      CHECK((sum_of(body->constraint_forces(field)) + Vector3::Unit(axis)).norm() < 1e-6);
+      CHECK((total_of(body->constraint_forces(field)) + Vector3::Unit(axis)).norm() < 1e-6);
     }
   MatrixX cases = MatrixX::Zero(15, 2);
   cases.col(0).segment<3>(3) = Vector3(1, -2, 0.5);
@@ -235,8 +238,8 @@ TEST_CASE("Forces on an appended cut's body act as they should") {
 }
 
 TEST_CASE("Pieces that an appended cut frees are refused, held or dropped") {
-  CutBody body = severed_cube(250);
-  hold_surface(
+  experiments::CutBody body = appended_cube(250);
+  experiments::hold_surface(
       body.problem, [](const Vector3& x, const Vector3& n) { return x.z() < 0 && n.z() < -0.5; },
       [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
   CHECK_THROWS_AS(discretise(body.problem, appending()), InputError);
@@ -250,7 +253,7 @@ TEST_CASE("Pieces that an appended cut frees are refused, held or dropped") {
   CHECK(held->residual(field) < 1e-9);
   double stress = 0, largest = 0;
   for (int i = 0; i < body.problem.nodes.size(); ++i)
-    if (const Vector3& x = body.problem.nodes.positions[i]; is_above(x)) {
+    if (const Vector3& x = body.problem.nodes.positions[i]; is_above_cut(x)) {
       const PointState state = held->at(x, field);
       stress = std::max(stress, state.stress.norm());
       largest = std::max(largest, (state.strain - balanced.initial_strain).norm());
@@ -264,7 +267,7 @@ TEST_CASE("Pieces that an appended cut frees are refused, held or dropped") {
   const VectorX u = dropped->nodal_displacements(dropped->solve());
   double above = 0, below = 0;
   for (int i = 0; i < body.problem.nodes.size(); ++i) {
-    double& most = is_above(body.problem.nodes.positions[i]) ? above : below;
+    double& most = is_above_cut(body.problem.nodes.positions[i]) ? above : below;
     most = std::max(most, u.segment<3>(3 * i).norm());
   }
   CHECK(below > 0.1);
