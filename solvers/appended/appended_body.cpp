@@ -85,7 +85,7 @@ std::unique_ptr<Discretisation> make_appended(Problem problem, const Discretisat
   return std::make_unique<AppendedBody>(std::move(problem), options, uncut);
 }
 
-AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options)
+AppendedBody::AppendedBody(const Problem& problem, const DiscretisationOptions& options)
     : AppendedBody(
           problem, options,
           std::make_shared<const UncutBody>(problem, base_nodes(problem.nodes), uncut_options(problem, options))) {}

@@ -16,7 +16,7 @@ int base_nodes(const NodeCloud& nodes);
 class AppendedBody final : public Discretisation, public Growable {
  public:
   /// Throws as discretise().
-  AppendedBody(Problem problem, const DiscretisationOptions& options);
+  AppendedBody(const Problem& problem, const DiscretisationOptions& options);
   /// On an uncut body that is there already.
   AppendedBody(Problem problem, const DiscretisationOptions& options, std::shared_ptr<const UncutBody> uncut);
 

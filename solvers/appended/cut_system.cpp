@@ -220,8 +220,13 @@ void CutSystem::add_cell(int cell_index, std::span<const int> fresh, CellProduct
   const BoxShapes& cell = boxes.cells()[cell_index];
   const Material& material = uncut_.problem().material;
   const double lambda = material.lame_lambda(), mu = material.shear_modulus();
-  auto& [parts, twins, groups, new_twins, new_groups, next, gradient, flat, pull, of_groups, stress, stress_columns,
-         with_groups, group_pairs, group_twin, with_twins] = work;
+  auto& parts = work.parts;
+  auto &twins = work.twins, &groups = work.groups, &new_twins = work.new_twins, &new_groups = work.new_groups;
+  auto& next = work.next;
+  MatrixX &gradient = work.gradient, &flat = work.flat, &pull = work.pull, &of_groups = work.of_groups,
+          &stress = work.stress, &stress_columns = work.stress_columns, &with_groups = work.with_groups,
+          &group_pairs = work.group_pairs, &group_twin = work.group_twin;
+  auto& with_twins = work.with_twins;
   for (auto* list : {&parts, &twins, &groups, &new_twins, &new_groups})
     list->clear();
   for (int box = cell.first_box; box < cell.first_box + cell.boxes; ++box)
