@@ -127,7 +127,6 @@ test('A picture for a tool that moves is the one that is drawn as a whole', asyn
       for (let k = 0; k < 3; ++k) worst = Math.max(worst, Math.abs(quick.picture.data[4 * i + k]! - whole.picture.data[4 * i + k]!));
     }
     assert.ok(worst <= 3, `${worst} of 255`);
-    await withdraw(tab);
   });
 });
 
