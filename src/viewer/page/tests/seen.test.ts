@@ -89,7 +89,7 @@ for (const [name, args] of browsers) {
   }
 }
 
-test('They are seen after the window was resized, and its context lost and given back', async () => {
+test('They are seen after the window was resized', async () => {
   await inBrowser(browsers[0]![1], 1, async ({ tab }) => {
     for (const [width, height] of [[700, 900], [1300, 620]] as const) {
       await hovers(tab, 'before', 1);
@@ -97,6 +97,13 @@ test('They are seen after the window was resized, and its context lost and given
       organIsSeen(await see(tab), `at ${width} x ${height}`);
       await hovers(tab, `at ${width} x ${height}`, 2);
     }
+    await presses(tab, 'resized');
+  });
+});
+
+test('They are seen after the context was lost and given back', async () => {
+  await inBrowser(browsers[0]![1], 1, async ({ tab }) => {
+    await hovers(tab, 'before', 1);
     await tab.evaluate(() => {
       const lose = globalThis.spherecut!.view.canvas.getContext('webgl2')!.getExtension('WEBGL_lose_context')!;
       lose.loseContext();
