@@ -102,10 +102,12 @@ Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
       if (const auto rest =
               topology::rest_position_from(starts, x, displacement, coarse_tolerance * fine, difference * fine))
         return *rest;
-      const bool is_outside = starts.empty() || (starts.front() + displacement(starts.front()) - x).norm() >
-                                                    outside_reach * zone_.spacing(starts.front());
-      if (domain.signed_distance(guess) <= 0 || !is_outside) // outside no material is cut
-        throw;
+      const bool is_far = starts.empty() || (starts.front() + displacement(starts.front()) - x).norm() >
+                                                outside_reach * zone_.spacing(starts.front());
+      // Beyond the opening of a cut the displacement jumps, but by neither side's does the place come to lie inside.
+      const auto is_out = [&](const Vector3& start) { return domain.signed_distance(x - displacement(start)) > 0; };
+      if (domain.signed_distance(guess) <= 0 || !(is_far || std::all_of(starts.begin(), starts.end(), is_out)))
+        throw; // outside no material is cut
       return guess;
     }
   return x;
