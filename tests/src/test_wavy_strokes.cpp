@@ -1,6 +1,6 @@
 // Wavy strokes over the live liver, as a busy machine solves them: seldom, late, with coarser and coarser nodes, bodies
 // made beside the steps and taken over at some solve. SPHERECUT_STROKES of them (1), from the seed
-// SPHERECUT_STROKES_FIRST (207, which leaves most crumbs) on; SPHERECUT_STROKES_FULL=1: with all triangles and
+// SPHERECUT_STROKES_FIRST (163, which has ten crumbs to leave out) on; SPHERECUT_STROKES_FULL=1: with all triangles and
 // nodes of the scenario.
 #include "src/haptics/shown_opening.hpp"
 #include "src/haptics/simulation.hpp"
@@ -207,7 +207,7 @@ Outcome draw(unsigned seed) {
 } // namespace
 
 TEST_CASE("A wavy stroke over the live liver leaves no crumbs, and what is told is what is shown", "[cut]") {
-  const int first = from_environment("SPHERECUT_STROKES_FIRST", 207), count = from_environment("SPHERECUT_STROKES", 1);
+  const int first = from_environment("SPHERECUT_STROKES_FIRST", 163), count = from_environment("SPHERECUT_STROKES", 1);
   for (int seed = first; seed < first + count; ++seed) {
     const Outcome out = draw(static_cast<unsigned>(seed));
     std::cout << "seed " << seed << ": " << out.solves << " solves, " << out.cuts << " cuts, " << out.refused
