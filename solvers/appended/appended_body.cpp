@@ -246,28 +246,37 @@ void AppendedBody::assemble_loads() {
                                 : Vector3(Vector3::Zero());
       };
       if (function.is_front) {
-        std::vector<PartId> parts;
-        std::vector<FrontTerm> front;
+        std::vector<SampledFront> front;
         for (const int cell : space_->cells_of(function)) {
-          space_->terms_in(k, cell, parts, front);
-          for (std::size_t e = 0; e < parts.size(); ++e) {
-            if (is_dropped(parts[e]))
+          space_->terms_in(k, cell, front);
+          for (const SampledFront& at : front) {
+            if (is_dropped(at.part))
               continue;
-            to += front[e].value.transpose() * weight_of(parts[e]);
+            const double share = space_->samples(at.part)[at.sample].share;
+            to += share * at.term.value.transpose() * weight_of(at.part);
             for (int m = 0; m < 3; ++m)
-              to[m] += volume_of(parts[e]) * initial.cwiseProduct(front[e].gradient[m]).sum();
+              to[m] += share * volume_of(at.part) * initial.cwiseProduct(at.term.gradient[m]).sum();
           }
         }
         continue;
       }
+      PartId last = -1;
       for (const PartId id : system_->parts_of(k)) {
-        ScalarTerm term;
-        if (is_dropped(id) || !space_->term_at(k, id, term))
+        if (id == last || is_dropped(id))
           continue;
-        // Of a twin with an indicator the value is that at the middle of the box.
-        const Vector3 off = space_->cut().part(id).centroid - boxes.boxes()[box_of(id)].middle;
-        const double value = function.twin.is_step ? term.value : term.value + term.gradient.dot(off);
-        to += value * weight_of(id) + volume_of(id) * initial * term.gradient;
+        last = id;
+        ScalarTerm term;
+        if (!function.twin.is_step) { // its value is that at the middle of the box
+          if (!space_->term_at(k, id, 0, term))
+            continue;
+          const Vector3 off = space_->cut().part(id).centroid - boxes.boxes()[box_of(id)].middle;
+          to += (term.value + term.gradient.dot(off)) * weight_of(id) + volume_of(id) * initial * term.gradient;
+          continue;
+        }
+        const PlacedPart& samples = space_->samples(id);
+        for (int n = 0; n < std::ssize(samples); ++n)
+          if (space_->term_at(k, id, n, term))
+            to += samples[n].share * (term.value * weight_of(id) + volume_of(id) * initial * term.gradient);
       }
     }
   }

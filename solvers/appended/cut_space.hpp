@@ -60,13 +60,25 @@ struct CutTerms {
   }
 };
 
-/// Place of a part with respect to the front, and the near-tip fields there.
-struct PlacedFields {
-  std::optional<FrontPlace> place;
+/// Place of a part, or of a sample of it, with respect to the front, and the near-tip fields there.
+struct PlacedSample {
+  double share = 1;                // of the part's volume
+  Vector3 at = Vector3::Zero();    // m, centroid
+  std::optional<FrontPlace> place; // of no value: far from every front
   TipFields tip;
   // The fields as the station had them that was asked for last: its rings follow one another.
   FrontStation station; // of no spacing: none yet
   FrontFields fields;
+};
+/// One sample, or several where the near-tip fields change much within the part. The functions of the uncut body stay
+/// linear over all of them, so that their products with one another are what they are without the samples.
+using PlacedPart = std::vector<PlacedSample>;
+
+/// A term of a front group or a step at a sample of a part.
+struct SampledFront {
+  PartId part;
+  int sample;
+  FrontTerm term;
 };
 
 class CutSpace {
@@ -88,10 +100,17 @@ class CutSpace {
   [[nodiscard]] const topology::Incision* incision() const { return incision_.get(); }
   /// Cells in which a function may differ from zero, ascending.
   [[nodiscard]] std::vector<int> cells_of(const CutFunction& function) const;
-  /// Terms of the k-th function at a part of a box, with the box's linear shape functions. False: it vanishes there.
-  bool term_at(int k, PartId part, ScalarTerm& term) const;
-  /// Terms of a front group at all parts of a cell where it does not vanish, with the parts, ascending.
-  void terms_in(int k, int cell, std::vector<PartId>& parts, std::vector<FrontTerm>& terms) const;
+  /// Samples of a part for functions that know of the front; the others take the part as one.
+  [[nodiscard]] const PlacedPart& samples(PartId part) const { return place_of(part); }
+  /// How many samples a part has as far as functions have been asked for there.
+  [[nodiscard]] int known_samples(PartId part) const {
+    return places_[part] == nullptr ? 1 : static_cast<int>(places_[part]->size());
+  }
+  /// Term of a twin at a part of a box, or of a step at one of its samples, with the box's linear shape functions.
+  /// False: it vanishes there.
+  bool term_at(int k, PartId part, int sample, ScalarTerm& term) const;
+  /// Terms of a front group at all samples of the parts of a cell where it does not vanish, ascending.
+  void terms_in(int k, int cell, std::vector<SampledFront>& terms) const;
   /// All that do not vanish at x, in a part, with shape functions evaluated at x.
   void terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const;
 
@@ -100,12 +119,14 @@ class CutSpace {
   [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
   void add_twins(int node, std::vector<CutFunction>& found) const;
   void find_curved_front();
-  [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedFields& placed) const;
+  [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedSample& placed) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
   /// Place of a part with respect to the front, kept until the front about it changes.
-  [[nodiscard]] PlacedFields& place_of(PartId part) const;
+  [[nodiscard]] PlacedPart& place_of(PartId part) const;
+  [[nodiscard]] PlacedPart sampled(PartId part, const FrontPlace& middle) const;
 
   const SmallBoxes& boxes_;
+  const topology::Domain& domain_;
   const NodeCloud& nodes_;
   const Spheres& spheres_;
   Material material_;
@@ -115,12 +136,12 @@ class CutSpace {
   std::vector<CutFunction> functions_;
   std::vector<std::vector<int>> twins_of_, groups_of_; // places in functions_ by node
   std::vector<std::vector<double>> group_weights_;
-  std::vector<Vector3> origins_;                              // of the runs of the front
-  mutable std::vector<std::unique_ptr<PlacedFields>> places_; // by part; null: not asked for yet
-  mutable std::vector<PartId> placed_;                        // those that are there
-  mutable std::vector<int> local_;                            // of a part among those of a sphere, -1 between calls
-  mutable std::vector<std::vector<int>> reach_;               // by node, found as they are asked for
-  std::vector<char> curved_;                                  // by segment of the front: its run is curved
+  std::vector<Vector3> origins_;                            // of the runs of the front
+  mutable std::vector<std::unique_ptr<PlacedPart>> places_; // by part; null: not asked for yet
+  mutable std::vector<PartId> placed_;                      // those that are there
+  mutable std::vector<int> local_;                          // of a part among those of a sphere, -1 between calls
+  mutable std::vector<std::vector<int>> reach_;             // by node, found as they are asked for
+  std::vector<char> curved_;                                // by segment of the front: its run is curved
   double front_reach_ = 0; // m, from a front to the farthest place that its functions come to
   int next_id_ = 0;
 };

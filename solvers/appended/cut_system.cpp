@@ -17,6 +17,8 @@ namespace spherecut::solvers {
 
 namespace {
 
+constexpr int most_samples = 16; // of a part
+
 Matrix3 held_components(const Prescribed& entry) {
   Vector3 held;
   for (int c = 0; c < 3; ++c)
@@ -44,24 +46,34 @@ void CutSystem::evaluate(int function, FunctionData& data) const {
   const CutFunction& own = space_.functions()[function];
   data.id = own.id;
   data.is_front = own.is_front;
+  data.is_sampled = own.is_front || own.twin.is_step;
   if (!own.is_front) {
-    for (const PartId part : own.twin.hidden)
-      if (ScalarTerm term; space_.term_at(function, part, term)) {
-        data.gradients.insert(data.gradients.end(), term.gradient.data(), term.gradient.data() + 3);
-        data.parts.push_back(part);
-      }
+    for (const PartId part : own.twin.hidden) {
+      const int samples = data.is_sampled ? static_cast<int>(space_.samples(part).size()) : 1;
+      bool any = false;
+      std::array<double, 3 * most_samples> gradients{};
+      for (int n = 0; n < samples; ++n)
+        if (ScalarTerm term; space_.term_at(function, part, n, term)) {
+          any = true;
+          std::copy_n(term.gradient.data(), 3, gradients.data() + 3 * n);
+        }
+      if (!any)
+        continue;
+      data.gradients.insert(data.gradients.end(), gradients.data(), gradients.data() + 3 * samples);
+      data.parts.insert(data.parts.end(), samples, part);
+    }
     return;
   }
-  std::vector<PartId> parts;
-  std::vector<FrontTerm> terms;
+  std::vector<SampledFront> terms;
   for (const int cell : space_.cells_of(own)) {
-    space_.terms_in(function, cell, parts, terms);
-    data.parts.insert(data.parts.end(), parts.begin(), parts.end());
-    for (const FrontTerm& term : terms)
-      for (const Matrix3& gradient : term.gradient)
+    space_.terms_in(function, cell, terms);
+    for (const SampledFront& at : terms) {
+      data.parts.push_back(at.part);
+      for (const Matrix3& gradient : at.term.gradient)
         for (int i = 0; i < 3; ++i)
           for (int j = 0; j < 3; ++j)
             data.gradients.push_back(gradient(i, j));
+    }
   }
 }
 
@@ -169,7 +181,8 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
 /// Products over the parts of one cell, as many together as there are lanes.
 struct CutSystem::CellProducts {
   static constexpr int lanes = BoxShapes::lanes;
-  std::vector<PartId> parts;
+  std::vector<PartId> parts;                             // once for each sample
+  std::vector<double> weights;                           // m3, of every one of them
   std::vector<int> twins, groups, new_twins, new_groups; // functions here, ascending
   std::vector<std::size_t> next;                         // entry of every twin, then of every group
   MatrixX gradient;                                      // row: base function or twin; column 3 l + axis
@@ -229,9 +242,21 @@ void CutSystem::add_cell(int cell_index, std::span<const int> fresh, CellProduct
   auto& with_twins = work.with_twins;
   for (auto* list : {&parts, &twins, &groups, &new_twins, &new_groups})
     list->clear();
+  work.weights.clear();
   for (int box = cell.first_box; box < cell.first_box + cell.boxes; ++box)
-    for (int k = 0; k < space_.cut().part_count(box); ++k)
-      parts.push_back(part_id(box, k));
+    for (int k = 0; k < space_.cut().part_count(box); ++k) {
+      const PartId part = part_id(box, k);
+      const double volume = space_.cut().part(part).share * boxes.boxes()[box].volume;
+      if (space_.known_samples(part) == 1) {
+        parts.push_back(part);
+        work.weights.push_back(volume);
+        continue;
+      }
+      for (const PlacedSample& sample : space_.samples(part)) {
+        parts.push_back(part);
+        work.weights.push_back(sample.share * volume);
+      }
+    }
   for (const int k : in_cell_[cell_index])
     (data_[k].is_front ? groups : twins).push_back(k);
   for (const int k : fresh)
@@ -254,13 +279,15 @@ void CutSystem::add_cell(int cell_index, std::span<const int> fresh, CellProduct
   for (std::size_t first = 0; first < parts.size(); first += lanes) {
     const int count = static_cast<int>(std::min<std::size_t>(lanes, parts.size() - first));
     std::array<double, lanes> weight{};
-    for (int l = 0; l < count; ++l)
-      weight[l] = space_.cut().part(parts[first + l]).share * boxes.boxes()[box_of(parts[first + l])].volume;
+    std::copy_n(work.weights.begin() + static_cast<std::ptrdiff_t>(first), count, weight.begin());
     const auto for_entries = [&](int k, std::size_t& at, auto&& visit) {
       const FunctionData& of = data_[k];
       for (int l = 0; l < count && at < of.parts.size(); ++l)
-        if (of.parts[at] == parts[first + l])
-          visit(l, of.gradients.data() + of.stride() * at++);
+        if (of.parts[at] == parts[first + l]) {
+          visit(l, of.gradients.data() + of.stride() * at);
+          if (of.is_sampled || first + l + 1 == parts.size() || parts[first + l + 1] != parts[first + l])
+            ++at;
+        }
     };
     if (!is_plain) {
       gradient.setZero(rows, 3 * lanes);

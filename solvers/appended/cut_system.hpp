@@ -65,7 +65,7 @@ class CutSystem {
   void subtract_holding(const VectorX& base, const VectorX& cut, const VectorX& prescribed,
                         const std::function<Vector3(const Vector3&)>& field, CutVectors& rows) const;
 
-  /// Parts in which the k-th function does not vanish, ascending.
+  /// Parts in which the k-th function does not vanish, ascending; of a step once for each of its samples.
   [[nodiscard]] const std::vector<PartId>& parts_of(int k) const { return data_[k].parts; }
   [[nodiscard]] int functions() const { return static_cast<int>(data_.size()); }
   [[nodiscard]] long stored() const { return static_cast<long>(half_.size() + schur_.size()); }
@@ -75,8 +75,9 @@ class CutSystem {
   struct FunctionData {
     int id = -1;
     bool is_front = false;
-    std::vector<PartId> parts;                    // ascending
-    std::vector<double> gradients;                // per part: 3 of a twin; 27 of a front group, [mode][i][j] du_i/dx_j
+    bool is_sampled = false;                      // an entry for each sample of a part, else for each part
+    std::vector<PartId> parts;                    // ascending, of every entry
+    std::vector<double> gradients;                // per entry: 3 of a twin; 27 of a front group, [mode][i][j] du_i/dx_j
     std::vector<int> nodes;                       // base nodes that it couples with, ascending
     std::vector<Matrix3> blocks;                  // elastic, rows: components of the base
     std::vector<std::pair<int, Matrix3>> penalty; // by node: what held means add

@@ -41,7 +41,7 @@ std::pair<double, Vector3> part_inside(const topology::Domain& domain, const Vec
 
 SmallBoxes::SmallBoxes(const topology::Domain& domain, const NodeCloud& nodes, const Spheres& spheres,
                        double cell_size) {
-  const BackgroundCells leaves = background_cells(domain, nodes, {cell_size, 1, false});
+  const BackgroundCells leaves = background_cells(domain, nodes, {cell_size, 1, false, 1});
   cells_.reserve(leaves.boxes.size());
   for (const BackgroundBox& leaf : leaves.boxes)
     add_cell(domain, leaf);
