@@ -216,34 +216,56 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
   found.push_back(std::move(function));
 }
 
+// A run of the front is curved where it turns by more than step_turn within a sphere, over most of its length. Corners,
+// such as that of a blade, are not counted.
 void CutSpace::find_curved_front() {
-  const double least = std::cos(options_.step_turn * std::numbers::pi / 180);
+  const double most = options_.step_turn * std::numbers::pi / 180, corner = options_.corner * std::numbers::pi / 180;
   const std::vector<topology::FrontSegment>& front = incision_->front();
   std::vector<Vector3> middle, ahead;
-  std::vector<char> turns;
+  std::vector<double> radius; // of the largest sphere about a segment
+  middle.reserve(front.size());
+  ahead.reserve(front.size());
+  radius.reserve(front.size());
   for (int s = 0; s < std::ssize(front); ++s) {
-    middle.emplace_back(0.5 * (front[s].from + front[s].to));
+    const Vector3 x = 0.5 * (front[s].from + front[s].to);
+    middle.push_back(x);
     ahead.push_back(incision_->front_frame_at(s, 0.5).ahead);
-  }
-  for (std::size_t s = 0; s < front.size(); ++s) {
-    double radius = 0;
-    for (const int node : spheres_.candidates(middle[s]))
-      if ((spheres_.centres()[node] - middle[s]).norm() < spheres_.radii()[node])
-        radius = std::max(radius, spheres_.radii()[node]);
-    char turn = 0;
-    for (std::size_t other = 0; other < front.size() && turn == 0; ++other)
-      turn = (middle[other] - middle[s]).squaredNorm() < radius * radius && ahead[other].dot(ahead[s]) < least;
-    turns.push_back(turn);
+    double largest = 0;
+    for (const int node : spheres_.candidates(x))
+      if ((spheres_.centres()[node] - x).norm() < spheres_.radii()[node])
+        largest = std::max(largest, spheres_.radii()[node]);
+    radius.push_back(largest);
   }
   curved_.assign(front.size(), 0);
-  for (const std::vector<int>& run : front_runs(*incision_)) {
-    double length = 0, turning = 0;
-    for (const int s : run) {
-      length += (front[s].to - front[s].from).norm();
-      turning += turns[s] != 0 ? (front[s].to - front[s].from).norm() : 0;
+  for (const FrontRun& run : front_runs(*incision_)) {
+    const int count = static_cast<int>(run.segments.size());
+    const auto turning = [&](int k, int step) {
+      double turned = 0;
+      const int start = run.segments[k];
+      for (int walked = 1, at = k; walked < count; ++walked) {
+        int next = at + step;
+        if (run.closed)
+          next = (next + count) % count;
+        else if (next < 0 || next >= count)
+          break;
+        const int here = run.segments[at], there = run.segments[next];
+        if ((middle[there] - middle[start]).norm() >= radius[start])
+          break;
+        const double angle = std::acos(std::clamp(ahead[here].dot(ahead[there]), -1.0, 1.0));
+        turned += angle < corner ? angle : 0;
+        at = next;
+      }
+      return turned;
+    };
+    double length = 0, curved = 0;
+    for (int k = 0; k < count; ++k) {
+      const topology::FrontSegment& segment = front[run.segments[k]];
+      const double own = (segment.to - segment.from).norm();
+      length += own;
+      curved += std::max(turning(k, 1), turning(k, -1)) > most ? own : 0;
     }
-    for (const int s : run)
-      curved_[s] = turning > 0.5 * length ? 1 : 0;
+    for (const int s : run.segments)
+      curved_[s] = curved > 0.5 * length ? 1 : 0;
   }
 }
 

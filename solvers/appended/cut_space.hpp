@@ -16,6 +16,7 @@ struct CutSpaceOptions {
   /// most of its length; on straight ones, corners included, the front functions do as well with half as many.
   double step_reach = 1;
   double step_turn = 20; // degrees
+  double corner = 45;    // degrees from one segment to the next: a corner, which is no curvature
 };
 
 /// A second vector unknown of a sphere: h_J psi. Where the cut parts the sphere, psi is 1 in one component of what is

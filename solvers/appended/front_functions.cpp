@@ -15,12 +15,10 @@ namespace {
 
 constexpr double least_run = 1e-9; // of a spacing
 
-/// A run of the front in segments that follow one another, with the way along it in spacings.
-struct FrontRun {
-  std::vector<int> segments;
+/// A run with the way along it in spacings.
+struct MeasuredRun : FrontRun {
   std::vector<double> measure; // at the start of every segment, and at the end of the last
-  bool closed = false;
-  bool reversed = false; // measured from its end
+  bool reversed = false;       // measured from its end
   [[nodiscard]] double length() const { return measure.back(); }
 };
 
@@ -29,7 +27,9 @@ PointKey key_of(const Vector3& x) {
   return {x.x(), x.y(), x.z()};
 }
 
-std::vector<FrontRun> runs_of(const topology::Incision& incision) {
+} // namespace
+
+std::vector<FrontRun> front_runs(const topology::Incision& incision) {
   const std::vector<topology::FrontSegment>& front = incision.front();
   std::map<std::pair<int, PointKey>, int> starting, ending;
   for (int s = 0; s < std::ssize(front); ++s) {
@@ -58,15 +58,6 @@ std::vector<FrontRun> runs_of(const topology::Incision& incision) {
     if (taken[s] == 0)
       follow(s);
   return runs;
-}
-
-} // namespace
-
-std::vector<std::vector<int>> front_runs(const topology::Incision& incision) {
-  std::vector<std::vector<int>> segments;
-  for (FrontRun& run : runs_of(incision))
-    segments.push_back(std::move(run.segments));
-  return segments;
 }
 
 std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach) {
@@ -105,11 +96,13 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
     return groups;
   const topology::PointTree tree(nodes.positions);
   const auto spacing_at = [&](const Vector3& x) { return nodes.spacings[tree.nearest(x).index]; };
-  std::vector<FrontRun> runs = runs_of(incision);
+  std::vector<MeasuredRun> runs;
+  for (FrontRun& run : front_runs(incision))
+    runs.push_back({std::move(run), {}, false});
   std::vector<int> run_of(front.size(), -1), place_in_run(front.size(), 0);
   std::vector<Vector3> starts;
   for (int r = 0; r < std::ssize(runs); ++r) {
-    FrontRun& run = runs[r];
+    MeasuredRun& run = runs[r];
     run.measure.assign(1, 0);
     for (int k = 0; k < std::ssize(run.segments); ++k) {
       const topology::FrontSegment& segment = front[run.segments[k]];
@@ -139,7 +132,7 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
   std::vector<Stations> stations(runs.size());
   std::vector<FrontStation> all;
   for (int r = 0; r < std::ssize(runs); ++r) {
-    const FrontRun& run = runs[r];
+    const MeasuredRun& run = runs[r];
     stations[r].first = static_cast<int>(all.size());
     const double length = run.length();
     if (length < least_run)
@@ -184,7 +177,7 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
     const double radius = options.radius * spacing_at(place->nearest);
     if (place->distance > radius)
       continue;
-    const FrontRun& run = runs[r];
+    const MeasuredRun& run = runs[r];
     const topology::FrontSegment& segment = front[place->segment];
     const int k = place_in_run[place->segment];
     const double length = (segment.to - segment.from).norm();

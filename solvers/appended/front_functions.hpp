@@ -27,8 +27,13 @@ struct FrontPlace {
 /// Nothing farther than `reach` m from the front. Continuous across everything but the sheet.
 std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach);
 
-/// Segments of the front in runs that follow one another; open runs come first.
-std::vector<std::vector<int>> front_runs(const topology::Incision& incision);
+/// Segments of the front that follow one another.
+struct FrontRun {
+  std::vector<int> segments;
+  bool closed = false;
+};
+/// All runs of the front; open ones come first.
+std::vector<FrontRun> front_runs(const topology::Incision& incision);
 
 struct FrontOptions {
   double radius = 3; // of the outer ring, in spacings at the front; 0: no functions
