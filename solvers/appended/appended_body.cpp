@@ -100,6 +100,7 @@ AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options
   space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
                                       problem_.material, CutSpaceOptions{});
   system_ = std::make_unique<CutSystem>(*uncut_, *space_);
+  places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
   follow(everywhere(problem_));
 }
 
@@ -111,9 +112,10 @@ void AppendedBody::follow(const BoundingBox& region) {
     change = space_->update(problem_.incision, region);
   find_pieces();
   system_->update(change, loose_);
-  contacts_.clear();
-  patches_.reset();
-  nodal_.clear();
+  KeptPlaces::IsDropped is_dropped_at;
+  if (!dropped_.empty())
+    is_dropped_at = [this](const Vector3& x) { return is_dropped(space_->cut().part_at(x, *problem_.incision)); };
+  places_->follow(problem_, region, change, std::move(is_dropped_at));
   assemble_loads();
   report_.nodes = problem_.nodes.size();
   report_.unknowns = coefficient_count();
@@ -140,6 +142,7 @@ BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown,
     space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
                                         problem_.material, CutSpaceOptions{});
     system_ = std::make_unique<CutSystem>(*uncut_, *space_);
+    places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
     follow(everywhere(problem_));
     throw;
   }
@@ -293,31 +296,13 @@ void AppendedBody::assemble_loads() {
 
 // ---- places
 
-CutFunctional AppendedBody::mean_over(std::vector<QuadraturePoint> points) const {
-  if (!dropped_.empty())
-    std::erase_if(points, [&](const QuadraturePoint& point) {
-      return is_dropped(space_->cut().part_at(point.position, *problem_.incision));
-    });
-  return system_->mean_over(points);
-}
-
 CutFunctional AppendedBody::value_at(const Vector3& x) const {
-  return mean_over({{x, 1}});
-}
-
-const AppendedBody::Contact& AppendedBody::contact(int node) const {
-  const auto known = contacts_.find(node);
-  if (known != contacts_.end())
-    return known->second;
-  if (patches_ == nullptr)
-    patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
-  const DisplacementMean mean = patches_->contact_mean(node, uncut_->spheres(), problem_);
-  return contacts_.emplace(node, Contact{mean_over(mean.share), mean.centroid}).first->second;
+  return places_->mean_over({{x, 1}});
 }
 
 Vector3 AppendedBody::contact_point(int node) const {
   require_nodes({node});
-  return contact(node).centroid;
+  return places_->contact(node).centroid;
 }
 
 std::vector<Vector3> AppendedBody::constraint_points() const {
@@ -367,24 +352,23 @@ PointState AppendedBody::at(const Vector3& x, const Field& field) const {
 
 VectorX AppendedBody::nodal_displacements(const Field& field) const {
   require_own(field);
-  if (nodal_.empty())
-    for (const Vector3& x : problem_.nodes.positions)
-      nodal_.push_back(value_at(x));
   const CutVectors parts = split(field.coefficients);
-  VectorX displacements(3 * std::ssize(nodal_));
-  for (Eigen::Index i = 0; i < std::ssize(nodal_); ++i)
-    displacements.segment<3>(3 * i) = CutSystem::value(nodal_[i], parts.base, parts.cut);
+  VectorX displacements(3 * static_cast<Eigen::Index>(problem_.nodes.size()));
+  for (int i = 0; i < problem_.nodes.size(); ++i)
+    displacements.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+        CutSystem::value(places_->at_node(i), parts.base, parts.cut);
   return displacements;
 }
 
 MatrixX AppendedBody::contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const {
   require_nodes(nodes);
   require_own(fields);
+  places_->require(nodes);
   MatrixX displacements(3 * std::ssize(nodes), std::ssize(fields));
   for (Eigen::Index f = 0; f < std::ssize(fields); ++f) {
     const CutVectors parts = split(fields[f].coefficients);
     for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
-      displacements.col(f).segment<3>(3 * c) = CutSystem::value(contact(nodes[c]).mean, parts.base, parts.cut);
+      displacements.col(f).segment<3>(3 * c) = CutSystem::value(places_->contact(nodes[c]).mean, parts.base, parts.cut);
   }
   return displacements;
 }
@@ -465,20 +449,22 @@ std::vector<Field> AppendedBody::fields_of(const CutVectors& solutions) const {
 }
 
 CutVectors AppendedBody::unit_forces(const std::vector<int>& nodes) const {
+  places_->require(nodes);
   CutVectors loads = system_->zero(3 * std::ssize(nodes));
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
     for (int axis = 0; axis < 3; ++axis)
-      CutSystem::add_force(contact(nodes[c]).mean, Vector3::Unit(axis), 3 * c + axis, loads);
+      CutSystem::add_force(places_->contact(nodes[c]).mean, Vector3::Unit(axis), 3 * c + axis, loads);
   return loads;
 }
 
 CutVectors AppendedBody::case_forces(const std::vector<int>& nodes, const MatrixX& forces) const {
   require_cases(nodes, forces);
+  places_->require(nodes);
   CutVectors loads = system_->zero(forces.cols());
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
     for (Eigen::Index k = 0; k < forces.cols(); ++k)
       if (const Vector3 force = forces.col(k).segment<3>(3 * c); !force.isZero(0))
-        CutSystem::add_force(contact(nodes[c]).mean, force, k, loads);
+        CutSystem::add_force(places_->contact(nodes[c]).mean, force, k, loads);
   return loads;
 }
 
@@ -497,20 +483,19 @@ CaseResponses AppendedBody::condense_cases(const std::vector<int>& nodes, const 
   const CutVectors cases = system_->half_solutions(case_forces(nodes, forces));
   CaseResponses responses;
   responses.among = CutSystem::compliance(cases, cases);
-  responses.at = CutSystem::compliance(system_->half_solutions(unit_forces(at)), cases);
+  responses.at = CutSystem::compliance(places_->unit_halves(at), cases);
   return responses;
 }
 
 MatrixX AppendedBody::contact_compliance(const std::vector<int>& candidates) const {
   require_nodes(candidates);
-  const CutVectors half = system_->half_solutions(unit_forces(candidates));
-  return CutSystem::compliance(half, half);
+  return places_->compliance(candidates);
 }
 
 MatrixX AppendedBody::compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const {
   require_nodes(at);
   require_nodes(forced);
-  return CutSystem::compliance(system_->half_solutions(unit_forces(at)), system_->half_solutions(unit_forces(forced)));
+  return CutSystem::compliance(places_->unit_halves(at), places_->unit_halves(forced));
 }
 
 std::vector<Field> AppendedBody::pattern_responses(const std::vector<ForcePattern>& patterns) const {
@@ -563,7 +548,7 @@ double AppendedBody::residual(const Field& field, const std::vector<int>& loaded
   applied.base *= field.load_factor;
   applied.cut *= field.load_factor;
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
-    CutSystem::add_force(contact(loaded_nodes[k]).mean, nodal_forces[k], 0, applied);
+    CutSystem::add_force(places_->contact(loaded_nodes[k]).mean, nodal_forces[k], 0, applied);
   CutVectors rows = system_->elastic_forces(parts.base, parts.cut);
   system_->subtract_holding(parts.base, parts.cut, base_prescribed(field.prescribed),
                             field.load_factor != 0 ? problem_.prescribed_field : nullptr, rows);

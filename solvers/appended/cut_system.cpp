@@ -665,14 +665,18 @@ CutVectors CutSystem::solve(const CutVectors& loads) const {
 
 CutVectors CutSystem::half_solutions(const CutVectors& loads) const {
   CutVectors half{uncut_.factor().forward_sparse(uncut_.ordered(loads.base)), loads.cut, loads.multipliers};
+  finish_halves(half);
+  return half;
+}
+
+void CutSystem::finish_halves(CutVectors& half) const {
   add_transposed_product(-1, half_.data(), static_cast<int>(half_.rows()), half.base, half.cut);
   triangular_solve(false, lower_.data(), static_cast<int>(lower_.rows()), half.cut);
-  if (!parted_.empty()) {
-    add_product(-1, parted_half_, true, half.base, half.multipliers);
-    add_product(-1, parted_schur_, true, half.cut, half.multipliers);
-    triangular_solve(false, parted_lower_.data(), static_cast<int>(parted_lower_.rows()), half.multipliers);
-  }
-  return half;
+  if (parted_.empty())
+    return;
+  add_product(-1, parted_half_, true, half.base, half.multipliers);
+  add_product(-1, parted_schur_, true, half.cut, half.multipliers);
+  triangular_solve(false, parted_lower_.data(), static_cast<int>(parted_lower_.rows()), half.multipliers);
 }
 
 MatrixX CutSystem::compliance(const CutVectors& a, const CutVectors& b) {

@@ -47,6 +47,8 @@ class CutSystem {
   [[nodiscard]] CutVectors solve(const CutVectors& loads) const;
   /// Half solutions of loads: what they do to each other is base^T base + cut^T cut - multipliers^T multipliers.
   [[nodiscard]] CutVectors half_solutions(const CutVectors& loads) const;
+  /// The same where the base rows are half solutions of the uncut body already.
+  void finish_halves(CutVectors& half) const;
   [[nodiscard]] static MatrixX compliance(const CutVectors& a, const CutVectors& b);
 
   /// Mean over weighted points (weights add up to one) with the functions as they are now.
