@@ -222,47 +222,48 @@ void AppendedBody::assemble_loads() {
   const Matrix3 initial = initial_stress(problem_);
   const SmallBoxes& boxes = uncut_->boxes();
   if (loads.body_force || !initial.isZero(0)) {
-    for (int box = 0; box < boxes.size(); ++box) {
-      const BoxShapes& cell = boxes.cells()[boxes.cell_of(box)];
-      const int lane = boxes.lane_of(box);
-      for (int k = 0; k < space_->cut().part_count(box); ++k) {
-        if (is_dropped(part_id(box, k)))
+    // What acts on the functions of the uncut body is the same whatever is cut, but for parts that are left out.
+    if (uncut_loads_.size() == 0 || !dropped_.empty()) {
+      uncut_loads_ = VectorX::Zero(loads_.base.rows());
+      for (int box = 0; box < boxes.size(); ++box) {
+        double left = 0;
+        for (int k = 0; k < space_->cut().part_count(box); ++k)
+          left += is_dropped(part_id(box, k)) ? 0 : space_->cut().part(part_id(box, k)).share;
+        if (left == 0)
           continue;
-        const CutPart part = space_->cut().part(part_id(box, k));
-        const double volume = part.share * boxes.boxes()[box].volume;
+        const BoxShapes& cell = boxes.cells()[boxes.cell_of(box)];
+        const int lane = boxes.lane_of(box);
+        const double volume = left * boxes.boxes()[box].volume;
         const Vector3 force =
-            loads.body_force ? Vector3(volume * loads.body_force(part.centroid)) : Vector3(Vector3::Zero());
-        for (std::size_t n = 0; n < cell.nodes.size(); ++n) {
-          const Vector3 gradient = cell.gradient_at(n, lane);
-          const double value = cell.value_at(n, lane) + gradient.dot(part.centroid - boxes.boxes()[box].middle);
-          loads_.base.col(0).segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[n])) +=
-              value * force + volume * initial * gradient;
-        }
+            loads.body_force ? Vector3(volume * loads.body_force(boxes.boxes()[box].middle)) : Vector3(Vector3::Zero());
+        for (std::size_t n = 0; n < cell.nodes.size(); ++n)
+          uncut_loads_.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[n])) +=
+              cell.value_at(n, lane) * force + volume * initial * cell.gradient_at(n, lane);
       }
     }
+    loads_.base.col(0) = uncut_loads_;
+    if (!dropped_.empty())
+      uncut_loads_.resize(0);
+    const auto volume_of = [&](PartId id) { return space_->cut().part(id).share * boxes.boxes()[box_of(id)].volume; };
+    const auto weight_of = [&](PartId id) -> Vector3 {
+      return loads.body_force ? Vector3(volume_of(id) * loads.body_force(space_->cut().part(id).centroid))
+                              : Vector3(Vector3::Zero());
+    };
+    for (const int cell : space_->cells_of_groups(0))
+      space_->for_each_front_term(0, cell, [&](PartId part, int sample, const FrontTerm& term) {
+        if (is_dropped(part))
+          return;
+        auto to = loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(term.function));
+        const double share = space_->samples(part)[sample].share;
+        to += share * term.value.transpose() * weight_of(part);
+        for (int m = 0; m < 3; ++m)
+          to[m] += share * volume_of(part) * initial.cwiseProduct(term.gradient[m]).sum();
+      });
     for (int k = 0; k < std::ssize(space_->functions()); ++k) {
       const CutFunction& function = space_->functions()[k];
       auto to = loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(k));
-      const auto volume_of = [&](PartId id) { return space_->cut().part(id).share * boxes.boxes()[box_of(id)].volume; };
-      const auto weight_of = [&](PartId id) -> Vector3 {
-        return loads.body_force ? Vector3(volume_of(id) * loads.body_force(space_->cut().part(id).centroid))
-                                : Vector3(Vector3::Zero());
-      };
-      if (function.is_front) {
-        std::vector<SampledFront> front;
-        for (const int cell : space_->cells_of(function)) {
-          space_->terms_in(k, cell, front);
-          for (const SampledFront& at : front) {
-            if (is_dropped(at.part))
-              continue;
-            const double share = space_->samples(at.part)[at.sample].share;
-            to += share * at.term.value.transpose() * weight_of(at.part);
-            for (int m = 0; m < 3; ++m)
-              to[m] += share * volume_of(at.part) * initial.cwiseProduct(at.term.gradient[m]).sum();
-          }
-        }
+      if (function.is_front)
         continue;
-      }
       PartId last = -1;
       for (const PartId id : system_->parts_of(k)) {
         if (id == last || is_dropped(id))

@@ -86,6 +86,7 @@ class AppendedBody final : public Discretisation, public Growable {
   std::vector<char> dropped_;           // by component of the cut; empty: none
   CutBoxes::Components components_;
   CutVectors loads_;
+  VectorX uncut_loads_; // body force and initial stress on the functions of the uncut body; empty: not known
   std::unique_ptr<KeptPlaces> places_; // what they keep is found as it is asked for
 };
 

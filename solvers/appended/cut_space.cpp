@@ -474,43 +474,17 @@ FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, Pla
   return term;
 }
 
-void CutSpace::terms_in(int k, int cell_index, std::vector<SampledFront>& terms) const {
-  constexpr int lanes = BoxShapes::lanes;
-  const FrontGroup& group = functions_[k].group;
-  const BoxShapes& cell = boxes_.cells()[cell_index];
-  terms.clear();
-  std::array<double, lanes> middle{};
-  std::array<Vector3, lanes> gradient;
-  gradient.fill(Vector3::Zero());
-  bool any = false;
-  std::size_t c = 0; // both lists ascend
-  for (std::size_t n = 0; n < group.nodes.size(); ++n) {
-    while (c < cell.nodes.size() && cell.nodes[c] < group.nodes[n])
-      ++c;
-    if (c == cell.nodes.size())
-      break;
-    if (cell.nodes[c] != group.nodes[n])
-      continue;
-    any = true;
-    for (int lane = 0; lane < cell.boxes; ++lane) {
-      middle[lane] += group.weights[n] * cell.value_at(c, lane);
-      gradient[lane] += group.weights[n] * cell.gradient_at(c, lane);
-    }
-  }
-  for (int lane = 0; any && lane < cell.boxes; ++lane) {
-    if (middle[lane] == 0 && gradient[lane].isZero(0))
-      continue;
-    const int box = cell.first_box + lane;
-    for (int p = 0; p < cut_.part_count(box); ++p) {
-      const PartId part = part_id(box, p);
-      PlacedPart& samples = place_of(part);
-      for (int n = 0; n < std::ssize(samples); ++n)
-        if (PlacedSample& sample = samples[n]; sample.place)
-          terms.push_back({part, n,
-                           front_term(k, middle[lane] + gradient[lane].dot(sample.at - boxes_.boxes()[box].middle),
-                                      gradient[lane], sample)});
-    }
-  }
+std::vector<int> CutSpace::cells_of_groups(int first) const {
+  std::vector<char> taken(boxes_.cells().size(), 0);
+  for (std::size_t node = 0; node < groups_of_.size(); ++node)
+    if (std::any_of(groups_of_[node].begin(), groups_of_[node].end(), [&](int k) { return k >= first; }))
+      for (const int cell : boxes_.cells_of_node(static_cast<int>(node)))
+        taken[cell] = 1;
+  std::vector<int> cells;
+  for (int cell = 0; cell < std::ssize(taken); ++cell)
+    if (taken[cell] != 0)
+      cells.push_back(cell);
+  return cells;
 }
 
 void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const {

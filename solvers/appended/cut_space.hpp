@@ -75,13 +75,6 @@ struct PlacedSample {
 /// linear over all of them, so that their products with one another are what they are without the samples.
 using PlacedPart = std::vector<PlacedSample>;
 
-/// A term of a front group or a step at a sample of a part.
-struct SampledFront {
-  PartId part;
-  int sample;
-  FrontTerm term;
-};
-
 class CutSpace {
  public:
   /// Base nodes and their spheres; all outlive this.
@@ -110,8 +103,12 @@ class CutSpace {
   /// Term of a twin at a part of a box, or of a step at one of its samples, with the box's linear shape functions.
   /// False: it vanishes there.
   bool term_at(int k, PartId part, int sample, ScalarTerm& term) const;
-  /// Terms of a front group at all samples of the parts of a cell where it does not vanish, ascending.
-  void terms_in(int k, int cell, std::vector<SampledFront>& terms) const;
+  /// Calls visit(part, sample, term) for the terms in a cell of the front groups from function `first` on, at all
+  /// samples of all parts where they do not vanish; parts and samples of a group ascend.
+  template <class Visit>
+  void for_each_front_term(int first, int cell, Visit&& visit) const;
+  /// Cells in which some front group from function `first` on may differ from zero, ascending.
+  [[nodiscard]] std::vector<int> cells_of_groups(int first) const;
   /// All that do not vanish at x, in a part, with shape functions evaluated at x.
   void terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const;
 
@@ -140,11 +137,67 @@ class CutSpace {
   std::vector<Vector3> origins_;                            // of the runs of the front
   mutable std::vector<std::unique_ptr<PlacedPart>> places_; // by part; null: not asked for yet
   mutable std::vector<PartId> placed_;                      // those that are there
-  mutable std::vector<int> local_;                          // of a part among those of a sphere, -1 between calls
-  mutable std::vector<std::vector<int>> reach_;             // by node, found as they are asked for
-  std::vector<char> curved_;                                // by segment of the front: its run is curved
-  double front_reach_ = 0; // m, from a front to the farthest place that its functions come to
+  /// Blended hats of a front group over the boxes of a cell.
+  struct Blend {
+    int function;
+    std::array<double, BoxShapes::lanes> middle{};        // at the middles of the boxes
+    std::array<double, 3 * BoxShapes::lanes> gradients{}; // 1/m, [lane][axis]
+  };
+  mutable std::vector<Blend> blends_;           // of one cell
+  mutable std::vector<int> blend_of_;           // by function, -1 between calls
+  mutable std::vector<int> local_;              // of a part among those of a sphere, -1 between calls
+  mutable std::vector<std::vector<int>> reach_; // by node, found as they are asked for
+  std::vector<char> curved_;                    // by segment of the front: its run is curved
+  double front_reach_ = 0;                      // m, from a front to the farthest place that its functions come to
   int next_id_ = 0;
 };
+
+template <class Visit>
+void CutSpace::for_each_front_term(int first, int cell_index, Visit&& visit) const {
+  const BoxShapes& cell = boxes_.cells()[cell_index];
+  const auto count = std::ssize(cell.nodes);
+  blends_.clear();
+  blend_of_.resize(std::max(blend_of_.size(), functions_.size()), -1);
+  for (std::ptrdiff_t n = 0; n < count; ++n) {
+    const std::vector<int>& groups = groups_of_[cell.nodes[n]];
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (groups[g] < first)
+        continue;
+      int& at = blend_of_[groups[g]];
+      if (at < 0) {
+        at = static_cast<int>(blends_.size());
+        blends_.push_back({groups[g], {}, {}});
+      }
+      Blend& blend = blends_[at];
+      const double weight = group_weights_[cell.nodes[n]][g];
+      for (int lane = 0; lane < BoxShapes::lanes; ++lane)
+        blend.middle[lane] += weight * cell.value[n * BoxShapes::lanes + lane];
+      const double* gradient = cell.gradients.data() + n;
+      for (int k = 0; k < 3 * cell.boxes; ++k, gradient += count)
+        blend.gradients[k] += weight * *gradient;
+    }
+  }
+  for (const Blend& blend : blends_)
+    blend_of_[blend.function] = -1;
+  for (int lane = 0; lane < cell.boxes; ++lane) {
+    const int box = cell.first_box + lane;
+    const Vector3& centre = boxes_.boxes()[box].middle;
+    for (int p = 0; p < cut_.part_count(box); ++p) {
+      const PartId part = part_id(box, p);
+      PlacedPart* samples = nullptr;
+      for (const Blend& blend : blends_) {
+        const Vector3 gradient = Vector3::Map(blend.gradients.data() + 3 * lane);
+        if (blend.middle[lane] == 0 && gradient.isZero(0))
+          continue;
+        if (samples == nullptr)
+          samples = &place_of(part);
+        for (int n = 0; n < std::ssize(*samples); ++n)
+          if (PlacedSample& sample = (*samples)[n]; sample.place)
+            visit(part, n,
+                  front_term(blend.function, blend.middle[lane] + gradient.dot(sample.at - centre), gradient, sample));
+      }
+    }
+  }
+}
 
 } // namespace spherecut::solvers

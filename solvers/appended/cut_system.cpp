@@ -42,39 +42,46 @@ int factor_lower(MatrixX& matrix) {
 
 // ---- functions and functionals
 
-void CutSystem::evaluate(int function, FunctionData& data) const {
-  const CutFunction& own = space_.functions()[function];
-  data.id = own.id;
-  data.is_front = own.is_front;
-  data.is_sampled = own.is_front || own.twin.is_step;
-  if (!own.is_front) {
-    for (const PartId part : own.twin.hidden) {
-      const int samples = data.is_sampled ? static_cast<int>(space_.samples(part).size()) : 1;
-      bool any = false;
-      std::array<double, 3 * most_samples> gradients{};
-      for (int n = 0; n < samples; ++n)
-        if (ScalarTerm term; space_.term_at(function, part, n, term)) {
-          any = true;
-          std::copy_n(term.gradient.data(), 3, gradients.data() + 3 * n);
-        }
-      if (!any)
-        continue;
-      data.gradients.insert(data.gradients.end(), gradients.data(), gradients.data() + 3 * samples);
-      data.parts.insert(data.parts.end(), samples, part);
-    }
-    return;
+void CutSystem::evaluate_twin(int function, FunctionData& data) const {
+  const Twin& twin = space_.functions()[function].twin;
+  for (const PartId part : twin.hidden) {
+    const int samples = data.is_sampled ? static_cast<int>(space_.samples(part).size()) : 1;
+    bool any = false;
+    std::array<double, 3 * most_samples> gradients{};
+    for (int n = 0; n < samples; ++n)
+      if (ScalarTerm term; space_.term_at(function, part, n, term)) {
+        any = true;
+        std::copy_n(term.gradient.data(), 3, gradients.data() + 3 * n);
+      }
+    if (!any)
+      continue;
+    data.gradients.insert(data.gradients.end(), gradients.data(), gradients.data() + 3 * samples);
+    data.parts.insert(data.parts.end(), samples, part);
   }
-  std::vector<SampledFront> terms;
-  for (const int cell : space_.cells_of(own)) {
-    space_.terms_in(function, cell, terms);
-    for (const SampledFront& at : terms) {
-      data.parts.push_back(at.part);
-      for (const Matrix3& gradient : at.term.gradient)
-        for (int i = 0; i < 3; ++i)
-          for (int j = 0; j < 3; ++j)
-            data.gradients.push_back(gradient(i, j));
-    }
+}
+
+void CutSystem::evaluate(int first_new) {
+  for (int k = first_new; k < std::ssize(space_.functions()); ++k) {
+    const CutFunction& own = space_.functions()[k];
+    FunctionData& data = data_.emplace_back();
+    data.id = own.id;
+    data.is_front = own.is_front;
+    data.is_sampled = own.is_front || own.twin.is_step;
+    if (!own.is_front)
+      evaluate_twin(k, data);
   }
+  for (const int cell : space_.cells_of_groups(first_new))
+    space_.for_each_front_term(first_new, cell, [&](PartId part, int, const FrontTerm& term) {
+      FunctionData& data = data_[term.function];
+      data.parts.push_back(part);
+      const std::size_t size = data.gradients.size();
+      data.gradients.resize(size + 27);
+      double* to = data.gradients.data() + size;
+      for (const Matrix3& gradient : term.gradient) {
+        const Matrix3 rows = gradient.transpose(); // in memory row by row of the gradient
+        to = std::copy_n(rows.data(), 9, to);
+      }
+    });
 }
 
 CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points) const {
@@ -138,8 +145,7 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
   penalty_ = std::move(penalty);
   schur_ = std::move(schur);
   const int first_new = static_cast<int>(kept);
-  for (Eigen::Index k = kept; k < count; ++k)
-    evaluate(static_cast<int>(k), data_.emplace_back());
+  evaluate(first_new);
   in_cell_.assign(uncut_.boxes().cells().size(), {});
   for (int k = 0; k < count; ++k) {
     int last = -1;

@@ -92,7 +92,8 @@ class CutSystem {
     CutFunctional difference;
     std::vector<QuadraturePoint> first, second;
   };
-  void evaluate(int function, FunctionData& data) const;
+  void evaluate(int first_new);
+  void evaluate_twin(int function, FunctionData& data) const;
   void add_elastic(int first_new);
   void add_held(int first_new, const CutSpace::Change& change);
   void part_held_shares();
