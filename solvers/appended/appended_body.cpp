@@ -210,9 +210,9 @@ void AppendedBody::assemble_loads() {
     if (!evaluate(uncut_->spheres(), x, shape))
       throw NumericalError(
           fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+    space_->terms_at(x, part, shape, terms);
     for (int k = 0; k < shape.size(); ++k)
       loads_.base.col(0).segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
-    space_->terms_at(x, part, shape, terms);
     for (const ScalarTerm& term : terms.scalar)
       loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(term.function)) += term.value * force;
     for (const FrontTerm& term : terms.front)

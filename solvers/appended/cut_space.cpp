@@ -1,5 +1,6 @@
 #include "solvers/appended/cut_space.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -20,7 +21,8 @@ CutSpace::CutSpace(const SmallBoxes& boxes, const topology::Domain& domain, cons
                    const Spheres& spheres, const Material& material, CutSpaceOptions options)
     : boxes_(boxes), domain_(domain), nodes_(nodes), spheres_(spheres), material_(material), options_(options),
       cut_(boxes, domain), twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()),
-      group_weights_(nodes.positions.size()), places_(most_parts * static_cast<std::size_t>(boxes.size())),
+      group_weights_(nodes.positions.size()), unseen_(nodes.positions.size()),
+      places_(most_parts * static_cast<std::size_t>(boxes.size())),
       local_(most_parts * static_cast<std::size_t>(boxes.size()), -1), reach_(nodes.positions.size()) {
   const double widest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
   const double largest = *std::max_element(spheres_.radii().begin(), spheres_.radii().end());
@@ -136,7 +138,8 @@ PlacedPart& CutSpace::place_of(PartId part) const {
 
 // Components of the parts in reach of a sphere: its node's own one, and a twin for each of the others. Where all hang
 // together although a sheet divides some, the sphere has a step.
-void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
+void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
+  unseen_[node].clear();
   const std::vector<int>& reach = boxes_in_reach(node);
   if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
     return;
@@ -196,7 +199,10 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
     any = true;
     if (heavy)
       found.push_back(std::move(function));
+    else
+      unseen_[node].insert(unseen_[node].end(), function.twin.hidden.begin(), function.twin.hidden.end());
   }
+  std::sort(unseen_[node].begin(), unseen_[node].end());
   if (any || options_.step_reach <= 0)
     return;
   // The front ends in the sphere, or passes beside it.
@@ -487,10 +493,54 @@ std::vector<int> CutSpace::cells_of_groups(int first) const {
   return cells;
 }
 
-void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const {
+void CutSpace::take_out_unseen(const Vector3& x, PartId part, ShapeFunctions& shape) const {
+  bool any = false;
+  for (int n = 0; n < shape.size(); ++n)
+    if (const auto& unseen = unseen_[shape.nodes[n]];
+        !unseen.empty() && std::binary_search(unseen.begin(), unseen.end(), part)) {
+      shape.value[n] = shape.dx[n] = shape.dy[n] = shape.dz[n] = 0;
+      any = true;
+    }
+  if (!any)
+    return;
+  // h + h M p, p = (1, (x_J - x) / R): constants and linear functions are reproduced as before.
+  using Moments = Eigen::Matrix<double, 4, 1>;
+  const double radius = spheres_.radii()[shape.nodes.front()];
+  const auto moments_of = [&](int n) {
+    Moments p;
+    p << 1, (spheres_.centres()[shape.nodes[n]] - x) / radius;
+    return p;
+  };
+  Eigen::Matrix4d gram = Eigen::Matrix4d::Zero();
+  Moments missing = Moments::Unit(0);
+  Eigen::Matrix<double, 3, 4> missing_slope;
+  missing_slope << Vector3::Zero(), Matrix3::Identity() / radius;
+  for (int n = 0; n < shape.size(); ++n) {
+    const Moments p = moments_of(n);
+    gram += shape.value[n] * p * p.transpose();
+    missing -= shape.value[n] * p;
+    missing_slope -= shape.gradient(n) * p.transpose();
+  }
+  const Eigen::FullPivLU<Eigen::Matrix4d> lu(gram);
+  if (!lu.isInvertible())
+    return;
+  const Moments add = lu.solve(missing);
+  const Eigen::Matrix<double, 3, 4> add_slope = lu.solve(missing_slope.transpose()).transpose();
+  for (int n = 0; n < shape.size(); ++n) {
+    const Moments p = moments_of(n);
+    const Vector3 gradient = shape.gradient(n) + shape.value[n] * (add_slope * p);
+    shape.value[n] *= 1 + add.dot(p);
+    shape.dx[n] = gradient.x();
+    shape.dy[n] = gradient.y();
+    shape.dz[n] = gradient.z();
+  }
+}
+
+void CutSpace::terms_at(const Vector3& x, PartId part, ShapeFunctions& shape, CutTerms& terms) const {
   terms.clear();
   if (functions_.empty())
     return;
+  take_out_unseen(x, part, shape);
   std::optional<FrontPlace> place;
   bool placed = false;
   const auto place_here = [&]() -> const FrontPlace* {

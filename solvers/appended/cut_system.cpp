@@ -93,11 +93,11 @@ CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points) c
     if (!solvers::evaluate(uncut_.spheres(), point.position, shape))
       throw NumericalError(fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m",
                                        point.position.x(), point.position.y(), point.position.z()));
+    if (!space_.functions().empty())
+      space_.terms_at(point.position, space_.cut().part_at(point.position, *space_.incision()), shape, terms);
     for (int k = 0; k < shape.size(); ++k)
-      base[shape.nodes[k]] += point.weight * shape.value[k];
-    if (space_.functions().empty())
-      continue;
-    space_.terms_at(point.position, space_.cut().part_at(point.position, *space_.incision()), shape, terms);
+      if (shape.value[k] != 0)
+        base[shape.nodes[k]] += point.weight * shape.value[k];
     for (const ScalarTerm& term : terms.scalar)
       cut.try_emplace(term.function, Matrix3::Zero()).first->second.diagonal().array() += point.weight * term.value;
     for (const FrontTerm& term : terms.front)
