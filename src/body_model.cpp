@@ -117,7 +117,8 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
 } // namespace
 
 bool cut_appends(const Scenario& scenario) {
-  return scenario.method.method == solvers::Method::galerkin &&
+  const bool cuts = scenario.blade || !scenario.precuts.empty() || scenario.tearing.enabled;
+  return cuts && scenario.method.method == solvers::Method::galerkin &&
          scenario.cut.sight.value_or(solvers::SightRule::appended) == solvers::SightRule::appended;
 }
 

@@ -204,12 +204,11 @@ void AppendedBody::assemble_loads() {
   ShapeFunctions shape;
   CutTerms terms;
   const auto add = [&](const Vector3& x, const Vector3& force) {
-    const PartId part = incision != nullptr ? space_->cut().part_at(x, *incision) : 0;
-    if (incision != nullptr && is_dropped(part))
+    const PartId part = space_->part_at(x);
+    if (is_dropped(part))
       return;
-    if (!evaluate(uncut_->spheres(), x, shape))
-      throw NumericalError(
-          fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+    uncut_->boxes().evaluate(box_of(part), x, shape);
+    space_->take_out_faint(x, part, shape);
     space_->terms_at(x, part, shape, terms);
     for (int k = 0; k < shape.size(); ++k)
       loads_.base.col(0).segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
@@ -332,6 +331,7 @@ void AppendedBody::shape_at(const Vector3& x, ShapeFunctions& shape) const {
       std::fill(of->begin(), of->end(), 0.0);
     return;
   }
+  space_->take_out_faint(x, part, shape);
   space_->terms_at(x, part, shape, terms);
   for (const ScalarTerm& term : terms.scalar) {
     shape.nodes.push_back(uncut_->size() + term.function);

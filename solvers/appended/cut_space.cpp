@@ -1,6 +1,5 @@
 #include "solvers/appended/cut_space.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,8 +10,9 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double near_front_boxes = 3;  // half diagonals of a box: nearer to a front its octants count one by one
-constexpr int front_samples_along = 4;  // an edge of such a box
+constexpr double near_front_boxes = 3; // half diagonals of a box: nearer to a front its octants count one by one
+constexpr int front_samples_along = 4; // an edge of such a box
+constexpr double faint = 1e-4;         // of a sphere's energy: less of it beyond a cut says nothing of the places there
 constexpr double nearest_sample = 0.05; // half diagonals: samples count as this far from the front at least
 
 } // namespace
@@ -21,7 +21,7 @@ CutSpace::CutSpace(const SmallBoxes& boxes, const topology::Domain& domain, cons
                    const Spheres& spheres, const Material& material, CutSpaceOptions options)
     : boxes_(boxes), domain_(domain), nodes_(nodes), spheres_(spheres), material_(material), options_(options),
       cut_(boxes, domain), twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()),
-      group_weights_(nodes.positions.size()), unseen_(nodes.positions.size()),
+      group_weights_(nodes.positions.size()), faint_(nodes.positions.size()),
       places_(most_parts * static_cast<std::size_t>(boxes.size())),
       local_(most_parts * static_cast<std::size_t>(boxes.size()), -1), reach_(nodes.positions.size()) {
   const double widest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
@@ -139,7 +139,7 @@ PlacedPart& CutSpace::place_of(PartId part) const {
 // Components of the parts in reach of a sphere: its node's own one, and a twin for each of the others. Where all hang
 // together although a sheet divides some, the sphere has a step.
 void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
-  unseen_[node].clear();
+  faint_[node].clear();
   const std::vector<int>& reach = boxes_in_reach(node);
   if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
     return;
@@ -175,35 +175,38 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   const int own = own_place < 0 ? component.front() : component[own_place];
   for (const PartId part : parts)
     local_[part] = -1;
-  // A part in which the sphere has no weight asks for nothing.
-  const auto weighs = [&](PartId part) {
+  // Energy of the sphere in a part, but for the material. A component in which it has none asks for nothing.
+  const auto energy_in = [&](PartId part) {
     const int box = box_of(part);
     const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
     const auto at = std::lower_bound(cell.nodes.begin(), cell.nodes.end(), node);
-    return at != cell.nodes.end() && *at == node &&
-           (cell.value_at(at - cell.nodes.begin(), boxes_.lane_of(box)) != 0 ||
-            !cell.gradient_at(at - cell.nodes.begin(), boxes_.lane_of(box)).isZero(0));
+    if (at == cell.nodes.end() || *at != node)
+      return 0.0;
+    return cut_.part(part).share * boxes_.boxes()[box].volume *
+           cell.gradient_at(at - cell.nodes.begin(), boxes_.lane_of(box)).squaredNorm();
   };
-  bool any = false;
+  std::vector<double> energy(static_cast<std::size_t>(count), 0.0);
+  double whole = 0;
+  for (std::size_t k = 0; k < parts.size() && count > 1; ++k) {
+    const double own_share = energy_in(parts[k]);
+    energy[component[k]] += own_share;
+    whole += own_share;
+  }
   for (int c = 0; c < count; ++c) {
     if (c == own)
       continue;
     CutFunction function;
     function.twin.node = node;
-    bool heavy = false;
     for (std::size_t k = 0; k < parts.size(); ++k)
-      if (component[k] == c) {
+      if (component[k] == c)
         function.twin.hidden.push_back(parts[k]);
-        heavy = heavy || weighs(parts[k]);
-      }
-    any = true;
-    if (heavy)
+    if (energy[c] < faint * whole)
+      faint_[node].insert(faint_[node].end(), function.twin.hidden.begin(), function.twin.hidden.end());
+    if (energy[c] > 0)
       found.push_back(std::move(function));
-    else
-      unseen_[node].insert(unseen_[node].end(), function.twin.hidden.begin(), function.twin.hidden.end());
   }
-  std::sort(unseen_[node].begin(), unseen_[node].end());
-  if (any || options_.step_reach <= 0)
+  std::sort(faint_[node].begin(), faint_[node].end());
+  if (count > 1 || options_.step_reach <= 0)
     return;
   // The front ends in the sphere, or passes beside it.
   const double radius = spheres_.radii()[node];
@@ -493,54 +496,17 @@ std::vector<int> CutSpace::cells_of_groups(int first) const {
   return cells;
 }
 
-void CutSpace::take_out_unseen(const Vector3& x, PartId part, ShapeFunctions& shape) const {
-  bool any = false;
-  for (int n = 0; n < shape.size(); ++n)
-    if (const auto& unseen = unseen_[shape.nodes[n]];
-        !unseen.empty() && std::binary_search(unseen.begin(), unseen.end(), part)) {
-      shape.value[n] = shape.dx[n] = shape.dy[n] = shape.dz[n] = 0;
-      any = true;
-    }
-  if (!any)
-    return;
-  // h + h M p, p = (1, (x_J - x) / R): constants and linear functions are reproduced as before.
-  using Moments = Eigen::Matrix<double, 4, 1>;
-  const double radius = spheres_.radii()[shape.nodes.front()];
-  const auto moments_of = [&](int n) {
-    Moments p;
-    p << 1, (spheres_.centres()[shape.nodes[n]] - x) / radius;
-    return p;
-  };
-  Eigen::Matrix4d gram = Eigen::Matrix4d::Zero();
-  Moments missing = Moments::Unit(0);
-  Eigen::Matrix<double, 3, 4> missing_slope;
-  missing_slope << Vector3::Zero(), Matrix3::Identity() / radius;
-  for (int n = 0; n < shape.size(); ++n) {
-    const Moments p = moments_of(n);
-    gram += shape.value[n] * p * p.transpose();
-    missing -= shape.value[n] * p;
-    missing_slope -= shape.gradient(n) * p.transpose();
-  }
-  const Eigen::FullPivLU<Eigen::Matrix4d> lu(gram);
-  if (!lu.isInvertible())
-    return;
-  const Moments add = lu.solve(missing);
-  const Eigen::Matrix<double, 3, 4> add_slope = lu.solve(missing_slope.transpose()).transpose();
-  for (int n = 0; n < shape.size(); ++n) {
-    const Moments p = moments_of(n);
-    const Vector3 gradient = shape.gradient(n) + shape.value[n] * (add_slope * p);
-    shape.value[n] *= 1 + add.dot(p);
-    shape.dx[n] = gradient.x();
-    shape.dy[n] = gradient.y();
-    shape.dz[n] = gradient.z();
-  }
+void CutSpace::take_out_faint(const Vector3& x, PartId part, ShapeFunctions& shape) const {
+  take_out(spheres_, x, shape, [&](int k) {
+    const std::vector<PartId>& faint = faint_[shape.nodes[k]];
+    return !faint.empty() && std::binary_search(faint.begin(), faint.end(), part);
+  });
 }
 
-void CutSpace::terms_at(const Vector3& x, PartId part, ShapeFunctions& shape, CutTerms& terms) const {
+void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const {
   terms.clear();
   if (functions_.empty())
     return;
-  take_out_unseen(x, part, shape);
   std::optional<FrontPlace> place;
   bool placed = false;
   const auto place_here = [&]() -> const FrontPlace* {

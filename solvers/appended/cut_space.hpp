@@ -109,16 +109,20 @@ class CutSpace {
   void for_each_front_term(int first, int cell, Visit&& visit) const;
   /// Cells in which some front group from function `first` on may differ from zero, ascending.
   [[nodiscard]] std::vector<int> cells_of_groups(int first) const;
-  /// All that do not vanish at x, in a part, with shape functions evaluated at x. Spheres that the cut hides from the
-  /// part, and that have no twin there because no box of it feels them, are taken out of `shape`; the others go on
-  /// reproducing linear functions.
-  void terms_at(const Vector3& x, PartId part, ShapeFunctions& shape, CutTerms& terms) const;
+  /// The part that x lies in, or next to.
+  [[nodiscard]] PartId part_at(const Vector3& x) const {
+    return incision_ == nullptr ? part_id(boxes_.locate(x), 0) : cut_.part_at(x, *incision_);
+  }
+  /// All that do not vanish at x, in a part, with shape functions at x.
+  void terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const;
+  /// Takes spheres out of shape functions evaluated at x whose twin in the part, or what they would have there, weighs
+  /// next to nothing in the boxes: their unknowns say nothing of x. The others go on reproducing linear functions.
+  void take_out_faint(const Vector3& x, PartId part, ShapeFunctions& shape) const;
 
  private:
   /// Boxes that the sphere of a node may reach, ascending; kept.
   [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
   void add_twins(int node, std::vector<CutFunction>& found);
-  void take_out_unseen(const Vector3& x, PartId part, ShapeFunctions& shape) const;
   void find_curved_front();
   [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedSample& placed) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
@@ -137,8 +141,8 @@ class CutSpace {
   std::vector<CutFunction> functions_;
   std::vector<std::vector<int>> twins_of_, groups_of_; // places in functions_ by node
   std::vector<std::vector<double>> group_weights_;
-  std::vector<std::vector<PartId>> unseen_; // by node: hidden parts in its reach without a twin, ascending
-  std::vector<Vector3> origins_;            // of the runs of the front
+  std::vector<std::vector<PartId>> faint_; // by node: hidden parts in its reach without a twin that weighs, ascending
+  std::vector<Vector3> origins_;           // of the runs of the front
   mutable std::vector<std::unique_ptr<PlacedPart>> places_; // by part; null: not asked for yet
   mutable std::vector<PartId> placed_;                      // those that are there
   /// Blended hats of a front group over the boxes of a cell.

@@ -84,20 +84,19 @@ void CutSystem::evaluate(int first_new) {
     });
 }
 
-CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points) const {
+CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points, Faint faint) const {
   std::map<int, double> base;
   std::map<int, Matrix3> cut;
   ShapeFunctions shape;
   CutTerms terms;
   for (const QuadraturePoint& point : points) {
-    if (!solvers::evaluate(uncut_.spheres(), point.position, shape))
-      throw NumericalError(fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m",
-                                       point.position.x(), point.position.y(), point.position.z()));
-    if (!space_.functions().empty())
-      space_.terms_at(point.position, space_.cut().part_at(point.position, *space_.incision()), shape, terms);
+    const PartId part = space_.part_at(point.position);
+    uncut_.boxes().evaluate(box_of(part), point.position, shape);
+    if (faint == Faint::left_out)
+      space_.take_out_faint(point.position, part, shape);
+    space_.terms_at(point.position, part, shape, terms);
     for (int k = 0; k < shape.size(); ++k)
-      if (shape.value[k] != 0)
-        base[shape.nodes[k]] += point.weight * shape.value[k];
+      base[shape.nodes[k]] += point.weight * shape.value[k];
     for (const ScalarTerm& term : terms.scalar)
       cut.try_emplace(term.function, Matrix3::Zero()).first->second.diagonal().array() += point.weight * term.value;
     for (const FrontTerm& term : terms.front)
@@ -478,7 +477,10 @@ void CutSystem::add_held(int first_new, const CutSpace::Change& change) {
           held.base.emplace_back(mean.nodes[k], mean.weights[k]);
       continue;
     }
-    held = mean_over(mean.share);
+    held = mean_over(mean.share, Faint::kept);
+    held.base.clear(); // as the uncut body has it, whose penalty is in K0
+    for (std::size_t k = 0; k < mean.nodes.size(); ++k)
+      held.base.emplace_back(mean.nodes[k], mean.weights[k]);
     const Prescribed& entry = problem.prescribed[p];
     const double stiffness = constraint_stiffness(problem, entry.node);
     const Matrix3 components = held_components(entry);
@@ -545,7 +547,7 @@ void CutSystem::part_held_shares() {
           point.weight = -point.weight;
           both.push_back(point);
         }
-        parted.difference = mean_over(both);
+        parted.difference = mean_over(both, Faint::kept);
         const Matrix3 components = held_components(entry);
         for (auto& [function, matrix] : parted.difference.cut)
           matrix = components * matrix;

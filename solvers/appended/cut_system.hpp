@@ -52,7 +52,11 @@ class CutSystem {
   [[nodiscard]] static MatrixX compliance(const CutVectors& a, const CutVectors& b);
 
   /// Mean over weighted points (weights add up to one) with the functions as they are now.
-  [[nodiscard]] CutFunctional mean_over(const std::vector<QuadraturePoint>& points) const;
+  /// Twins that hardly weigh are left out, as are their spheres, except where something is held: then they are kept, as
+  /// the uncut body has them.
+  enum class Faint { left_out, kept };
+  [[nodiscard]] CutFunctional mean_over(const std::vector<QuadraturePoint>& points,
+                                        Faint faint = Faint::left_out) const;
   [[nodiscard]] static Vector3 value(const CutFunctional& functional, const VectorX& base, const VectorX& cut);
 
   /// Means of what each prescribed entry of the uncut body holds.

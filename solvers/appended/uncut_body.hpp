@@ -41,6 +41,7 @@ class UncutBody {
 
  private:
   void assemble();
+  void weigh(DisplacementMean& mean) const;
 
   Problem problem_;
   AssemblyReport report_;
