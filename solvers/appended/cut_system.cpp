@@ -26,6 +26,10 @@ Matrix3 held_components(const Prescribed& entry) {
   return held.asDiagonal();
 }
 
+constexpr double negative = 1e-9;   // of it: beyond rounding, the sum of energies is not one
+constexpr double superfluous = 1e9; // pivot of an unknown that is left out
+constexpr double redundant = 1e-13; // of a function's energy: what the others leave of it is rounding
+
 /// The lower Cholesky factor of a symmetric matrix in its lower triangle; zeros above. Returns the first column that is
 /// not positive, or -1.
 int factor_lower(MatrixX& matrix) {
@@ -594,7 +598,36 @@ void CutSystem::factor(Eigen::Index unchanged) {
       add_product(-1, beside, true, beside, corner);
       lower.bottomLeftCorner(rest, first) = beside.transpose();
     }
-    if (const int column = factor_lower(corner); column >= 0) {
+    const MatrixX whole = corner;
+    int column = factor_lower(corner);
+    const auto is_redundant = [&](Eigen::Index k) {
+      return corner(k, k) * corner(k, k) <
+             redundant * (elastic_(first + k, first + k) + penalty_(first + k, first + k));
+    };
+    bool repeats = column >= 0;
+    for (Eigen::Index k = 0; k < rest && !repeats; ++k)
+      repeats = is_redundant(k);
+    if (repeats) { // unknowns that the others make superfluous stay zero
+      corner = whole;
+      column = -1;
+      for (Eigen::Index k = 0; k < rest; ++k) {
+        VectorX below = corner.col(k).tail(rest - k);
+        below -= corner.block(k, 0, rest - k, k) * corner.row(k).head(k).transpose();
+        const double scale = elastic_(first + k, first + k) + penalty_(first + k, first + k);
+        if (!(below[0] > redundant * scale)) {
+          if (!(below[0] > -negative * scale)) {
+            column = static_cast<int>(k);
+            break;
+          }
+          corner.col(k).setZero();
+          corner(k, k) = superfluous * std::sqrt(scale);
+          continue;
+        }
+        corner.col(k).head(k).setZero();
+        corner.col(k).tail(rest - k) = below / std::sqrt(below[0]);
+      }
+    }
+    if (column >= 0) {
       const CutFunction& function = space_.functions()[unchanged + column / 3];
       const Vector3 x = function.is_front ? function.group.station.point : uncut_.nodes().positions[function.twin.node];
       throw NumericalError(

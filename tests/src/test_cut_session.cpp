@@ -62,8 +62,9 @@ TEST_CASE("A cut that is put off is the same cut in fewer increments") {
 }
 
 TEST_CASE("A pressurised disc opens, by about as much as in an infinite body, and keeps the volume of the block") {
+  const std::string sight = GENERATE(as<std::string>(), "enriched", "appended");
   Session session = session_of(replaced(cut_block, "fine_spacing = 0.005", "fine_spacing = 0.0035") + disc_precut +
-                               "pressure = 100\n");
+                               "pressure = 100\n[cut]\nsight = \"" + sight + "\"\n");
   REQUIRE(session.steps().size() == 1);
   const StepResult result = session.step(session.steps().front());
   REQUIRE(result.cut);
@@ -170,10 +171,11 @@ TEST_CASE("A box cut out of a block: lip nodes keep off the folds of its sheet, 
                               (k & 4) != 0 ? 0.026 : 0.008);
   topology::write_surface(folder.path() / "box.obj", box);
   const std::string coarse = GENERATE(as<std::string>(), "0.012", "0.009", "0.007");
-  const auto file =
-      write_file(folder.path() / "case.toml",
-                 replaced(cut_block, "coarse_spacing = 0.012", "coarse_spacing = " + coarse) +
-                     "[cut]\nunheld = \"hold\"\n[[precut]]\nshape = \"file\"\nfile = \"box.obj\"\npressure = 50\n");
+  const std::string sight = GENERATE(as<std::string>(), "enriched", "appended");
+  const auto file = write_file(folder.path() / "case.toml",
+                               replaced(cut_block, "coarse_spacing = 0.012", "coarse_spacing = " + coarse) +
+                                   "[cut]\nunheld = \"hold\"\nsight = \"" + sight +
+                                   "\"\n[[precut]]\nshape = \"file\"\nfile = \"box.obj\"\npressure = 50\n");
   Session session(read_scenario(file));
   const StepResult last = run(session).back();
   CHECK(last.cut->pieces == 2);
