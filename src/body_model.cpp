@@ -119,7 +119,7 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
 bool cut_appends(const Scenario& scenario) {
   const bool cuts = scenario.blade || !scenario.precuts.empty() || scenario.tearing.enabled;
   return cuts && scenario.method.method == solvers::Method::galerkin &&
-         scenario.cut.sight == solvers::SightRule::appended;
+         scenario.cut.sight.value_or(solvers::SightRule::appended) == solvers::SightRule::appended;
 }
 
 int BodyModel::nearest_seen(const Vector3& x) const {

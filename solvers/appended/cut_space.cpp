@@ -225,8 +225,8 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   found.push_back(std::move(function));
 }
 
-// A run of the front is curved where it turns by more than step_turn within a sphere, over most of its length. Corners,
-// such as that of a blade, are not counted.
+// A run of the front is curved where it turns by more than step_turn within a sphere, over most of its length; corners,
+// such as that of a blade, are not counted. A cut that is shallow behind its front counts as well.
 void CutSpace::find_curved_front() {
   const double most = options_.step_turn * std::numbers::pi / 180, corner = options_.corner * std::numbers::pi / 180;
   const std::vector<topology::FrontSegment>& front = incision_->front();
@@ -271,7 +271,11 @@ void CutSpace::find_curved_front() {
       const topology::FrontSegment& segment = front[run.segments[k]];
       const double own = (segment.to - segment.from).norm();
       length += own;
-      curved += std::max(turning(k, 1), turning(k, -1)) > most ? own : 0;
+      const int at = run.segments[k];
+      const Vector3 behind = middle[at] - options_.shallow * radius[at] * ahead[at];
+      const bool is_shallow =
+          domain_.signed_distance(behind) > 0 || !incision_->closest(behind, 0.5 * options_.shallow * radius[at]);
+      curved += is_shallow || std::max(turning(k, 1), turning(k, -1)) > most ? own : 0;
     }
     for (const int s : run.segments)
       curved_[s] = curved > 0.5 * length ? 1 : 0;

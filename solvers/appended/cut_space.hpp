@@ -16,6 +16,7 @@ struct CutSpaceOptions {
   /// most of its length; on straight ones, corners included, the front functions do as well with half as many.
   double step_reach = 1;
   double step_turn = 20; // degrees
+  double shallow = 1.2;  // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
   double corner = 45;    // degrees from one segment to the next: a corner, which is no curvature
 };
 
