@@ -350,7 +350,7 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   std::vector<CutFunction> wanted;
   for (const int node : concerned)
     add_twins(node, wanted);
-  std::vector<FrontGroup> groups = front_groups(*incision_, nodes_, options_.front, origins_);
+  std::vector<FrontGroup> groups = front_groups(*incision_, nodes_, options_.front);
 
   Change change;
   std::vector<CutFunction> next;

@@ -143,7 +143,6 @@ class CutSpace {
   std::vector<std::vector<int>> twins_of_, groups_of_; // places in functions_ by node
   std::vector<std::vector<double>> group_weights_;
   std::vector<std::vector<PartId>> faint_; // by node: hidden parts in its reach without a twin that weighs, ascending
-  std::vector<Vector3> origins_;           // of the runs of the front
   mutable std::vector<std::unique_ptr<PlacedPart>> places_; // by part; null: not asked for yet
   mutable std::vector<PartId> placed_;                      // those that are there
   /// Blended hats of a front group over the boxes of a cell.

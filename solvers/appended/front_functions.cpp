@@ -22,6 +22,14 @@ struct MeasuredRun : FrontRun {
   [[nodiscard]] double length() const { return measure.back(); }
 };
 
+/// Place of the vertex nearest to x in the order in which the vertices of a sheet came.
+std::ptrdiff_t age_of(const topology::SurfaceMesh& sheet, const Vector3& x) {
+  return std::min_element(
+             sheet.vertices.begin(), sheet.vertices.end(),
+             [&](const Vector3& a, const Vector3& b) { return (a - x).squaredNorm() < (b - x).squaredNorm(); }) -
+         sheet.vertices.begin();
+}
+
 using PointKey = std::array<double, 3>;
 PointKey key_of(const Vector3& x) {
   return {x.x(), x.y(), x.z()};
@@ -89,7 +97,7 @@ std::optional<FrontPlace> front_place(const topology::Incision& incision, const 
 }
 
 std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
-                                     const FrontOptions& options, std::vector<Vector3>& origins) {
+                                     const FrontOptions& options) {
   std::vector<FrontGroup> groups;
   const std::vector<topology::FrontSegment>& front = incision.front();
   if (front.empty() || options.radius <= 0 || options.rings < 1)
@@ -100,7 +108,6 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
   for (FrontRun& run : front_runs(incision))
     runs.push_back({std::move(run), {}, false});
   std::vector<int> run_of(front.size(), -1), place_in_run(front.size(), 0);
-  std::vector<Vector3> starts;
   for (int r = 0; r < std::ssize(runs); ++r) {
     MeasuredRun& run = runs[r];
     run.measure.assign(1, 0);
@@ -112,17 +119,12 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
                             (segment.to - segment.from).norm() / spacing_at(0.5 * (segment.from + segment.to)));
     }
     if (!run.closed) {
-      const Vector3 &first = front[run.segments.front()].from, &last = front[run.segments.back()].to;
-      double to_first = std::numeric_limits<double>::infinity(), to_last = to_first;
-      for (const Vector3& origin : origins) {
-        to_first = std::min(to_first, (first - origin).squaredNorm());
-        to_last = std::min(to_last, (last - origin).squaredNorm());
-      }
-      run.reversed = to_last < to_first;
-      starts.push_back(run.reversed ? last : first);
+      // The older end, whose place in the sheet came first: it stays where it is as the other end grows.
+      const topology::FrontSegment &first = front[run.segments.front()], &last = front[run.segments.back()];
+      run.reversed =
+          age_of(incision.sheets()[last.sheet], last.to) < age_of(incision.sheets()[first.sheet], first.from);
     }
   }
-  origins = std::move(starts);
 
   // Stations: an open run has one at either end.
   struct Stations {

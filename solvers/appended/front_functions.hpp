@@ -61,10 +61,10 @@ struct FrontGroup {
   }
 };
 
-/// The groups of all runs of the front. An open run is measured from its end nearest to one of `origins` (m, the first
-/// stations of an earlier call), so that stations stay where they are as the other end grows.
+/// The groups of all runs of the front. An open run is measured from its older end, so that stations stay where they
+/// are as the other end grows, and do not depend on the increments by which it has.
 std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
-                                     const FrontOptions& options, std::vector<Vector3>& origins);
+                                     const FrontOptions& options);
 
 /// Near-tip fields of unit intensity in the axes (ahead, normal, along): displacement of every mode in a column, m, and
 /// its derivatives ahead and along the normal.
