@@ -249,6 +249,7 @@ std::vector<DisplacementMean> SurfacePatches::means(const std::vector<Prescribed
                                                     const HeldRegion& held) const {
   if (!held.by_axis()) { // one region, shared out among all, whatever axes each holds its share along
     std::vector<int> nodes;
+    nodes.reserve(entries.size());
     for (const Prescribed& entry : entries)
       nodes.push_back(entry.node);
     return means(nodes, spheres, [&](const Vector3& x, const Vector3& normal) { return held(x, normal); });

@@ -81,7 +81,7 @@ std::vector<int> Session::press_surface(const ToolSettings* tool, const topology
     model.watch.emplace(model, *organ_.domain, zone_.spacing.fine, dropped_nodes(scenario_, *model.body));
   for (int round = 0;; ++round) {
     penetration_ = model.watch->depths(tool->shape, *pose, model.field, most_left_over);
-    const std::vector<int> beyond = touchable(penetration_->beyond, *pose, model);
+    std::vector<int> beyond = touchable(penetration_->beyond, *pose, model);
     if (!beyond.empty())
       return beyond;
     if (round == most_lifts || !lift_shares(*penetration_, *pose, model))

@@ -56,14 +56,17 @@ std::optional<Wound> without_splinters(const Wound& wound, double thinnest) {
   const auto largest = std::max_element(shapes.begin(), shapes.end(),
                                         [](const PieceShape& a, const PieceShape& b) { return a.size < b.size; });
   std::vector<char> pieces;
+  pieces.reserve(shapes.size());
   for (const PieceShape& shape : shapes)
     pieces.push_back(shape.size >= std::min(thinnest, largest->size) ? 1 : 0);
   if (std::find(pieces.begin(), pieces.end(), 0) == pieces.end())
     return std::nullopt;
   std::vector<char> components;
+  components.reserve(wound.components.size());
   for (const WoundComponent& component : wound.components)
     components.push_back(pieces[static_cast<std::size_t>(component.piece)]);
   std::vector<char> triangles;
+  triangles.reserve(wound.surface.triangles.size());
   std::vector<char> vertices(wound.surface.vertices.size(), 0);
   for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
     triangles.push_back(components[static_cast<std::size_t>(wound.component[t])]);

@@ -259,6 +259,7 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
         vertex_phi[v] = clipper.phi(vertex(v));
       if (surface != nullptr && surface->sharp_near(x, radius * h).any) {
         std::vector<Vector3> corners;
+        corners.reserve(vertex_count);
         for (int v = 0; v < vertex_count; ++v)
           corners.push_back(vertex(v));
         facets.emplace(*surface, x, h, corners);

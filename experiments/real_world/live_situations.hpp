@@ -5,8 +5,6 @@
 
 namespace spherecut::experiments {
 
-std::vector<Check> run_real_world(const ExperimentContext& context);
-
 namespace real_world {
 
 /// Clients that send fewer poses a second than the loop ticks, with jitter, loss and reordering.
