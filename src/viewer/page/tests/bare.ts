@@ -66,7 +66,7 @@ export async function openBare(address: string, args: string[]): Promise<Bare> {
       const ended = new Promise<void>((done) => child.once('exit', () => done()));
       child.kill('SIGKILL');
       await ended;
-      rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
+      rmSync(folder, { recursive: true, force: true, maxRetries: 30, retryDelay: 200 });
     },
   };
 }

@@ -37,7 +37,7 @@ export async function serve(
     const patience = setTimeout(() => child.kill('SIGKILL'), 10_000);
     await ended;
     clearTimeout(patience);
-    rmSync(folder, { recursive: true, force: true });
+    rmSync(folder, { recursive: true, force: true, maxRetries: 30, retryDelay: 200 });
   };
   const start = Date.now();
   for (;;) {
