@@ -3,6 +3,7 @@
 // including the condensation to the contact; the window covers the next `ahead` increments of the known path, or a fan
 // of +-45 degrees for an unknown one. Beside it: condensing anew (the background's work) and a full rebuild.
 // BM_cholesky_900 (bench_rebuild) is the yardstick of the machine.
+#include "solvers/appended/appended_body.hpp"
 #include "solvers/growing_body.hpp"
 #include "topology/blade.hpp"
 #include "topology/cut_sheets.hpp"
@@ -27,14 +28,15 @@ struct Scene {
   SprinkleOptions sprinkling;
   NodeCloud nodes;
   std::vector<bool> retired;
-  double travelled = 0, time = 0;
+  double travelled = 0, time = 0, poisson_ratio = 0.4;
 
-  explicit Scene(int target, Method method = Method::galerkin)
+  explicit Scene(int target, Method method = Method::galerkin, bool lips_apart = false)
       : sweep({{{0, 0, -depth}, {0, 0, 0.004}}, 1e-4}, domain, {.edge = 0.002}) {
     for (int k = 0; k < 24; ++k) // from outside to 15 mm inside
       advance();
     sprinkling.incision = sweep.incision();
     sprinkling.ring_ahead = wants_ring_ahead(method);
+    sprinkling.lips_apart = lips_apart;
     double low = 0.002, high = 0.02;
     for (int trial = 0; trial < 12; ++trial) {
       sprinkling.spacing.fine = sprinkling.spacing.coarse = std::sqrt(low * high);
@@ -57,7 +59,7 @@ struct Scene {
     p.domain = domain;
     p.incision = sweep.incision();
     p.nodes = nodes;
-    p.material = {5000, 0.4, 1000};
+    p.material = {5000, poisson_ratio, 1000};
     for (int i = 0; i < nodes.size(); ++i)
       if (nodes.kinds[i] != NodeKind::interior && nodes.positions[i].z() < -0.03 + 1e-9)
         p.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
@@ -154,6 +156,61 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
   state.counters["left_window"] = condensed;
 }
 
+/// The same where the cut appends unknowns, path unknown, at nu in hundredths: the time is that of the update and of
+/// the condensation to the contact, which follows it.
+void growth_by_appending(benchmark::State& state) {
+  constexpr int increments = 3;
+  using Clock = std::chrono::steady_clock;
+  const auto since = [](Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  };
+  double seconds = 0, condense_seconds = 0, sprinkle_seconds = 0, anew = 0;
+  int count = 0, unknowns = 0, nodes = 0;
+  for (auto _ : state) {
+    Scene scene(static_cast<int>(state.range(0)), Method::galerkin, true);
+    scene.poisson_ratio = 0.01 * static_cast<double>(state.range(1));
+    DiscretisationOptions options;
+    options.sight = SightRule::appended;
+    options.estimate_condition = false;
+    const std::vector<int> contact = scene.options(4, true, SightRule::appended).contact;
+    auto start = Clock::now();
+    AppendedBody body(scene.problem(), options);
+    anew += since(start);
+    benchmark::DoNotOptimize(body.contact_compliance(contact));
+    nodes = scene.nodes.size();
+    double own = 0;
+    for (int k = 0; k < increments; ++k) {
+      const auto before = scene.sweep.incision();
+      scene.advance();
+      start = Clock::now();
+      scene.sprinkling.incision = scene.sweep.incision();
+      const SprinkleIncrement change =
+          extend_sprinkling(*scene.domain, scene.sprinkling, scene.nodes, before.get(), scene.retired);
+      for (int j = 0; j < change.added.size(); ++j)
+        scene.nodes.add(change.added, j);
+      scene.retired.resize(scene.nodes.size(), false);
+      sprinkle_seconds += since(start);
+      start = Clock::now();
+      body.grow(change, scene.problem(), {}, true);
+      own += since(start);
+      start = Clock::now();
+      benchmark::DoNotOptimize(body.contact_compliance(contact));
+      condense_seconds += since(start);
+      own += since(start);
+      unknowns = body.coefficient_count() - 3 * body.sphere_count();
+      ++count;
+    }
+    seconds += own;
+    state.SetIterationTime(own / increments);
+  }
+  state.counters["nodes"] = nodes;
+  state.counters["appended"] = unknowns;
+  state.counters["grow_ms"] = 1e3 * (seconds - condense_seconds) / count;
+  state.counters["condense_ms"] = 1e3 * condense_seconds / count;
+  state.counters["sprinkle_ms"] = 1e3 * sprinkle_seconds / count;
+  state.counters["anew_ms"] = 1e3 * anew * increments / count;
+}
+
 /// The same with method collocation, whose body prepares itself; condensed to the contact with `condense_seconds`.
 void growth_of_collocation(benchmark::State& state, SightRule sight) {
   constexpr int increments = 3;
@@ -241,6 +298,9 @@ void growth_of_collocation(benchmark::State& state, SightRule sight) {
 void BM_growing_cut_collocation(benchmark::State& state) {
   growth_of_collocation(state, SightRule::enriched);
 }
+void BM_growing_cut_appended(benchmark::State& state) {
+  growth_by_appending(state);
+}
 void BM_growing_cut_enriched(benchmark::State& state) {
   growth(state, 3, false, SightRule::enriched);
 }
@@ -255,8 +315,17 @@ void at_three_sizes(benchmark::internal::Benchmark* benchmark) {
   benchmark->Arg(300)->Arg(1000)->Arg(2000)->UseManualTime()->Iterations(2)->Unit(benchmark::kMillisecond);
 }
 
+void at_three_sizes_and_two_ratios(benchmark::internal::Benchmark* benchmark) {
+  benchmark->ArgsProduct({{300, 1000, 2000}, {30, 49}})
+      ->ArgNames({"nodes", "nu"})
+      ->UseManualTime()
+      ->Iterations(2)
+      ->Unit(benchmark::kMillisecond);
+}
+
 } // namespace
 
+BENCHMARK(BM_growing_cut_appended)->Apply(at_three_sizes_and_two_ratios);
 BENCHMARK(BM_growing_cut_collocation)->Apply(at_three_sizes);
 BENCHMARK(BM_growing_cut_enriched)->Apply(at_three_sizes);
 BENCHMARK(BM_growing_cut_diffraction)->Apply(at_three_sizes);
