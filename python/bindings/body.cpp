@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::bindings {
 namespace {
@@ -52,38 +53,62 @@ Held held_from(const py::object& region, const std::array<bool, 3>& components, 
   return held;
 }
 
-void hold(const std::vector<Held>& all, solvers::Problem& problem) {
-  const solvers::NodeCloud& nodes = problem.nodes;
-  bool varies = false;
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    const std::size_t before = problem.prescribed.size();
-    for (int i = 0; i < nodes.size(); ++i) {
-      const solvers::NodeKind kind = nodes.kinds[static_cast<std::size_t>(i)];
-      const Vector3& x = nodes.positions[static_cast<std::size_t>(i)];
-      if ((kind == solvers::NodeKind::surface || kind == solvers::NodeKind::edge) &&
-          all[k].holds(x, nodes.normals[static_cast<std::size_t>(i)]))
-        problem.prescribed.push_back({i, all[k].components, all[k].at(x)});
-    }
-    if (problem.prescribed.size() == before)
-      throw InputError(fmt::format("held[{}]: no surface node lies in its region; allowed: at least one", k));
-    varies = varies || all[k].field;
+// The displacement of the first that holds an axis there; the normal is not known here, so a function's own region is
+// where its displacement is asked for.
+Vector3 first_displacement(const std::vector<Held>& all, const Vector3& x) {
+  Vector3 value = Vector3::Zero();
+  std::array<bool, 3> given{};
+  for (const Held& held : all) {
+    if (held.region && !held.region->holds(x))
+      continue;
+    const Vector3 here = held.at(x);
+    for (std::size_t a = 0; a < 3; ++a)
+      if (held.components[a] && !std::exchange(given[a], true))
+        value[static_cast<Eigen::Index>(a)] = here[static_cast<Eigen::Index>(a)];
   }
-  problem.prescribed_region = [all](const Vector3& x, const Vector3& normal, int axis) {
-    return std::any_of(all.begin(), all.end(), [&](const Held& held) {
-      return held.components[static_cast<std::size_t>(axis)] && held.holds(x, normal);
-    });
+  return value;
+}
+
+// Where several hold an axis of a node the first counts.
+void hold_nodes(const std::vector<Held>& all, solvers::Problem& problem) {
+  const solvers::NodeCloud& nodes = problem.nodes;
+  std::vector<int> count(all.size(), 0);
+  for (int i = 0; i < nodes.size(); ++i) {
+    const auto node = static_cast<std::size_t>(i);
+    if (nodes.kinds[node] != solvers::NodeKind::surface && nodes.kinds[node] != solvers::NodeKind::edge)
+      continue;
+    std::array<bool, 3> given{};
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      if (!all[k].holds(nodes.positions[node], nodes.normals[node]))
+        continue;
+      ++count[k];
+      std::array<bool, 3> axes{};
+      for (std::size_t a = 0; a < 3; ++a)
+        axes[a] = all[k].components[a] && !std::exchange(given[a], given[a] || all[k].components[a]);
+      if (axes != std::array{false, false, false})
+        problem.prescribed.push_back({i, axes, all[k].at(nodes.positions[node])});
+    }
+  }
+  for (std::size_t k = 0; k < all.size(); ++k)
+    if (count[k] == 0)
+      throw InputError(fmt::format("held[{}]: no surface node lies in its region; allowed: at least one", k));
+}
+
+void hold(const std::vector<Held>& all, solvers::Problem& problem) {
+  hold_nodes(all, problem);
+  const auto holds = [all](const Vector3& x, const Vector3& normal) {
+    return std::any_of(all.begin(), all.end(), [&](const Held& held) { return held.holds(x, normal); });
   };
-  if (!varies)
-    return;
-  problem.prescribed_field = [all](const Vector3& x) {
-    Vector3 value = Vector3::Zero();
-    for (const Held& held : all) // a function of the place alone: the normal is not known here
-      if (!held.region || held.region->holds(x))
-        for (Eigen::Index a = 0; a < 3; ++a)
-          if (held.components[static_cast<std::size_t>(a)])
-            value[a] = held.at(x)[a];
-    return value;
-  };
+  if (std::all_of(all.begin(), all.end(), [](const Held& h) { return h.components == std::array{true, true, true}; }))
+    problem.prescribed_region = holds;
+  else
+    problem.prescribed_region = [all](const Vector3& x, const Vector3& normal, int axis) {
+      return std::any_of(all.begin(), all.end(), [&](const Held& held) {
+        return held.components[static_cast<std::size_t>(axis)] && held.holds(x, normal);
+      });
+    };
+  if (std::any_of(all.begin(), all.end(), [](const Held& held) { return static_cast<bool>(held.field); }))
+    problem.prescribed_field = [all](const Vector3& x) { return first_displacement(all, x); };
 }
 
 std::shared_ptr<Body> body_from(std::shared_ptr<topology::Domain> domain, const solvers::NodeCloud& nodes,
