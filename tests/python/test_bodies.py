@@ -8,8 +8,9 @@ from conftest import block_nodes
 STRAIN = np.array([[0.01, 0.004, 0.0], [0.0, -0.005, 0.002], [0.003, 0.0, 0.007]])
 
 
-# The weak form integrates rational shape functions by quadrature: docs/experiments/patch_test.md.
-@pytest.mark.parametrize("method, bound", [("galerkin", 1e-3), ("collocation", 1e-10)])
+# The weak form integrates rational shape functions by quadrature: docs/experiments/patch_test.md. There 9 nodes a side are
+# right to 1e-3; here are 5.
+@pytest.mark.parametrize("method, bound", [("galerkin", 4e-3), ("collocation", 1e-10)])
 def test_linear_patch(method, bound):
     """A linear displacement of the foot, and the traction of its stress on the rest: linear inside, with Hooke's law."""
     domain, nodes = block_nodes()

@@ -9,6 +9,7 @@ import pytest
 import spherecut as sc
 
 TIMES = {"seconds", "topology_s", "level_sets_s", "visibility_s", "sprinkling_s", "assembly_s", "solve_s", "intensities_s"}
+COARSE = {"residual", "penetration_m", "rotation_deg", "force_jump", "imbalance_J"}  # printed with three digits
 
 
 @pytest.fixture(scope="module", params=["block_slice.toml", "peel.toml"])
@@ -51,7 +52,7 @@ def test_tables_are_those_of_the_command(runs):
                 elif isinstance(value, str):
                     assert row[column] == value
                 else:
-                    assert float(row[column]) == pytest.approx(float(value), rel=1e-3 if "resid" in column or "pene" in column or "rot" in column or "jump" in column or "imbalance" in column else 1e-8)
+                    assert float(row[column]) == pytest.approx(float(value), rel=1e-2 if column in COARSE else 1e-8)
 
 
 def test_frames_are_those_of_the_command_bit_by_bit(runs):
@@ -62,7 +63,7 @@ def test_frames_are_those_of_the_command_bit_by_bit(runs):
         assert (folder / "command" / "frames" / name).read_bytes() == (folder / "python" / "frames" / name).read_bytes()
     last = max(n for n in names if n.startswith("surface_"))
     data = (folder / "command" / "frames" / last).read_bytes()
-    blocks = data[data.index(b'encoding="raw">_') + 16 :]
+    blocks = data[data.index(b'encoding="raw">\n_') + 17 :]
     count = int(re.search(rb'NumberOfPoints="(\d+)"', data)[1])
     points = np.frombuffer(blocks, dtype="<f8", count=3 * count, offset=offset_of(data, b"<Points>") + 8).reshape(-1, 3)
     assert np.array_equal(points, frames[-1]["points"])
@@ -72,15 +73,15 @@ def offset_of(data, after):
     return int(re.search(rb'offset="(\d+)"', data[data.index(after) :])[1])
 
 
-def test_forces_of_a_press_bit_by_bit(tmp_path, source, command):
-    scenario = source / "scenarios" / "block_punch.toml"
+def test_forces_of_a_press_bit_by_bit(tmp_path, small, command):
+    scenario = small
     subprocess.run([command, "run", scenario, "--out", tmp_path / "run", "--threads", "1"], check=True, capture_output=True)
     run = sc.run(scenario)
     for row, force in zip(rows_of(tmp_path / "run" / "forces.csv"), run.forces["force_z_N"]):
         assert row["force_z_N"] == f"{force:.9g}"
     again = sc.run(sc.Scenario.from_text(scenario.read_text()))
     assert np.array_equal(run.forces["force_z_N"], again.forces["force_z_N"])
-    assert run.forces["force_z_N"].max() > 0.1
+    assert run.forces["force_z_N"].max() > 0.05
 
 
 @pytest.mark.parametrize(
@@ -90,11 +91,11 @@ def test_forces_of_a_press_bit_by_bit(tmp_path, source, command):
         ("poisson_ratio = 0.3", 'poisson_ratio = "much"\nhardness = 3'),
         ('shape = "block"', 'shape = "sponge"'),
         ("lower = [-0.06, -0.06, -0.001]\nupper = [0.06, 0.06, 0.001]", "lower = [1.0, 1.0, 1.0]\nupper = [2.0, 2.0, 2.0]"),
-        ("fine_spacing = 0.002", "fine_spacing = 0.2"),
+        ("fine_spacing = 0.003", "fine_spacing = 0.2"),
     ],
 )
-def test_words_are_those_of_the_command(tmp_path, source, command, old, new):
-    text = (source / "scenarios" / "block_punch.toml").read_text()
+def test_words_are_those_of_the_command(tmp_path, small, command, old, new):
+    text = small.read_text()
     assert old in text
     file = tmp_path / "bad.toml"
     file.write_text(text.replace(old, new))
@@ -105,12 +106,13 @@ def test_words_are_those_of_the_command(tmp_path, source, command, old, new):
     assert said.stderr.strip() == f"spherecut: error: {told.value}"
 
 
-def test_missing_files_and_taken_folders(tmp_path, source, command):
+def test_missing_files_and_taken_folders(tmp_path, small):
     with pytest.raises(sc.InputError, match="nowhere.toml"):
         sc.Scenario.read(tmp_path / "nowhere.toml")
-    sc.run(source / "scenarios" / "precut_disc.toml", tmp_path / "run")
+    done = sc.run(small, tmp_path / "run")
+    assert "forces.csv" in done.files and (tmp_path / "run" / "summary.json").exists()
     with pytest.raises(sc.InputError, match="run"):
-        sc.run(source / "scenarios" / "precut_disc.toml", tmp_path / "run")
+        sc.run(small, tmp_path / "run")
 
 
 def test_a_session_led_by_hand(source):
@@ -128,9 +130,9 @@ def test_a_session_led_by_hand(source):
     states = session.front_states()
     assert states and all(s.toughness == 1.0 for s in states)
     assert all(s.toughness == 7.0 for s in session.front_states(toughness=lambda x: 7.0))
-    with pytest.raises(sc.InputError, match="later|after|time"):
-        pose = path[5].blade
-        session.step(sc.Step(path[5].time - 0.05, None, sc.BladePose(path[5].time - 0.05, pose.position - [0, 0, 0.004])))
+    pose = path[5].blade
+    back = session.step(sc.Step(path[5].time - 0.05, None, sc.BladePose(path[5].time - 0.05, pose.position - [0, 0, 0.004])))
+    assert back.cut["refused"] and "does not come after" in back.cut["reason"]
     other = scenario.with_random_seed(5)
     assert other.random_seed == 5 and not np.array_equal(sc.Session(other).nodes.positions[-1], sc.Session(scenario).nodes.positions[-1])
 
