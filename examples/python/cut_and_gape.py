@@ -52,7 +52,8 @@ print(f"cut {1e4 * cuts['area_m2'][-1]:.2f} cm2, opened by {1e3 * cuts['opening_
       f"{cuts['nodes'][-1]} nodes, {cuts['pieces'][-1]} piece(s)")
 
 surface = run.session.surface()
-front_side = surface["points"][surface["triangles"]][surface["points"][surface["triangles"]][..., 1].max(axis=1) < -0.0149]
+at_rest = (surface["points"] - surface["displacement"])[surface["triangles"]]
+front_side = surface["points"][surface["triangles"]][at_rest[..., 1].max(axis=1) < -0.015 + 1e-6]
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4))
 left.plot(1e4 * cuts["area_m2"], 1e3 * cuts["opening_m"], "o-")
 left.set(xlabel="area of the cut [cm$^2$]", ylabel="opening [mm]", title="how it gapes")

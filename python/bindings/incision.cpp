@@ -198,7 +198,7 @@ void bind_blade(py::module_& module) {
             const VectorFunction map = vector_function(to_rest, "to_rest");
             return sweep_result(unlocked([&] { return self.move_to(pose, map); }));
           },
-          "time"_a, "position"_a, "orientation"_a = Doubles(array_of(Matrix3(Matrix3::Identity()))),
+          "time"_a, "position"_a, "orientation"_a = Doubles(owned(std::vector<double>{1, 0, 0, 0})),
           "to_rest"_a = py::none(),
           "Moves the blade's frame to position, (3,), m, turned by orientation: (3, 3), a rotation, or (4,), a unit "
           "quaternion w, x, y, z. The first call only places it. to_rest: function from a point of the deformed body "

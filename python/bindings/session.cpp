@@ -140,7 +140,7 @@ py::array quaternion(const topology::BladePose& pose) {
 void bind_samples(py::module_& module) {
   py::class_<topology::BladePose>(module, "BladePose", "Where the frame of a blade is at a time.")
       .def(py::init(&blade_pose_from), "time"_a, "position"_a,
-           "orientation"_a = Doubles(array_of(Matrix3(Matrix3::Identity()))),
+           "orientation"_a = Doubles(owned(std::vector<double>{1, 0, 0, 0})),
            "time: s. position: (3,), m. orientation: (3, 3), a rotation, or (4,), a unit quaternion w, x, y, z.")
       .def_readonly("time", &topology::BladePose::time, "s.")
       .def_property_readonly(

@@ -30,7 +30,7 @@ def thread_count() -> int:
 
 class Surface:
     """A triangulated surface that does not change: vertices, m, and triangles."""
-    def __init__(self, vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> None:
+    def __init__(self, vertices: npt.ArrayLike, triangles: npt.NDArray[Any]) -> None:
         """vertices: (n, 3), m. triangles: (m, 3) numbers of vertices, counter-clockwise seen from outside. Both are
         copied. Nothing but ranges is checked: check_surface() mends what comes from elsewhere.
         """
@@ -79,7 +79,7 @@ def check_surface(vertices: npt.ArrayLike, polygons: Any, name: str = 'surface',
 def read_surface(file: Union[str, PathLike[str]], scale: float = 1.0, pieces: str = 'refuse', cavities: str = 'keep') -> CheckedSurface:
     """check_surface() of an OBJ, PLY, STL, OFF, VTK or VTP file. scale: metres in a unit of the file."""
 
-def label_surface(labels: npt.ArrayLike, origin: npt.ArrayLike, axes: npt.ArrayLike, label: Optional[int] = None, name: str = 'labels') -> CheckedSurface:
+def label_surface(labels: npt.NDArray[Any], origin: npt.ArrayLike, axes: npt.ArrayLike, label: Optional[int] = None, name: str = 'labels') -> CheckedSurface:
     """Surface of the voxels of one label of a segmentation. labels: (i, j, k) whole numbers. origin: (3,), m, centre
     of voxel (0, 0, 0). axes: (3, 3), m; its columns lead from a voxel to the next along i, j and k. label: None
     takes the only one but 0. (SimpleITK's arrays are (k, j, i): transpose them.)
@@ -268,6 +268,12 @@ class BladeSweep:
     """A blade drawn through a body, and the sheets that its edge sweeps, in the body at rest."""
     def __init__(self, edge: npt.ArrayLike, domain: Domain, triangle_edge: float = 0.002, edge_radius: float = 0.0001) -> None:
         """edge: (n, 3), m, a polyline in the blade's frame. triangle_edge: m, of the sheets' triangles."""
+    def move_to(self, time: float, position: npt.ArrayLike, orientation: npt.ArrayLike = ..., to_rest: Any = None) -> dict[str, Any]:
+        """Moves the blade's frame to position, (3,), m, turned by orientation: (3, 3), a rotation, or (4,), a unit
+        quaternion w, x, y, z. The first call only places it. to_rest: function from a point of the deformed body to
+        its place at rest, both (3,), m. Returns a dict: triangles added, their area, m2, and refused, why none
+        were.
+        """
     def lift(self) -> None:
         """The next motion only places the blade."""
     @property
@@ -346,7 +352,7 @@ class NodeKind:
 
 class Nodes:
     """Nodes of a body at rest. They do not change; the arrays are their own memory."""
-    def __init__(self, positions: npt.ArrayLike, spacings: npt.ArrayLike, kinds: npt.ArrayLike, normals: Optional[npt.ArrayLike] = None, reaches: Optional[npt.ArrayLike] = None) -> None:
+    def __init__(self, positions: npt.ArrayLike, spacings: npt.ArrayLike, kinds: npt.NDArray[Any], normals: Optional[npt.ArrayLike] = None, reaches: Optional[npt.ArrayLike] = None) -> None:
         """positions: (n, 3), m. spacings, reaches: (n,), m. kinds: (n,) numbers of NodeKind. normals: (n, 3) unit,
         outward at surface and edge nodes. All are copied.
         """
@@ -474,7 +480,7 @@ class Field:
 
 class Held:
     """A part of a body's surface whose displacement is given."""
-    def __init__(self, region: Any, components: Sequence[bool[3]] = [True, True, True], displacement: Any = None) -> None:
+    def __init__(self, region: Any, components: Sequence[bool] = [True, True, True], displacement: Any = None) -> None:
         """region: a Region, or a function of x, (3,), m, and normal, (3,), that tells whether the surface is held
         there. components: which axes are held. displacement: (3,), m, or a function of x; None: zero.
         """
@@ -498,9 +504,9 @@ class Body:
         """PointValues of the field at points, (n, 3), m. Raises InputError for a point that no sphere covers."""
     def nodal_displacements(self, field: Field) -> npt.NDArray[Any]:
         """(n, 3), m, at the nodes."""
-    def contact_displacements(self, nodes: npt.ArrayLike, field: Field) -> npt.NDArray[Any]:
+    def contact_displacements(self, nodes: npt.NDArray[Any], field: Field) -> npt.NDArray[Any]:
         """(k, 3), m: conjugate to a force on each node: with 'galerkin' the mean over its share."""
-    def force_response(self, nodes: npt.ArrayLike, forces: npt.ArrayLike) -> Field:
+    def force_response(self, nodes: npt.NDArray[Any], forces: npt.ArrayLike) -> Field:
         """Field of forces, (k, 3), N, on nodes, (k,), without the body's own loads."""
     def constraint_forces(self, field: Field) -> npt.NDArray[Any]:
         """(k, 3), N, on the body, of every entry that is held; see held_nodes."""
@@ -509,7 +515,7 @@ class Body:
         """(k,): the node of every entry that is held."""
     def load_work(self, field: Field) -> float:
         """J: work of the loads on the displacements of the field."""
-    def residual(self, field: Field, nodes: Optional[npt.ArrayLike] = None, forces: Optional[npt.ArrayLike] = None) -> float:
+    def residual(self, field: Field, nodes: Optional[npt.NDArray[Any]] = None, forces: Optional[npt.ArrayLike] = None) -> float:
         """Largest unbalanced force over the largest force, under the loads and forces, (k, 3), N, on nodes, (k,)."""
     @property
     def nodes(self) -> Nodes:
@@ -544,7 +550,7 @@ class ContactPatch:
     def base_displacement(self) -> npt.NDArray[Any]:
         """(m, 3), m, without a tool."""
 
-def condense(body: Body, nodes: npt.ArrayLike) -> ContactPatch:
+def condense(body: Body, nodes: npt.NDArray[Any]) -> ContactPatch:
     """ContactPatch of surface nodes, (m,), none of them held."""
 
 class ContactState:
@@ -746,9 +752,16 @@ class Scenario:
         """(n, 3), m, in the blade's frame; None without a blade."""
     def toughness_at(self, points: npt.ArrayLike) -> npt.NDArray[Any]:
         """(n,), J/m2: toughness with its layers at points, (n, 3), m, of the body at rest."""
+    @property
+    def random_seed(self) -> int:
+        """Of its nodes."""
+    def with_random_seed(self, seed: int) -> Scenario:
+        """The same scenario with other nodes: nodes.random_seed. Its text stays what it was."""
 
 class BladePose:
     """Where the frame of a blade is at a time."""
+    def __init__(self, time: float, position: npt.ArrayLike, orientation: npt.ArrayLike = ...) -> None:
+        """time: s. position: (3,), m. orientation: (3, 3), a rotation, or (4,), a unit quaternion w, x, y, z."""
     @property
     def time(self) -> float:
         """s."""

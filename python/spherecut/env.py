@@ -177,7 +177,7 @@ class CuttingEnv(_Base):  # type: ignore[misc]
         if scenario is None:
             scenario = default_scenario()
         self.scenario = scenario if isinstance(scenario, Scenario) else Scenario.read(scenario)
-        self._options = dict(
+        self._options: dict[str, Any] = dict(
             holds=tuple(holds), speed=speed, time_step=time_step, most_steps=most_steps, places=places, reward=reward,
             margin=margin, beside=beside,
         )
@@ -187,9 +187,9 @@ class CuttingEnv(_Base):  # type: ignore[misc]
                 raise InputError(f"holds: '{name}'; allowed: {', '.join(n for n in there if there[n])} in this scenario")
         if len(holds) == 0:
             raise InputError("holds: nothing; allowed: blade, tool, or both")
-        for name, value in {"speed": speed, "time_step": time_step}.items():
+        for what, value in {"speed": speed, "time_step": time_step}.items():
             if not 0 < value < np.inf:
-                raise InputError(f"{name}: {value:g}; allowed: above 0")
+                raise InputError(f"{what}: {value:g}; allowed: above 0")
         if most_steps < 1 or places < 0:
             raise InputError(f"most_steps: {most_steps}, places: {places}; allowed: from 1, from 0")
         self.action_space = _Box(-1.0, 1.0, shape=(3 * len(holds),), dtype=np.float64)
@@ -272,7 +272,8 @@ class CuttingEnv(_Base):  # type: ignore[misc]
         self.session = None
 
     def _sample(self) -> Step:
-        tool = None if self._tool is None else self.scenario.tool.pose_at(self._at["tool"], self._tool.axis)
+        shape = self.scenario.tool
+        tool = None if shape is None or self._tool is None else shape.pose_at(self._at["tool"], self._tool.axis)
         blade = None if self._turn is None else BladePose(self._time, self._at["blade"], self._turn)
         return Step(self._time, tool, blade)
 
@@ -296,7 +297,7 @@ class CuttingEnv(_Base):  # type: ignore[misc]
     def _along_front(self) -> Array:
         """G at places evenly along the front of the cut that the body follows."""
         assert self.session is not None
-        places = self._options["places"]
+        places = int(self._options["places"])
         try:
             states = self.session.front_states()
         except NumericalError:  # a front too short for the nodes
@@ -304,7 +305,8 @@ class CuttingEnv(_Base):  # type: ignore[misc]
         if not states:
             return np.zeros(places)
         values = np.array([s.release for s in states])
-        return np.interp(np.linspace(0, len(values) - 1, places), np.arange(len(values)), values)
+        release: Array = np.interp(np.linspace(0, len(values) - 1, places), np.arange(len(values)), values)
+        return release
 
     def _revive(self) -> None:
         """A copy goes through the actions of the original."""
