@@ -13,6 +13,9 @@ namespace spherecut::solvers {
 
 namespace {
 
+/// Halving a cell that is a little too large would cost eight times the points: where the spacing is graded, cells
+/// range from slack / 2 to slack times the size asked for.
+constexpr double slack = 1.6;
 /// Parts of cells this near to a front, in half diagonals, have their points placed for what is singular there.
 constexpr double front_reach = 2;
 /// Samples of a part count as this far from the front at least, in half edges of the part.
@@ -326,7 +329,7 @@ class Octree {
       return;
     const double longest = 2 * half.maxCoeff(), spacing = spacing_near(centre);
     // A coarse node may be nearest to the centre while fine ones sit in a corner: large cells always divide.
-    if (longest > options_.slack * options_.cell_size * spacing || holds_finer_node(centre, half)) {
+    if (longest > slack * options_.cell_size * spacing || holds_finer_node(centre, half)) {
       std::array<int, 3> parts{};
       for (int c = 0; c < 3; ++c)
         parts[c] = half[c] > 0.3 * longest ? 2 : 1;
@@ -374,7 +377,7 @@ BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud
 
 bool is_too_large(const BackgroundBox& box, const Vector3& x, double spacing, const BackgroundOptions& options) {
   return ((x - box.centre).cwiseAbs().array() <= box.half.array()).all() &&
-         2 * box.half.maxCoeff() > finer_node_slack * options.slack * options.cell_size * spacing;
+         2 * box.half.maxCoeff() > finer_node_slack * slack * options.cell_size * spacing;
 }
 
 void refill_box(const topology::Domain& domain, const BackgroundBox& box, const BackgroundOptions& options,

@@ -30,14 +30,11 @@ struct BackgroundCells {
 };
 
 struct BackgroundOptions {
-  double cell_size = 1.0; // edge of a cell that is asked for, in units of the local spacing h
+  double cell_size = 1.0; // largest edge of a cell, in units of the local spacing h
   int quadrature = 2;     // rule of a cell, exact to degree 2 quadrature - 1: 1, 2 or 3
   // The basis is enriched at the front of an incision: what is integrated goes with 1 / r there, and points are placed
   // for that.
   bool enriched = true;
-  // Halving a cell that is a little too large would cost eight times the points: where the spacing is graded, cells
-  // range from slack / 2 to slack times the size asked for.
-  double slack = 1.6;
 };
 
 /// Cells inside the body carry their centre (rule 1), six points (2) or 3 x 3 x 3 Gauss points (3). Cells that meet the

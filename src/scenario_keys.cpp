@@ -283,7 +283,7 @@ constexpr std::array keys = {
         "",
         "How a sphere reaches around a cut: it ends where the cut hides its node, it bends around the front, it "
         "bends and the basis gains the field of a crack front, or it stays what it is and the cut appends functions "
-        "(method galerkin). Left out: appended with method galerkin, enriched with collocation.",
+        "(method galerkin). Left out: the method's own.",
         {},
         "visibility, diffraction, enriched, appended"},
     ScenarioKey{"cut.lips",
@@ -331,10 +331,9 @@ constexpr std::array keys = {
         "blade.advance", number, "", "",
         "Fine spacings that the edge goes before wound and body follow its cut; 0: they do in every step. What is "
         "put off is cut by the way that the edge took, at the latest when it leaves the body or the run ends. "
-        "It tells where steps are shorter than that: in real time, or with a small blade.step. Left out: 0 where the "
-        "cut appends, else 0.5 in real time, where the body then follows beside the steps, and 0 elsewhere. Above 0 "
-        "not with material.toughness, which in real time lets the blade cut beside the steps as well where this is "
-        "left out.",
+        "It tells where steps are shorter than that: in real time, or with a small blade.step. Left out: 0.5 in real "
+        "time, where the body then follows beside the steps, and 0 elsewhere. Above 0 not with material.toughness, "
+        "which in real time lets the blade cut beside the steps as well where this is left out.",
         from(0, 1)},
     ScenarioKey{"blade.path", array_of_tables, "", "required",
                 "Poses of the blade, between which it moves evenly; at least two. It cuts whatever its edge sweeps."},

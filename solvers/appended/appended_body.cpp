@@ -100,7 +100,6 @@ AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options
   space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
                                       problem_.material, CutSpaceOptions{});
   system_ = std::make_unique<CutSystem>(*uncut_, *space_);
-  places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
   follow(everywhere(problem_));
 }
 
@@ -112,10 +111,9 @@ void AppendedBody::follow(const BoundingBox& region) {
     change = space_->update(problem_.incision, region);
   find_pieces();
   system_->update(change, loose_);
-  KeptPlaces::IsDropped is_dropped_at;
-  if (!dropped_.empty())
-    is_dropped_at = [this](const Vector3& x) { return is_dropped(space_->cut().part_at(x, *problem_.incision)); };
-  places_->follow(problem_, region, change, std::move(is_dropped_at));
+  contacts_.clear();
+  patches_.reset();
+  nodal_.clear();
   assemble_loads();
   report_.nodes = problem_.nodes.size();
   report_.unknowns = coefficient_count();
@@ -142,7 +140,6 @@ BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown,
     space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
                                         problem_.material, CutSpaceOptions{});
     system_ = std::make_unique<CutSystem>(*uncut_, *space_);
-    places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
     follow(everywhere(problem_));
     throw;
   }
@@ -204,14 +201,15 @@ void AppendedBody::assemble_loads() {
   ShapeFunctions shape;
   CutTerms terms;
   const auto add = [&](const Vector3& x, const Vector3& force) {
-    const PartId part = space_->part_at(x);
-    if (is_dropped(part))
+    const PartId part = incision != nullptr ? space_->cut().part_at(x, *incision) : 0;
+    if (incision != nullptr && is_dropped(part))
       return;
-    uncut_->boxes().evaluate(box_of(part), x, shape);
-    space_->take_out_faint(x, part, shape);
-    space_->terms_at(x, part, shape, terms);
+    if (!evaluate(uncut_->spheres(), x, shape))
+      throw NumericalError(
+          fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
     for (int k = 0; k < shape.size(); ++k)
       loads_.base.col(0).segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
+    space_->terms_at(x, part, shape, terms);
     for (const ScalarTerm& term : terms.scalar)
       loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(term.function)) += term.value * force;
     for (const FrontTerm& term : terms.front)
@@ -221,65 +219,55 @@ void AppendedBody::assemble_loads() {
   const Matrix3 initial = initial_stress(problem_);
   const SmallBoxes& boxes = uncut_->boxes();
   if (loads.body_force || !initial.isZero(0)) {
-    // What acts on the functions of the uncut body is the same whatever is cut, but for parts that are left out.
-    if (uncut_loads_.size() == 0 || !dropped_.empty()) {
-      uncut_loads_ = VectorX::Zero(loads_.base.rows());
-      for (int box = 0; box < boxes.size(); ++box) {
-        double left = 0;
-        for (int k = 0; k < space_->cut().part_count(box); ++k)
-          left += is_dropped(part_id(box, k)) ? 0 : space_->cut().part(part_id(box, k)).share;
-        if (left == 0)
+    for (int box = 0; box < boxes.size(); ++box) {
+      const BoxShapes& cell = boxes.cells()[boxes.cell_of(box)];
+      const int lane = boxes.lane_of(box);
+      for (int k = 0; k < space_->cut().part_count(box); ++k) {
+        if (is_dropped(part_id(box, k)))
           continue;
-        const BoxShapes& cell = boxes.cells()[boxes.cell_of(box)];
-        const int lane = boxes.lane_of(box);
-        const double volume = left * boxes.boxes()[box].volume;
+        const CutPart part = space_->cut().part(part_id(box, k));
+        const double volume = part.share * boxes.boxes()[box].volume;
         const Vector3 force =
-            loads.body_force ? Vector3(volume * loads.body_force(boxes.boxes()[box].middle)) : Vector3(Vector3::Zero());
-        for (std::size_t n = 0; n < cell.nodes.size(); ++n)
-          uncut_loads_.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[n])) +=
-              cell.value_at(n, lane) * force + volume * initial * cell.gradient_at(n, lane);
+            loads.body_force ? Vector3(volume * loads.body_force(part.centroid)) : Vector3(Vector3::Zero());
+        for (std::size_t n = 0; n < cell.nodes.size(); ++n) {
+          const Vector3 gradient = cell.gradient_at(n, lane);
+          const double value = cell.value_at(n, lane) + gradient.dot(part.centroid - boxes.boxes()[box].middle);
+          loads_.base.col(0).segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[n])) +=
+              value * force + volume * initial * gradient;
+        }
       }
     }
-    loads_.base.col(0) = uncut_loads_;
-    if (!dropped_.empty())
-      uncut_loads_.resize(0);
-    const auto volume_of = [&](PartId id) { return space_->cut().part(id).share * boxes.boxes()[box_of(id)].volume; };
-    const auto weight_of = [&](PartId id) -> Vector3 {
-      return loads.body_force ? Vector3(volume_of(id) * loads.body_force(space_->cut().part(id).centroid))
-                              : Vector3(Vector3::Zero());
-    };
-    for (const int cell : space_->cells_of_groups(0))
-      space_->for_each_front_term(0, cell, [&](PartId part, int sample, const FrontTerm& term) {
-        if (is_dropped(part))
-          return;
-        auto to = loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(term.function));
-        const double share = space_->samples(part)[sample].share;
-        to += share * term.value.transpose() * weight_of(part);
-        for (int m = 0; m < 3; ++m)
-          to[m] += share * volume_of(part) * initial.cwiseProduct(term.gradient[m]).sum();
-      });
     for (int k = 0; k < std::ssize(space_->functions()); ++k) {
       const CutFunction& function = space_->functions()[k];
       auto to = loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(k));
-      if (function.is_front)
-        continue;
-      PartId last = -1;
-      for (const PartId id : system_->parts_of(k)) {
-        if (id == last || is_dropped(id))
-          continue;
-        last = id;
-        ScalarTerm term;
-        if (!function.twin.is_step) { // its value is that at the middle of the box
-          if (!space_->term_at(k, id, 0, term))
-            continue;
-          const Vector3 off = space_->cut().part(id).centroid - boxes.boxes()[box_of(id)].middle;
-          to += (term.value + term.gradient.dot(off)) * weight_of(id) + volume_of(id) * initial * term.gradient;
-          continue;
+      const auto volume_of = [&](PartId id) { return space_->cut().part(id).share * boxes.boxes()[box_of(id)].volume; };
+      const auto weight_of = [&](PartId id) -> Vector3 {
+        return loads.body_force ? Vector3(volume_of(id) * loads.body_force(space_->cut().part(id).centroid))
+                                : Vector3(Vector3::Zero());
+      };
+      if (function.is_front) {
+        std::vector<PartId> parts;
+        std::vector<FrontTerm> front;
+        for (const int cell : space_->cells_of(function)) {
+          space_->terms_in(k, cell, parts, front);
+          for (std::size_t e = 0; e < parts.size(); ++e) {
+            if (is_dropped(parts[e]))
+              continue;
+            to += front[e].value.transpose() * weight_of(parts[e]);
+            for (int m = 0; m < 3; ++m)
+              to[m] += volume_of(parts[e]) * initial.cwiseProduct(front[e].gradient[m]).sum();
+          }
         }
-        const PlacedPart& samples = space_->samples(id);
-        for (int n = 0; n < std::ssize(samples); ++n)
-          if (space_->term_at(k, id, n, term))
-            to += samples[n].share * (term.value * weight_of(id) + volume_of(id) * initial * term.gradient);
+        continue;
+      }
+      for (const PartId id : system_->parts_of(k)) {
+        ScalarTerm term;
+        if (is_dropped(id) || !space_->term_at(k, id, term))
+          continue;
+        // Of a twin with an indicator the value is that at the middle of the box.
+        const Vector3 off = space_->cut().part(id).centroid - boxes.boxes()[box_of(id)].middle;
+        const double value = function.twin.is_step ? term.value : term.value + term.gradient.dot(off);
+        to += value * weight_of(id) + volume_of(id) * initial * term.gradient;
       }
     }
   }
@@ -296,13 +284,31 @@ void AppendedBody::assemble_loads() {
 
 // ---- places
 
+CutFunctional AppendedBody::mean_over(std::vector<QuadraturePoint> points) const {
+  if (!dropped_.empty())
+    std::erase_if(points, [&](const QuadraturePoint& point) {
+      return is_dropped(space_->cut().part_at(point.position, *problem_.incision));
+    });
+  return system_->mean_over(points);
+}
+
 CutFunctional AppendedBody::value_at(const Vector3& x) const {
-  return places_->mean_over({{x, 1}});
+  return mean_over({{x, 1}});
+}
+
+const AppendedBody::Contact& AppendedBody::contact(int node) const {
+  const auto known = contacts_.find(node);
+  if (known != contacts_.end())
+    return known->second;
+  if (patches_ == nullptr)
+    patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
+  const DisplacementMean mean = patches_->contact_mean(node, uncut_->spheres(), problem_);
+  return contacts_.emplace(node, Contact{mean_over(mean.share), mean.centroid}).first->second;
 }
 
 Vector3 AppendedBody::contact_point(int node) const {
   require_nodes({node});
-  return places_->contact(node).centroid;
+  return contact(node).centroid;
 }
 
 std::vector<Vector3> AppendedBody::constraint_points() const {
@@ -331,7 +337,6 @@ void AppendedBody::shape_at(const Vector3& x, ShapeFunctions& shape) const {
       std::fill(of->begin(), of->end(), 0.0);
     return;
   }
-  space_->take_out_faint(x, part, shape);
   space_->terms_at(x, part, shape, terms);
   for (const ScalarTerm& term : terms.scalar) {
     shape.nodes.push_back(uncut_->size() + term.function);
@@ -353,23 +358,24 @@ PointState AppendedBody::at(const Vector3& x, const Field& field) const {
 
 VectorX AppendedBody::nodal_displacements(const Field& field) const {
   require_own(field);
+  if (nodal_.empty())
+    for (const Vector3& x : problem_.nodes.positions)
+      nodal_.push_back(value_at(x));
   const CutVectors parts = split(field.coefficients);
-  VectorX displacements(3 * static_cast<Eigen::Index>(problem_.nodes.size()));
-  for (int i = 0; i < problem_.nodes.size(); ++i)
-    displacements.segment<3>(3 * static_cast<Eigen::Index>(i)) =
-        CutSystem::value(places_->at_node(i), parts.base, parts.cut);
+  VectorX displacements(3 * std::ssize(nodal_));
+  for (Eigen::Index i = 0; i < std::ssize(nodal_); ++i)
+    displacements.segment<3>(3 * i) = CutSystem::value(nodal_[i], parts.base, parts.cut);
   return displacements;
 }
 
 MatrixX AppendedBody::contact_displacements(const std::vector<int>& nodes, const std::vector<Field>& fields) const {
   require_nodes(nodes);
   require_own(fields);
-  places_->require(nodes);
   MatrixX displacements(3 * std::ssize(nodes), std::ssize(fields));
   for (Eigen::Index f = 0; f < std::ssize(fields); ++f) {
     const CutVectors parts = split(fields[f].coefficients);
     for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
-      displacements.col(f).segment<3>(3 * c) = CutSystem::value(places_->contact(nodes[c]).mean, parts.base, parts.cut);
+      displacements.col(f).segment<3>(3 * c) = CutSystem::value(contact(nodes[c]).mean, parts.base, parts.cut);
   }
   return displacements;
 }
@@ -450,22 +456,20 @@ std::vector<Field> AppendedBody::fields_of(const CutVectors& solutions) const {
 }
 
 CutVectors AppendedBody::unit_forces(const std::vector<int>& nodes) const {
-  places_->require(nodes);
   CutVectors loads = system_->zero(3 * std::ssize(nodes));
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
     for (int axis = 0; axis < 3; ++axis)
-      CutSystem::add_force(places_->contact(nodes[c]).mean, Vector3::Unit(axis), 3 * c + axis, loads);
+      CutSystem::add_force(contact(nodes[c]).mean, Vector3::Unit(axis), 3 * c + axis, loads);
   return loads;
 }
 
 CutVectors AppendedBody::case_forces(const std::vector<int>& nodes, const MatrixX& forces) const {
   require_cases(nodes, forces);
-  places_->require(nodes);
   CutVectors loads = system_->zero(forces.cols());
   for (Eigen::Index c = 0; c < std::ssize(nodes); ++c)
     for (Eigen::Index k = 0; k < forces.cols(); ++k)
       if (const Vector3 force = forces.col(k).segment<3>(3 * c); !force.isZero(0))
-        CutSystem::add_force(places_->contact(nodes[c]).mean, force, k, loads);
+        CutSystem::add_force(contact(nodes[c]).mean, force, k, loads);
   return loads;
 }
 
@@ -484,19 +488,20 @@ CaseResponses AppendedBody::condense_cases(const std::vector<int>& nodes, const 
   const CutVectors cases = system_->half_solutions(case_forces(nodes, forces));
   CaseResponses responses;
   responses.among = CutSystem::compliance(cases, cases);
-  responses.at = CutSystem::compliance(places_->unit_halves(at), cases);
+  responses.at = CutSystem::compliance(system_->half_solutions(unit_forces(at)), cases);
   return responses;
 }
 
 MatrixX AppendedBody::contact_compliance(const std::vector<int>& candidates) const {
   require_nodes(candidates);
-  return places_->compliance(candidates);
+  const CutVectors half = system_->half_solutions(unit_forces(candidates));
+  return CutSystem::compliance(half, half);
 }
 
 MatrixX AppendedBody::compliance_between(const std::vector<int>& at, const std::vector<int>& forced) const {
   require_nodes(at);
   require_nodes(forced);
-  return CutSystem::compliance(places_->unit_halves(at), places_->unit_halves(forced));
+  return CutSystem::compliance(system_->half_solutions(unit_forces(at)), system_->half_solutions(unit_forces(forced)));
 }
 
 std::vector<Field> AppendedBody::pattern_responses(const std::vector<ForcePattern>& patterns) const {
@@ -549,7 +554,7 @@ double AppendedBody::residual(const Field& field, const std::vector<int>& loaded
   applied.base *= field.load_factor;
   applied.cut *= field.load_factor;
   for (std::size_t k = 0; k < loaded_nodes.size(); ++k)
-    CutSystem::add_force(places_->contact(loaded_nodes[k]).mean, nodal_forces[k], 0, applied);
+    CutSystem::add_force(contact(loaded_nodes[k]).mean, nodal_forces[k], 0, applied);
   CutVectors rows = system_->elastic_forces(parts.base, parts.cut);
   system_->subtract_holding(parts.base, parts.cut, base_prescribed(field.prescribed),
                             field.load_factor != 0 ? problem_.prescribed_field : nullptr, rows);

@@ -3,7 +3,7 @@
 // touch and openings are told. They come after all other nodes.
 #pragma once
 
-#include "solvers/appended/kept_places.hpp"
+#include "solvers/appended/cut_system.hpp"
 #include "solvers/growing_body.hpp"
 
 #include <memory>
@@ -62,10 +62,17 @@ class AppendedBody final : public Discretisation, public Growable {
   [[nodiscard]] Vector3 front_intensities(const Field& field, const topology::FrontFrame& front) const;
 
  private:
+  struct Contact {
+    CutFunctional mean;
+    Vector3 centroid = Vector3::Zero();
+  };
   void follow(const BoundingBox& region);
   void find_pieces();
   void assemble_loads();
+  [[nodiscard]] const Contact& contact(int node) const;
   [[nodiscard]] CutFunctional value_at(const Vector3& x) const;
+  /// Mean over the points that have not left the computation: nothing moves the others.
+  [[nodiscard]] CutFunctional mean_over(std::vector<QuadraturePoint> points) const;
   [[nodiscard]] bool is_dropped(PartId part) const { return !dropped_.empty() && dropped_[components_.of(part)] != 0; }
   [[nodiscard]] CutVectors split(const VectorX& coefficients) const;
   [[nodiscard]] std::vector<Field> fields_of(const CutVectors& solutions) const;
@@ -86,8 +93,9 @@ class AppendedBody final : public Discretisation, public Growable {
   std::vector<char> dropped_;           // by component of the cut; empty: none
   CutBoxes::Components components_;
   CutVectors loads_;
-  VectorX uncut_loads_; // body force and initial stress on the functions of the uncut body; empty: not known
-  std::unique_ptr<KeptPlaces> places_; // what they keep is found as it is asked for
+  mutable std::unique_ptr<SurfacePatches> patches_;
+  mutable std::unordered_map<int, Contact> contacts_;
+  mutable std::vector<CutFunctional> nodal_; // values at the nodes; empty: not asked for yet
 };
 
 /// A body of method galerkin with rule `appended`, on `uncut` where that fits its nodes (else, or where it is null, on

@@ -10,7 +10,7 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double least_share = 1e-6; // of a box: a smaller part is given to the largest one
+constexpr double least_share = 0.01; // of a box: a smaller part is given to the largest one
 constexpr int samples_along = 4;     // of a box where one plane is not the whole cut
 
 Vector3 corner_of(const SmallBox& box, int k, double factor) {

@@ -10,18 +10,16 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double near_front_boxes = 3; // half diagonals of a box: nearer to a front its octants count one by one
-constexpr int front_samples_along = 4; // an edge of such a box
-constexpr double faint = 1e-4;         // of a sphere's energy: less of it beyond a cut says nothing of the places there
+constexpr double near_front_boxes = 3;  // half diagonals of a box: nearer to a front its place is a harmonic mean
+constexpr int harmonic_samples = 4;     // along an edge of the box
 constexpr double nearest_sample = 0.05; // half diagonals: samples count as this far from the front at least
 
 } // namespace
 
 CutSpace::CutSpace(const SmallBoxes& boxes, const topology::Domain& domain, const NodeCloud& nodes,
                    const Spheres& spheres, const Material& material, CutSpaceOptions options)
-    : boxes_(boxes), domain_(domain), nodes_(nodes), spheres_(spheres), material_(material), options_(options),
-      cut_(boxes, domain), twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()),
-      group_weights_(nodes.positions.size()), faint_(nodes.positions.size()),
+    : boxes_(boxes), nodes_(nodes), spheres_(spheres), material_(material), options_(options), cut_(boxes, domain),
+      twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()), group_weights_(nodes.positions.size()),
       places_(most_parts * static_cast<std::size_t>(boxes.size())),
       local_(most_parts * static_cast<std::size_t>(boxes.size()), -1), reach_(nodes.positions.size()) {
   const double widest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
@@ -63,74 +61,45 @@ double CutSpace::step(const FrontPlace* place, const Vector3& x, double length, 
   return side * t * (15 - 10 * squared + 3 * squared * squared) / 8;
 }
 
-// What is integrated goes with 1 / r. The octants of a part near the front count one by one, and the place of each
-// stands where r is its harmonic mean over the octant.
-PlacedPart CutSpace::sampled(PartId part, const FrontPlace& middle) const {
-  const CutPart whole = cut_.part(part);
-  const SmallBox& box = boxes_.boxes()[box_of(part)];
-  const double radius = box.half.norm();
-  const bool divided = cut_.part_count(box_of(part)) > 1;
-  const Vector3 half = box.half / front_samples_along;
-  const Matrix3 across =
-      middle.grad_ahead * middle.grad_ahead.transpose() + middle.grad_above * middle.grad_above.transpose();
-  topology::SheetPoint sheet; // no part of an undivided box lies beyond it
-  if (const auto nearest = incision_->closest(box.centre, radius))
-    sheet = *nearest;
-  const double side = divided ? sheet.normal.dot(whole.centroid - sheet.point) : 0;
-  struct Octant {
-    int count = 0;
-    Vector3 sum = Vector3::Zero();
-    double nearness = 0; // sum of 1 / r
-  };
-  std::array<Octant, 16> octants; // a sheet that ends in the box divides them
-  int count = 0;
-  for (int a = 0; a < front_samples_along; ++a)
-    for (int b = 0; b < front_samples_along; ++b)
-      for (int c = 0; c < front_samples_along; ++c) {
-        const Vector3 x = box.centre - box.half + half.cwiseProduct(Vector3(2 * a + 1, 2 * b + 1, 2 * c + 1));
-        const double above = sheet.normal.dot(x - sheet.point);
-        if (above * side < 0 || (!box.whole && domain_.signed_distance(x) > 0))
-          continue;
-        Octant& own = octants[(a >= front_samples_along / 2 ? 1 : 0) + (b >= front_samples_along / 2 ? 2 : 0) +
-                              (c >= front_samples_along / 2 ? 4 : 0) + (above >= 0 ? 8 : 0)];
-        ++own.count;
-        own.sum += x;
-        own.nearness += 1 / std::max(nearest_sample * radius, (across * (x - middle.nearest)).norm());
-        ++count;
-      }
-  PlacedPart samples;
-  for (const Octant& octant : octants) {
-    if (octant.count == 0)
-      continue;
-    PlacedSample sample;
-    sample.share = static_cast<double>(octant.count) / count;
-    sample.at = octant.sum / octant.count;
-    sample.place = front_place(*incision_, sample.at, front_reach_);
-    if (!sample.place)
-      sample.place = middle;
-    if (const double r = std::hypot(sample.place->ahead, sample.place->above); r > 0) {
-      const double factor = octant.count / octant.nearness / std::max(r, 1e-6 * radius);
-      sample.place->ahead *= factor;
-      sample.place->above *= factor;
-    }
-    samples.push_back(std::move(sample));
-  }
-  return samples;
-}
-
-PlacedPart& CutSpace::place_of(PartId part) const {
-  std::unique_ptr<PlacedPart>& known = places_[part];
+PlacedFields& CutSpace::place_of(PartId part) const {
+  std::unique_ptr<PlacedFields>& known = places_[part];
   if (known == nullptr) {
     const CutPart at = cut_.part(part);
-    const std::optional<FrontPlace> place = front_place(*incision_, at.centroid, front_reach_);
-    known = std::make_unique<PlacedPart>();
-    if (place && place->distance < near_front_boxes * boxes_.boxes()[box_of(part)].half.norm())
-      *known = sampled(part, *place);
-    if (known->empty())
-      known->push_back({1, at.centroid, place, {}, {}, {}});
-    for (PlacedSample& sample : *known)
-      if (sample.place)
-        sample.tip = tip_fields(material_, *sample.place);
+    const SmallBox& box = boxes_.boxes()[box_of(part)];
+    const double radius = box.half.norm();
+    std::optional<FrontPlace> place = front_place(*incision_, at.centroid, front_reach_);
+    if (place && place->distance < near_front_boxes * radius) {
+      // What is integrated goes with 1 / r: the place stands where r is its harmonic mean over the part.
+      double sum = 0;
+      int count = 0;
+      const bool divided = cut_.part_count(box_of(part)) > 1;
+      const Vector3 half = box.half / harmonic_samples;
+      const Matrix3 across =
+          place->grad_ahead * place->grad_ahead.transpose() + place->grad_above * place->grad_above.transpose();
+      topology::SheetPoint sheet; // no part of an undivided box lies beyond it
+      if (const auto nearest = divided ? incision_->closest(box.centre, radius) : std::nullopt)
+        sheet = *nearest;
+      const double side = sheet.normal.dot(at.centroid - sheet.point);
+      for (int a = 0; a < harmonic_samples; ++a)
+        for (int b = 0; b < harmonic_samples; ++b)
+          for (int c = 0; c < harmonic_samples; ++c) {
+            const Vector3 x = box.centre - box.half + half.cwiseProduct(Vector3(2 * a + 1, 2 * b + 1, 2 * c + 1));
+            if (sheet.normal.dot(x - sheet.point) * side < 0)
+              continue;
+            const Vector3 arm = across * (x - place->nearest);
+            sum += 1 / std::max(nearest_sample * radius, arm.norm());
+            ++count;
+          }
+      if (const double r = std::hypot(place->ahead, place->above); count > 0 && r > 0) {
+        const double factor = count / sum / std::max(r, 1e-6 * radius);
+        place->ahead *= factor;
+        place->above *= factor;
+      }
+    }
+    known = std::make_unique<PlacedFields>();
+    known->place = place;
+    if (place)
+      known->tip = tip_fields(material_, *place);
     placed_.push_back(part);
   }
   return *known;
@@ -138,8 +107,7 @@ PlacedPart& CutSpace::place_of(PartId part) const {
 
 // Components of the parts in reach of a sphere: its node's own one, and a twin for each of the others. Where all hang
 // together although a sheet divides some, the sphere has a step.
-void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
-  faint_[node].clear();
+void CutSpace::add_twins(int node, std::vector<CutFunction>& found) const {
   const std::vector<int>& reach = boxes_in_reach(node);
   if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
     return;
@@ -175,38 +143,32 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   const int own = own_place < 0 ? component.front() : component[own_place];
   for (const PartId part : parts)
     local_[part] = -1;
-  // Energy of the sphere in a part, but for the material. A component in which it has none asks for nothing.
-  const auto energy_in = [&](PartId part) {
+  // A part in which the sphere has no weight asks for nothing.
+  const auto weighs = [&](PartId part) {
     const int box = box_of(part);
     const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
     const auto at = std::lower_bound(cell.nodes.begin(), cell.nodes.end(), node);
-    if (at == cell.nodes.end() || *at != node)
-      return 0.0;
-    return cut_.part(part).share * boxes_.boxes()[box].volume *
-           cell.gradient_at(at - cell.nodes.begin(), boxes_.lane_of(box)).squaredNorm();
+    return at != cell.nodes.end() && *at == node &&
+           (cell.value_at(at - cell.nodes.begin(), boxes_.lane_of(box)) != 0 ||
+            !cell.gradient_at(at - cell.nodes.begin(), boxes_.lane_of(box)).isZero(0));
   };
-  std::vector<double> energy(static_cast<std::size_t>(count), 0.0);
-  double whole = 0;
-  for (std::size_t k = 0; k < parts.size() && count > 1; ++k) {
-    const double own_share = energy_in(parts[k]);
-    energy[component[k]] += own_share;
-    whole += own_share;
-  }
+  bool any = false;
   for (int c = 0; c < count; ++c) {
     if (c == own)
       continue;
     CutFunction function;
     function.twin.node = node;
+    bool heavy = false;
     for (std::size_t k = 0; k < parts.size(); ++k)
-      if (component[k] == c)
+      if (component[k] == c) {
         function.twin.hidden.push_back(parts[k]);
-    if (energy[c] < faint * whole)
-      faint_[node].insert(faint_[node].end(), function.twin.hidden.begin(), function.twin.hidden.end());
-    if (energy[c] > 0)
+        heavy = heavy || weighs(parts[k]);
+      }
+    any = true;
+    if (heavy)
       found.push_back(std::move(function));
   }
-  std::sort(faint_[node].begin(), faint_[node].end());
-  if (count > 1 || options_.step_reach <= 0)
+  if (any || options_.step_reach <= 0)
     return;
   // The front ends in the sphere, or passes beside it.
   const double radius = spheres_.radii()[node];
@@ -225,60 +187,34 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   found.push_back(std::move(function));
 }
 
-// A run of the front is curved where it turns by more than step_turn within a sphere, over most of its length; corners,
-// such as that of a blade, are not counted. A cut that is shallow behind its front counts as well.
 void CutSpace::find_curved_front() {
-  const double most = options_.step_turn * std::numbers::pi / 180, corner = options_.corner * std::numbers::pi / 180;
+  const double least = std::cos(options_.step_turn * std::numbers::pi / 180);
   const std::vector<topology::FrontSegment>& front = incision_->front();
   std::vector<Vector3> middle, ahead;
-  std::vector<double> radius; // of the largest sphere about a segment
-  middle.reserve(front.size());
-  ahead.reserve(front.size());
-  radius.reserve(front.size());
+  std::vector<char> turns;
   for (int s = 0; s < std::ssize(front); ++s) {
-    const Vector3 x = 0.5 * (front[s].from + front[s].to);
-    middle.push_back(x);
+    middle.emplace_back(0.5 * (front[s].from + front[s].to));
     ahead.push_back(incision_->front_frame_at(s, 0.5).ahead);
-    double largest = 0;
-    for (const int node : spheres_.candidates(x))
-      if ((spheres_.centres()[node] - x).norm() < spheres_.radii()[node])
-        largest = std::max(largest, spheres_.radii()[node]);
-    radius.push_back(largest);
+  }
+  for (std::size_t s = 0; s < front.size(); ++s) {
+    double radius = 0;
+    for (const int node : spheres_.candidates(middle[s]))
+      if ((spheres_.centres()[node] - middle[s]).norm() < spheres_.radii()[node])
+        radius = std::max(radius, spheres_.radii()[node]);
+    char turn = 0;
+    for (std::size_t other = 0; other < front.size() && turn == 0; ++other)
+      turn = (middle[other] - middle[s]).squaredNorm() < radius * radius && ahead[other].dot(ahead[s]) < least;
+    turns.push_back(turn);
   }
   curved_.assign(front.size(), 0);
-  for (const FrontRun& run : front_runs(*incision_)) {
-    const int count = static_cast<int>(run.segments.size());
-    const auto turning = [&](int k, int step) {
-      double turned = 0;
-      const int start = run.segments[k];
-      for (int walked = 1, at = k; walked < count; ++walked) {
-        int next = at + step;
-        if (run.closed)
-          next = (next + count) % count;
-        else if (next < 0 || next >= count)
-          break;
-        const int here = run.segments[at], there = run.segments[next];
-        if ((middle[there] - middle[start]).norm() >= radius[start])
-          break;
-        const double angle = std::acos(std::clamp(ahead[here].dot(ahead[there]), -1.0, 1.0));
-        turned += angle < corner ? angle : 0;
-        at = next;
-      }
-      return turned;
-    };
-    double length = 0, curved = 0;
-    for (int k = 0; k < count; ++k) {
-      const topology::FrontSegment& segment = front[run.segments[k]];
-      const double own = (segment.to - segment.from).norm();
-      length += own;
-      const int at = run.segments[k];
-      const Vector3 behind = middle[at] - options_.shallow * radius[at] * ahead[at];
-      const bool is_shallow =
-          domain_.signed_distance(behind) > 0 || !incision_->closest(behind, 0.5 * options_.shallow * radius[at]);
-      curved += is_shallow || std::max(turning(k, 1), turning(k, -1)) > most ? own : 0;
+  for (const std::vector<int>& run : front_runs(*incision_)) {
+    double length = 0, turning = 0;
+    for (const int s : run) {
+      length += (front[s].to - front[s].from).norm();
+      turning += turns[s] != 0 ? (front[s].to - front[s].from).norm() : 0;
     }
-    for (const int s : run.segments)
-      curved_[s] = curved > 0.5 * length ? 1 : 0;
+    for (const int s : run)
+      curved_[s] = turning > 0.5 * length ? 1 : 0;
   }
 }
 
@@ -290,33 +226,27 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   for (const int box : divided)
     changed[box] = 1;
   // The nearest place of the front changes where the front did. Far from what has changed it is where it was.
-  const auto is_far = [&](const Vector3& x, double radius, const PlacedPart& before) {
+  const auto is_far = [&](const Vector3& x, double radius, const PlacedFields& before) {
     const double away = (x - region.lower.cwiseMax(x.cwiseMin(region.upper))).norm();
-    return std::all_of(before.begin(), before.end(), [&](const PlacedSample& sample) {
-      return away > (sample.place ? sample.place->distance : front_reach_) + radius;
-    });
+    return away > (before.place ? before.place->distance : front_reach_) + radius;
   };
   const auto is_other = [](const std::optional<FrontPlace>& before, const std::optional<FrontPlace>& now) {
     return now.has_value() != before.has_value() ||
            (now && (now->ahead != before->ahead || now->above != before->above ||
                     now->grad_ahead != before->grad_ahead || now->grad_above != before->grad_above));
   };
-  const auto are_others = [&](const PlacedPart& before, const PlacedPart& now) {
-    return !std::equal(before.begin(), before.end(), now.begin(), now.end(),
-                       [&](const PlacedSample& a, const PlacedSample& b) { return !is_other(a.place, b.place); });
-  };
   std::vector<PartId> before_parts = std::move(placed_);
   placed_.clear();
   std::sort(before_parts.begin(), before_parts.end());
   for (const PartId part : before_parts) {
     const int box = box_of(part);
-    std::unique_ptr<PlacedPart> before = std::move(places_[part]);
+    std::unique_ptr<PlacedFields> before = std::move(places_[part]);
     if (changed[box] == 1 || part % most_parts >= cut_.part_count(box))
       continue;
     if (is_far(boxes_.boxes()[box].centre, boxes_.boxes()[box].half.norm(), *before)) {
       places_[part] = std::move(before);
       placed_.push_back(part);
-    } else if (are_others(*before, place_of(part))) {
+    } else if (is_other(before->place, place_of(part).place)) {
       changed[box] = 2;
     }
   }
@@ -350,7 +280,7 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   std::vector<CutFunction> wanted;
   for (const int node : concerned)
     add_twins(node, wanted);
-  std::vector<FrontGroup> groups = front_groups(*incision_, nodes_, options_.front);
+  std::vector<FrontGroup> groups = front_groups(*incision_, nodes_, options_.front, origins_);
 
   Change change;
   std::vector<CutFunction> next;
@@ -447,7 +377,7 @@ std::vector<int> CutSpace::cells_of(const CutFunction& function) const {
   return cells;
 }
 
-bool CutSpace::term_at(int k, PartId part, int sample, ScalarTerm& term) const {
+bool CutSpace::term_at(int k, PartId part, ScalarTerm& term) const {
   const Twin& twin = functions_[k].twin;
   const int box = box_of(part), lane = boxes_.lane_of(box);
   const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
@@ -463,17 +393,17 @@ bool CutSpace::term_at(int k, PartId part, int sample, ScalarTerm& term) const {
     term = {k, middle, gradient};
     return true;
   }
-  const PlacedSample& placed = place_of(part)[sample];
-  const double value = middle + gradient.dot(placed.at - boxes_.boxes()[box].middle);
+  const Vector3 x = cut_.part(part).centroid;
+  const double value = middle + gradient.dot(x - boxes_.boxes()[box].middle);
   Vector3 slope;
-  const double jump =
-      0.5 * (step(placed.place ? &*placed.place : nullptr, placed.at, twin.step_length, slope) - twin.step_at_node);
+  const std::optional<FrontPlace>& place_here = place_of(part).place;
+  const double jump = 0.5 * (step(place_here ? &*place_here : nullptr, x, twin.step_length, slope) - twin.step_at_node);
   term = {k, value * jump, jump * gradient + 0.5 * value * slope};
   return jump != 0 || !slope.isZero(0);
 }
 
 // A group whose blended hats are `value`, with their gradient, at a place.
-FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, PlacedSample& placed) const {
+FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, PlacedFields& placed) const {
   const FrontStation& station = functions_[k].group.station;
   if (placed.station.spacing != station.spacing || placed.station.point != station.point ||
       placed.station.axes != station.axes) {
@@ -487,24 +417,45 @@ FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, Pla
   return term;
 }
 
-std::vector<int> CutSpace::cells_of_groups(int first) const {
-  std::vector<char> taken(boxes_.cells().size(), 0);
-  for (std::size_t node = 0; node < groups_of_.size(); ++node)
-    if (std::any_of(groups_of_[node].begin(), groups_of_[node].end(), [&](int k) { return k >= first; }))
-      for (const int cell : boxes_.cells_of_node(static_cast<int>(node)))
-        taken[cell] = 1;
-  std::vector<int> cells;
-  for (int cell = 0; cell < std::ssize(taken); ++cell)
-    if (taken[cell] != 0)
-      cells.push_back(cell);
-  return cells;
-}
-
-void CutSpace::take_out_faint(const Vector3& x, PartId part, ShapeFunctions& shape) const {
-  take_out(spheres_, x, shape, [&](int k) {
-    const std::vector<PartId>& faint = faint_[shape.nodes[k]];
-    return !faint.empty() && std::binary_search(faint.begin(), faint.end(), part);
-  });
+void CutSpace::terms_in(int k, int cell_index, std::vector<PartId>& parts, std::vector<FrontTerm>& terms) const {
+  constexpr int lanes = BoxShapes::lanes;
+  const FrontGroup& group = functions_[k].group;
+  const BoxShapes& cell = boxes_.cells()[cell_index];
+  parts.clear();
+  terms.clear();
+  std::array<double, lanes> middle{};
+  std::array<Vector3, lanes> gradient;
+  gradient.fill(Vector3::Zero());
+  bool any = false;
+  std::size_t c = 0; // both lists ascend
+  for (std::size_t n = 0; n < group.nodes.size(); ++n) {
+    while (c < cell.nodes.size() && cell.nodes[c] < group.nodes[n])
+      ++c;
+    if (c == cell.nodes.size())
+      break;
+    if (cell.nodes[c] != group.nodes[n])
+      continue;
+    any = true;
+    for (int lane = 0; lane < cell.boxes; ++lane) {
+      middle[lane] += group.weights[n] * cell.value_at(c, lane);
+      gradient[lane] += group.weights[n] * cell.gradient_at(c, lane);
+    }
+  }
+  for (int lane = 0; any && lane < cell.boxes; ++lane) {
+    if (middle[lane] == 0 && gradient[lane].isZero(0))
+      continue;
+    const int box = cell.first_box + lane;
+    for (int p = 0; p < cut_.part_count(box); ++p) {
+      const PartId part = part_id(box, p);
+      PlacedFields& placed = place_of(part);
+      if (!placed.place)
+        continue;
+      terms.push_back(
+          front_term(k, middle[lane] + gradient[lane].dot(cut_.part(part).centroid - boxes_.boxes()[box].middle),
+                     gradient[lane], placed));
+      parts.push_back(part);
+    }
+  }
 }
 
 void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const {
@@ -543,7 +494,7 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
   }
   if (of_group.empty() || place_here() == nullptr)
     return;
-  PlacedSample here{1, x, place, tip_fields(material_, *place), {}, {}};
+  PlacedFields here{place, tip_fields(material_, *place), {}, {}};
   for (const auto& [k, sum] : of_group)
     terms.front.push_back(front_term(k, sum.first, sum.second, here));
 }

@@ -16,8 +16,6 @@ struct CutSpaceOptions {
   /// most of its length; on straight ones, corners included, the front functions do as well with half as many.
   double step_reach = 1;
   double step_turn = 20; // degrees
-  double shallow = 1.2;  // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
-  double corner = 45;    // degrees from one segment to the next: a corner, which is no curvature
 };
 
 /// A second vector unknown of a sphere: h_J psi. Where the cut parts the sphere, psi is 1 in one component of what is
@@ -62,19 +60,14 @@ struct CutTerms {
   }
 };
 
-/// Place of a part, or of a sample of it, with respect to the front, and the near-tip fields there.
-struct PlacedSample {
-  double share = 1;                // of the part's volume
-  Vector3 at = Vector3::Zero();    // m, centroid
-  std::optional<FrontPlace> place; // of no value: far from every front
+/// Place of a part with respect to the front, and the near-tip fields there.
+struct PlacedFields {
+  std::optional<FrontPlace> place;
   TipFields tip;
   // The fields as the station had them that was asked for last: its rings follow one another.
   FrontStation station; // of no spacing: none yet
   FrontFields fields;
 };
-/// One sample, or several where the near-tip fields change much within the part. The functions of the uncut body stay
-/// linear over all of them, so that their products with one another are what they are without the samples.
-using PlacedPart = std::vector<PlacedSample>;
 
 class CutSpace {
  public:
@@ -95,44 +88,24 @@ class CutSpace {
   [[nodiscard]] const topology::Incision* incision() const { return incision_.get(); }
   /// Cells in which a function may differ from zero, ascending.
   [[nodiscard]] std::vector<int> cells_of(const CutFunction& function) const;
-  /// Samples of a part for functions that know of the front; the others take the part as one.
-  [[nodiscard]] const PlacedPart& samples(PartId part) const { return place_of(part); }
-  /// How many samples a part has as far as functions have been asked for there.
-  [[nodiscard]] int known_samples(PartId part) const {
-    return places_[part] == nullptr ? 1 : static_cast<int>(places_[part]->size());
-  }
-  /// Term of a twin at a part of a box, or of a step at one of its samples, with the box's linear shape functions.
-  /// False: it vanishes there.
-  bool term_at(int k, PartId part, int sample, ScalarTerm& term) const;
-  /// Calls visit(part, sample, term) for the terms in a cell of the front groups from function `first` on, at all
-  /// samples of all parts where they do not vanish; parts and samples of a group ascend.
-  template <class Visit>
-  void for_each_front_term(int first, int cell, Visit&& visit) const;
-  /// Cells in which some front group from function `first` on may differ from zero, ascending.
-  [[nodiscard]] std::vector<int> cells_of_groups(int first) const;
-  /// The part that x lies in, or next to.
-  [[nodiscard]] PartId part_at(const Vector3& x) const {
-    return incision_ == nullptr ? part_id(boxes_.locate(x), 0) : cut_.part_at(x, *incision_);
-  }
-  /// All that do not vanish at x, in a part, with shape functions at x.
+  /// Terms of the k-th function at a part of a box, with the box's linear shape functions. False: it vanishes there.
+  bool term_at(int k, PartId part, ScalarTerm& term) const;
+  /// Terms of a front group at all parts of a cell where it does not vanish, with the parts, ascending.
+  void terms_in(int k, int cell, std::vector<PartId>& parts, std::vector<FrontTerm>& terms) const;
+  /// All that do not vanish at x, in a part, with shape functions evaluated at x.
   void terms_at(const Vector3& x, PartId part, const ShapeFunctions& shape, CutTerms& terms) const;
-  /// Takes spheres out of shape functions evaluated at x whose twin in the part, or what they would have there, weighs
-  /// next to nothing in the boxes: their unknowns say nothing of x. The others go on reproducing linear functions.
-  void take_out_faint(const Vector3& x, PartId part, ShapeFunctions& shape) const;
 
  private:
   /// Boxes that the sphere of a node may reach, ascending; kept.
   [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
-  void add_twins(int node, std::vector<CutFunction>& found);
+  void add_twins(int node, std::vector<CutFunction>& found) const;
   void find_curved_front();
-  [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedSample& placed) const;
+  [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedFields& placed) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
   /// Place of a part with respect to the front, kept until the front about it changes.
-  [[nodiscard]] PlacedPart& place_of(PartId part) const;
-  [[nodiscard]] PlacedPart sampled(PartId part, const FrontPlace& middle) const;
+  [[nodiscard]] PlacedFields& place_of(PartId part) const;
 
   const SmallBoxes& boxes_;
-  const topology::Domain& domain_;
   const NodeCloud& nodes_;
   const Spheres& spheres_;
   Material material_;
@@ -142,70 +115,14 @@ class CutSpace {
   std::vector<CutFunction> functions_;
   std::vector<std::vector<int>> twins_of_, groups_of_; // places in functions_ by node
   std::vector<std::vector<double>> group_weights_;
-  std::vector<std::vector<PartId>> faint_; // by node: hidden parts in its reach without a twin that weighs, ascending
-  mutable std::vector<std::unique_ptr<PlacedPart>> places_; // by part; null: not asked for yet
-  mutable std::vector<PartId> placed_;                      // those that are there
-  /// Blended hats of a front group over the boxes of a cell.
-  struct Blend {
-    int function;
-    std::array<double, BoxShapes::lanes> middle{};        // at the middles of the boxes
-    std::array<double, 3 * BoxShapes::lanes> gradients{}; // 1/m, [lane][axis]
-  };
-  mutable std::vector<Blend> blends_;           // of one cell
-  mutable std::vector<int> blend_of_;           // by function, -1 between calls
-  mutable std::vector<int> local_;              // of a part among those of a sphere, -1 between calls
-  mutable std::vector<std::vector<int>> reach_; // by node, found as they are asked for
-  std::vector<char> curved_;                    // by segment of the front: its run is curved
-  double front_reach_ = 0;                      // m, from a front to the farthest place that its functions come to
+  std::vector<Vector3> origins_;                              // of the runs of the front
+  mutable std::vector<std::unique_ptr<PlacedFields>> places_; // by part; null: not asked for yet
+  mutable std::vector<PartId> placed_;                        // those that are there
+  mutable std::vector<int> local_;                            // of a part among those of a sphere, -1 between calls
+  mutable std::vector<std::vector<int>> reach_;               // by node, found as they are asked for
+  std::vector<char> curved_;                                  // by segment of the front: its run is curved
+  double front_reach_ = 0; // m, from a front to the farthest place that its functions come to
   int next_id_ = 0;
 };
-
-template <class Visit>
-void CutSpace::for_each_front_term(int first, int cell_index, Visit&& visit) const {
-  const BoxShapes& cell = boxes_.cells()[cell_index];
-  const auto count = std::ssize(cell.nodes);
-  blends_.clear();
-  blend_of_.resize(std::max(blend_of_.size(), functions_.size()), -1);
-  for (std::ptrdiff_t n = 0; n < count; ++n) {
-    const std::vector<int>& groups = groups_of_[cell.nodes[n]];
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (groups[g] < first)
-        continue;
-      int& at = blend_of_[groups[g]];
-      if (at < 0) {
-        at = static_cast<int>(blends_.size());
-        blends_.push_back({groups[g], {}, {}});
-      }
-      Blend& blend = blends_[at];
-      const double weight = group_weights_[cell.nodes[n]][g];
-      for (int lane = 0; lane < BoxShapes::lanes; ++lane)
-        blend.middle[lane] += weight * cell.value[n * BoxShapes::lanes + lane];
-      const double* gradient = cell.gradients.data() + n;
-      for (int k = 0; k < 3 * cell.boxes; ++k, gradient += count)
-        blend.gradients[k] += weight * *gradient;
-    }
-  }
-  for (const Blend& blend : blends_)
-    blend_of_[blend.function] = -1;
-  for (int lane = 0; lane < cell.boxes; ++lane) {
-    const int box = cell.first_box + lane;
-    const Vector3& centre = boxes_.boxes()[box].middle;
-    for (int p = 0; p < cut_.part_count(box); ++p) {
-      const PartId part = part_id(box, p);
-      PlacedPart* samples = nullptr;
-      for (const Blend& blend : blends_) {
-        const Vector3 gradient = Vector3::Map(blend.gradients.data() + 3 * lane);
-        if (blend.middle[lane] == 0 && gradient.isZero(0))
-          continue;
-        if (samples == nullptr)
-          samples = &place_of(part);
-        for (int n = 0; n < std::ssize(*samples); ++n)
-          if (PlacedSample& sample = (*samples)[n]; sample.place)
-            visit(part, n,
-                  front_term(blend.function, blend.middle[lane] + gradient.dot(sample.at - centre), gradient, sample));
-      }
-    }
-  }
-}
 
 } // namespace spherecut::solvers

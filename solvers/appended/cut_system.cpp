@@ -17,18 +17,12 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr int most_samples = 16; // of a part
-
 Matrix3 held_components(const Prescribed& entry) {
   Vector3 held;
   for (int c = 0; c < 3; ++c)
     held[c] = entry.components[c] ? 1 : 0;
   return held.asDiagonal();
 }
-
-constexpr double negative = 1e-9;   // of it: beyond rounding, the sum of energies is not one
-constexpr double superfluous = 1e9; // pivot of an unknown that is left out
-constexpr double redundant = 1e-13; // of a function's energy: what the others leave of it is rounding
 
 /// The lower Cholesky factor of a symmetric matrix in its lower triangle; zeros above. Returns the first column that is
 /// not positive, or -1.
@@ -46,61 +40,45 @@ int factor_lower(MatrixX& matrix) {
 
 // ---- functions and functionals
 
-void CutSystem::evaluate_twin(int function, FunctionData& data) const {
-  const Twin& twin = space_.functions()[function].twin;
-  for (const PartId part : twin.hidden) {
-    const int samples = data.is_sampled ? static_cast<int>(space_.samples(part).size()) : 1;
-    bool any = false;
-    std::array<double, 3 * most_samples> gradients{};
-    for (int n = 0; n < samples; ++n)
-      if (ScalarTerm term; space_.term_at(function, part, n, term)) {
-        any = true;
-        std::copy_n(term.gradient.data(), 3, gradients.data() + 3 * n);
+void CutSystem::evaluate(int function, FunctionData& data) const {
+  const CutFunction& own = space_.functions()[function];
+  data.id = own.id;
+  data.is_front = own.is_front;
+  if (!own.is_front) {
+    for (const PartId part : own.twin.hidden)
+      if (ScalarTerm term; space_.term_at(function, part, term)) {
+        data.gradients.insert(data.gradients.end(), term.gradient.data(), term.gradient.data() + 3);
+        data.parts.push_back(part);
       }
-    if (!any)
-      continue;
-    data.gradients.insert(data.gradients.end(), gradients.data(), gradients.data() + 3 * samples);
-    data.parts.insert(data.parts.end(), samples, part);
+    return;
+  }
+  std::vector<PartId> parts;
+  std::vector<FrontTerm> terms;
+  for (const int cell : space_.cells_of(own)) {
+    space_.terms_in(function, cell, parts, terms);
+    data.parts.insert(data.parts.end(), parts.begin(), parts.end());
+    for (const FrontTerm& term : terms)
+      for (const Matrix3& gradient : term.gradient)
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j)
+            data.gradients.push_back(gradient(i, j));
   }
 }
 
-void CutSystem::evaluate(int first_new) {
-  for (int k = first_new; k < std::ssize(space_.functions()); ++k) {
-    const CutFunction& own = space_.functions()[k];
-    FunctionData& data = data_.emplace_back();
-    data.id = own.id;
-    data.is_front = own.is_front;
-    data.is_sampled = own.is_front || own.twin.is_step;
-    if (!own.is_front)
-      evaluate_twin(k, data);
-  }
-  for (const int cell : space_.cells_of_groups(first_new))
-    space_.for_each_front_term(first_new, cell, [&](PartId part, int, const FrontTerm& term) {
-      FunctionData& data = data_[term.function];
-      data.parts.push_back(part);
-      const std::size_t size = data.gradients.size();
-      data.gradients.resize(size + 27);
-      double* to = data.gradients.data() + size;
-      for (const Matrix3& gradient : term.gradient) {
-        const Matrix3 rows = gradient.transpose(); // in memory row by row of the gradient
-        to = std::copy_n(rows.data(), 9, to);
-      }
-    });
-}
-
-CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points, Faint faint) const {
+CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points) const {
   std::map<int, double> base;
   std::map<int, Matrix3> cut;
   ShapeFunctions shape;
   CutTerms terms;
   for (const QuadraturePoint& point : points) {
-    const PartId part = space_.part_at(point.position);
-    uncut_.boxes().evaluate(box_of(part), point.position, shape);
-    if (faint == Faint::left_out)
-      space_.take_out_faint(point.position, part, shape);
-    space_.terms_at(point.position, part, shape, terms);
+    if (!solvers::evaluate(uncut_.spheres(), point.position, shape))
+      throw NumericalError(fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m",
+                                       point.position.x(), point.position.y(), point.position.z()));
     for (int k = 0; k < shape.size(); ++k)
       base[shape.nodes[k]] += point.weight * shape.value[k];
+    if (space_.functions().empty())
+      continue;
+    space_.terms_at(point.position, space_.cut().part_at(point.position, *space_.incision()), shape, terms);
     for (const ScalarTerm& term : terms.scalar)
       cut.try_emplace(term.function, Matrix3::Zero()).first->second.diagonal().array() += point.weight * term.value;
     for (const FrontTerm& term : terms.front)
@@ -148,7 +126,8 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
   penalty_ = std::move(penalty);
   schur_ = std::move(schur);
   const int first_new = static_cast<int>(kept);
-  evaluate(first_new);
+  for (Eigen::Index k = kept; k < count; ++k)
+    evaluate(static_cast<int>(k), data_.emplace_back());
   in_cell_.assign(uncut_.boxes().cells().size(), {});
   for (int k = 0; k < count; ++k) {
     int last = -1;
@@ -190,8 +169,7 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
 /// Products over the parts of one cell, as many together as there are lanes.
 struct CutSystem::CellProducts {
   static constexpr int lanes = BoxShapes::lanes;
-  std::vector<PartId> parts;                             // once for each sample
-  std::vector<double> weights;                           // m3, of every one of them
+  std::vector<PartId> parts;
   std::vector<int> twins, groups, new_twins, new_groups; // functions here, ascending
   std::vector<std::size_t> next;                         // entry of every twin, then of every group
   MatrixX gradient;                                      // row: base function or twin; column 3 l + axis
@@ -251,21 +229,9 @@ void CutSystem::add_cell(int cell_index, std::span<const int> fresh, CellProduct
   auto& with_twins = work.with_twins;
   for (auto* list : {&parts, &twins, &groups, &new_twins, &new_groups})
     list->clear();
-  work.weights.clear();
   for (int box = cell.first_box; box < cell.first_box + cell.boxes; ++box)
-    for (int k = 0; k < space_.cut().part_count(box); ++k) {
-      const PartId part = part_id(box, k);
-      const double volume = space_.cut().part(part).share * boxes.boxes()[box].volume;
-      if (space_.known_samples(part) == 1) {
-        parts.push_back(part);
-        work.weights.push_back(volume);
-        continue;
-      }
-      for (const PlacedSample& sample : space_.samples(part)) {
-        parts.push_back(part);
-        work.weights.push_back(sample.share * volume);
-      }
-    }
+    for (int k = 0; k < space_.cut().part_count(box); ++k)
+      parts.push_back(part_id(box, k));
   for (const int k : in_cell_[cell_index])
     (data_[k].is_front ? groups : twins).push_back(k);
   for (const int k : fresh)
@@ -288,15 +254,13 @@ void CutSystem::add_cell(int cell_index, std::span<const int> fresh, CellProduct
   for (std::size_t first = 0; first < parts.size(); first += lanes) {
     const int count = static_cast<int>(std::min<std::size_t>(lanes, parts.size() - first));
     std::array<double, lanes> weight{};
-    std::copy_n(work.weights.begin() + static_cast<std::ptrdiff_t>(first), count, weight.begin());
+    for (int l = 0; l < count; ++l)
+      weight[l] = space_.cut().part(parts[first + l]).share * boxes.boxes()[box_of(parts[first + l])].volume;
     const auto for_entries = [&](int k, std::size_t& at, auto&& visit) {
       const FunctionData& of = data_[k];
       for (int l = 0; l < count && at < of.parts.size(); ++l)
-        if (of.parts[at] == parts[first + l]) {
-          visit(l, of.gradients.data() + of.stride() * at);
-          if (of.is_sampled || first + l + 1 == parts.size() || parts[first + l + 1] != parts[first + l])
-            ++at;
-        }
+        if (of.parts[at] == parts[first + l])
+          visit(l, of.gradients.data() + of.stride() * at++);
     };
     if (!is_plain) {
       gradient.setZero(rows, 3 * lanes);
@@ -481,10 +445,7 @@ void CutSystem::add_held(int first_new, const CutSpace::Change& change) {
           held.base.emplace_back(mean.nodes[k], mean.weights[k]);
       continue;
     }
-    held = mean_over(mean.share, Faint::kept);
-    held.base.clear(); // as the uncut body has it, whose penalty is in K0
-    for (std::size_t k = 0; k < mean.nodes.size(); ++k)
-      held.base.emplace_back(mean.nodes[k], mean.weights[k]);
+    held = mean_over(mean.share);
     const Prescribed& entry = problem.prescribed[p];
     const double stiffness = constraint_stiffness(problem, entry.node);
     const Matrix3 components = held_components(entry);
@@ -551,7 +512,7 @@ void CutSystem::part_held_shares() {
           point.weight = -point.weight;
           both.push_back(point);
         }
-        parted.difference = mean_over(both, Faint::kept);
+        parted.difference = mean_over(both);
         const Matrix3 components = held_components(entry);
         for (auto& [function, matrix] : parted.difference.cut)
           matrix = components * matrix;
@@ -598,36 +559,7 @@ void CutSystem::factor(Eigen::Index unchanged) {
       add_product(-1, beside, true, beside, corner);
       lower.bottomLeftCorner(rest, first) = beside.transpose();
     }
-    const MatrixX whole = corner;
-    int column = factor_lower(corner);
-    const auto is_redundant = [&](Eigen::Index k) {
-      return corner(k, k) * corner(k, k) <
-             redundant * (elastic_(first + k, first + k) + penalty_(first + k, first + k));
-    };
-    bool repeats = column >= 0;
-    for (Eigen::Index k = 0; k < rest && !repeats; ++k)
-      repeats = is_redundant(k);
-    if (repeats) { // unknowns that the others make superfluous stay zero
-      corner = whole;
-      column = -1;
-      for (Eigen::Index k = 0; k < rest; ++k) {
-        VectorX below = corner.col(k).tail(rest - k);
-        below -= corner.block(k, 0, rest - k, k) * corner.row(k).head(k).transpose();
-        const double scale = elastic_(first + k, first + k) + penalty_(first + k, first + k);
-        if (!(below[0] > redundant * scale)) {
-          if (!(below[0] > -negative * scale)) {
-            column = static_cast<int>(k);
-            break;
-          }
-          corner.col(k).setZero();
-          corner(k, k) = superfluous * std::sqrt(scale);
-          continue;
-        }
-        corner.col(k).head(k).setZero();
-        corner.col(k).tail(rest - k) = below / std::sqrt(below[0]);
-      }
-    }
-    if (column >= 0) {
+    if (const int column = factor_lower(corner); column >= 0) {
       const CutFunction& function = space_.functions()[unchanged + column / 3];
       const Vector3 x = function.is_front ? function.group.station.point : uncut_.nodes().positions[function.twin.node];
       throw NumericalError(
@@ -706,18 +638,14 @@ CutVectors CutSystem::solve(const CutVectors& loads) const {
 
 CutVectors CutSystem::half_solutions(const CutVectors& loads) const {
   CutVectors half{uncut_.factor().forward_sparse(uncut_.ordered(loads.base)), loads.cut, loads.multipliers};
-  finish_halves(half);
-  return half;
-}
-
-void CutSystem::finish_halves(CutVectors& half) const {
   add_transposed_product(-1, half_.data(), static_cast<int>(half_.rows()), half.base, half.cut);
   triangular_solve(false, lower_.data(), static_cast<int>(lower_.rows()), half.cut);
-  if (parted_.empty())
-    return;
-  add_product(-1, parted_half_, true, half.base, half.multipliers);
-  add_product(-1, parted_schur_, true, half.cut, half.multipliers);
-  triangular_solve(false, parted_lower_.data(), static_cast<int>(parted_lower_.rows()), half.multipliers);
+  if (!parted_.empty()) {
+    add_product(-1, parted_half_, true, half.base, half.multipliers);
+    add_product(-1, parted_schur_, true, half.cut, half.multipliers);
+    triangular_solve(false, parted_lower_.data(), static_cast<int>(parted_lower_.rows()), half.multipliers);
+  }
+  return half;
 }
 
 MatrixX CutSystem::compliance(const CutVectors& a, const CutVectors& b) {

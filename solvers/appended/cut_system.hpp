@@ -47,16 +47,10 @@ class CutSystem {
   [[nodiscard]] CutVectors solve(const CutVectors& loads) const;
   /// Half solutions of loads: what they do to each other is base^T base + cut^T cut - multipliers^T multipliers.
   [[nodiscard]] CutVectors half_solutions(const CutVectors& loads) const;
-  /// The same where the base rows are half solutions of the uncut body already.
-  void finish_halves(CutVectors& half) const;
   [[nodiscard]] static MatrixX compliance(const CutVectors& a, const CutVectors& b);
 
   /// Mean over weighted points (weights add up to one) with the functions as they are now.
-  /// Twins that hardly weigh are left out, as are their spheres, except where something is held: then they are kept, as
-  /// the uncut body has them.
-  enum class Faint { left_out, kept };
-  [[nodiscard]] CutFunctional mean_over(const std::vector<QuadraturePoint>& points,
-                                        Faint faint = Faint::left_out) const;
+  [[nodiscard]] CutFunctional mean_over(const std::vector<QuadraturePoint>& points) const;
   [[nodiscard]] static Vector3 value(const CutFunctional& functional, const VectorX& base, const VectorX& cut);
 
   /// Means of what each prescribed entry of the uncut body holds.
@@ -71,7 +65,7 @@ class CutSystem {
   void subtract_holding(const VectorX& base, const VectorX& cut, const VectorX& prescribed,
                         const std::function<Vector3(const Vector3&)>& field, CutVectors& rows) const;
 
-  /// Parts in which the k-th function does not vanish, ascending; of a step once for each of its samples.
+  /// Parts in which the k-th function does not vanish, ascending.
   [[nodiscard]] const std::vector<PartId>& parts_of(int k) const { return data_[k].parts; }
   [[nodiscard]] int functions() const { return static_cast<int>(data_.size()); }
   [[nodiscard]] long stored() const { return static_cast<long>(half_.size() + schur_.size()); }
@@ -81,9 +75,8 @@ class CutSystem {
   struct FunctionData {
     int id = -1;
     bool is_front = false;
-    bool is_sampled = false;                      // an entry for each sample of a part, else for each part
-    std::vector<PartId> parts;                    // ascending, of every entry
-    std::vector<double> gradients;                // per entry: 3 of a twin; 27 of a front group, [mode][i][j] du_i/dx_j
+    std::vector<PartId> parts;                    // ascending
+    std::vector<double> gradients;                // per part: 3 of a twin; 27 of a front group, [mode][i][j] du_i/dx_j
     std::vector<int> nodes;                       // base nodes that it couples with, ascending
     std::vector<Matrix3> blocks;                  // elastic, rows: components of the base
     std::vector<std::pair<int, Matrix3>> penalty; // by node: what held means add
@@ -96,8 +89,7 @@ class CutSystem {
     CutFunctional difference;
     std::vector<QuadraturePoint> first, second;
   };
-  void evaluate(int first_new);
-  void evaluate_twin(int function, FunctionData& data) const;
+  void evaluate(int function, FunctionData& data) const;
   void add_elastic(int first_new);
   void add_held(int first_new, const CutSpace::Change& change);
   void part_held_shares();

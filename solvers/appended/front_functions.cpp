@@ -15,29 +15,21 @@ namespace {
 
 constexpr double least_run = 1e-9; // of a spacing
 
-/// A run with the way along it in spacings.
-struct MeasuredRun : FrontRun {
+/// A run of the front in segments that follow one another, with the way along it in spacings.
+struct FrontRun {
+  std::vector<int> segments;
   std::vector<double> measure; // at the start of every segment, and at the end of the last
-  bool reversed = false;       // measured from its end
+  bool closed = false;
+  bool reversed = false; // measured from its end
   [[nodiscard]] double length() const { return measure.back(); }
 };
-
-/// Place of the vertex nearest to x in the order in which the vertices of a sheet came.
-std::ptrdiff_t age_of(const topology::SurfaceMesh& sheet, const Vector3& x) {
-  return std::min_element(
-             sheet.vertices.begin(), sheet.vertices.end(),
-             [&](const Vector3& a, const Vector3& b) { return (a - x).squaredNorm() < (b - x).squaredNorm(); }) -
-         sheet.vertices.begin();
-}
 
 using PointKey = std::array<double, 3>;
 PointKey key_of(const Vector3& x) {
   return {x.x(), x.y(), x.z()};
 }
 
-} // namespace
-
-std::vector<FrontRun> front_runs(const topology::Incision& incision) {
+std::vector<FrontRun> runs_of(const topology::Incision& incision) {
   const std::vector<topology::FrontSegment>& front = incision.front();
   std::map<std::pair<int, PointKey>, int> starting, ending;
   for (int s = 0; s < std::ssize(front); ++s) {
@@ -66,6 +58,15 @@ std::vector<FrontRun> front_runs(const topology::Incision& incision) {
     if (taken[s] == 0)
       follow(s);
   return runs;
+}
+
+} // namespace
+
+std::vector<std::vector<int>> front_runs(const topology::Incision& incision) {
+  std::vector<std::vector<int>> segments;
+  for (FrontRun& run : runs_of(incision))
+    segments.push_back(std::move(run.segments));
+  return segments;
 }
 
 std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach) {
@@ -97,19 +98,18 @@ std::optional<FrontPlace> front_place(const topology::Incision& incision, const 
 }
 
 std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
-                                     const FrontOptions& options) {
+                                     const FrontOptions& options, std::vector<Vector3>& origins) {
   std::vector<FrontGroup> groups;
   const std::vector<topology::FrontSegment>& front = incision.front();
   if (front.empty() || options.radius <= 0 || options.rings < 1)
     return groups;
   const topology::PointTree tree(nodes.positions);
   const auto spacing_at = [&](const Vector3& x) { return nodes.spacings[tree.nearest(x).index]; };
-  std::vector<MeasuredRun> runs;
-  for (FrontRun& run : front_runs(incision))
-    runs.push_back({std::move(run), {}, false});
+  std::vector<FrontRun> runs = runs_of(incision);
   std::vector<int> run_of(front.size(), -1), place_in_run(front.size(), 0);
+  std::vector<Vector3> starts;
   for (int r = 0; r < std::ssize(runs); ++r) {
-    MeasuredRun& run = runs[r];
+    FrontRun& run = runs[r];
     run.measure.assign(1, 0);
     for (int k = 0; k < std::ssize(run.segments); ++k) {
       const topology::FrontSegment& segment = front[run.segments[k]];
@@ -119,12 +119,17 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
                             (segment.to - segment.from).norm() / spacing_at(0.5 * (segment.from + segment.to)));
     }
     if (!run.closed) {
-      // The older end, whose place in the sheet came first: it stays where it is as the other end grows.
-      const topology::FrontSegment &first = front[run.segments.front()], &last = front[run.segments.back()];
-      run.reversed =
-          age_of(incision.sheets()[last.sheet], last.to) < age_of(incision.sheets()[first.sheet], first.from);
+      const Vector3 &first = front[run.segments.front()].from, &last = front[run.segments.back()].to;
+      double to_first = std::numeric_limits<double>::infinity(), to_last = to_first;
+      for (const Vector3& origin : origins) {
+        to_first = std::min(to_first, (first - origin).squaredNorm());
+        to_last = std::min(to_last, (last - origin).squaredNorm());
+      }
+      run.reversed = to_last < to_first;
+      starts.push_back(run.reversed ? last : first);
     }
   }
+  origins = std::move(starts);
 
   // Stations: an open run has one at either end.
   struct Stations {
@@ -134,7 +139,7 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
   std::vector<Stations> stations(runs.size());
   std::vector<FrontStation> all;
   for (int r = 0; r < std::ssize(runs); ++r) {
-    const MeasuredRun& run = runs[r];
+    const FrontRun& run = runs[r];
     stations[r].first = static_cast<int>(all.size());
     const double length = run.length();
     if (length < least_run)
@@ -179,7 +184,7 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
     const double radius = options.radius * spacing_at(place->nearest);
     if (place->distance > radius)
       continue;
-    const MeasuredRun& run = runs[r];
+    const FrontRun& run = runs[r];
     const topology::FrontSegment& segment = front[place->segment];
     const int k = place_in_run[place->segment];
     const double length = (segment.to - segment.from).norm();

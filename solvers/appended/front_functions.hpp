@@ -27,13 +27,8 @@ struct FrontPlace {
 /// Nothing farther than `reach` m from the front. Continuous across everything but the sheet.
 std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach);
 
-/// Segments of the front that follow one another.
-struct FrontRun {
-  std::vector<int> segments;
-  bool closed = false;
-};
-/// All runs of the front; open ones come first.
-std::vector<FrontRun> front_runs(const topology::Incision& incision);
+/// Segments of the front in runs that follow one another; open runs come first.
+std::vector<std::vector<int>> front_runs(const topology::Incision& incision);
 
 struct FrontOptions {
   double radius = 3; // of the outer ring, in spacings at the front; 0: no functions
@@ -61,10 +56,10 @@ struct FrontGroup {
   }
 };
 
-/// The groups of all runs of the front. An open run is measured from its older end, so that stations stay where they
-/// are as the other end grows, and do not depend on the increments by which it has.
+/// The groups of all runs of the front. An open run is measured from its end nearest to one of `origins` (m, the first
+/// stations of an earlier call), so that stations stay where they are as the other end grows.
 std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
-                                     const FrontOptions& options);
+                                     const FrontOptions& options, std::vector<Vector3>& origins);
 
 /// Near-tip fields of unit intensity in the axes (ahead, normal, along): displacement of every mode in a column, m, and
 /// its derivatives ahead and along the normal.

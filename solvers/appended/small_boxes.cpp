@@ -3,7 +3,6 @@
 #include "solvers/parallel.hpp"
 #include "topology/errors.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -40,15 +39,15 @@ std::pair<double, Vector3> part_inside(const topology::Domain& domain, const Vec
   return {fraction, -(1 - fraction) * reach * n};
 }
 
-SmallBoxes::SmallBoxes(const topology::Domain& domain, const NodeCloud& nodes, const Spheres& spheres, double cell_size)
-    : spheres_(spheres) {
-  const BackgroundCells leaves = background_cells(domain, nodes, {cell_size, 1, false, 1});
+SmallBoxes::SmallBoxes(const topology::Domain& domain, const NodeCloud& nodes, const Spheres& spheres,
+                       double cell_size) {
+  const BackgroundCells leaves = background_cells(domain, nodes, {cell_size, 1, false});
   cells_.reserve(leaves.boxes.size());
   for (const BackgroundBox& leaf : leaves.boxes)
     add_cell(domain, leaf);
   if (boxes_.empty())
     throw NumericalError("no background box lies inside the body");
-  evaluate_all();
+  evaluate(spheres);
   sort_into_bins(domain.bounds());
   find_neighbours();
   node_cell_start_.assign(spheres.size() + 1, 0);
@@ -62,53 +61,6 @@ SmallBoxes::SmallBoxes(const topology::Domain& domain, const NodeCloud& nodes, c
   for (int c = 0; c < std::ssize(cells_); ++c)
     for (const int node : cells_[c].nodes)
       node_cells_[next[node]++] = c;
-}
-
-void reproduce_linear(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape) {
-  using Moments = Eigen::Matrix<double, 4, 1>;
-  const double radius = spheres.radii()[shape.nodes.front()];
-  const auto moments_of = [&](int n) {
-    Moments p;
-    p << 1, (spheres.centres()[shape.nodes[n]] - x) / radius;
-    return p;
-  };
-  Eigen::Matrix4d gram = Eigen::Matrix4d::Zero();
-  Moments missing = Moments::Unit(0);
-  Eigen::Matrix<double, 3, 4> missing_slope;
-  missing_slope << Vector3::Zero(), Matrix3::Identity() / radius;
-  for (int n = 0; n < shape.size(); ++n) {
-    const Moments p = moments_of(n);
-    gram += shape.value[n] * p * p.transpose();
-    missing -= shape.value[n] * p;
-    missing_slope -= shape.gradient(n) * p.transpose();
-  }
-  const Eigen::FullPivLU<Eigen::Matrix4d> lu(gram);
-  if (!lu.isInvertible())
-    return;
-  const Moments add = lu.solve(missing);
-  const Eigen::Matrix<double, 3, 4> add_slope = lu.solve(missing_slope.transpose()).transpose();
-  for (int n = 0; n < shape.size(); ++n) {
-    const Moments p = moments_of(n);
-    const Vector3 gradient = shape.gradient(n) + shape.value[n] * (add_slope * p);
-    shape.value[n] *= 1 + add.dot(p);
-    shape.dx[n] = gradient.x();
-    shape.dy[n] = gradient.y();
-    shape.dz[n] = gradient.z();
-  }
-}
-
-void SmallBoxes::evaluate(int box, const Vector3& x, ShapeFunctions& shape) const {
-  if (!solvers::evaluate(spheres_, x, shape))
-    throw NumericalError(
-        fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
-  const BoxShapes& cell = cells_[cell_of_[box]];
-  const int lane = lane_of(box);
-  take_out(spheres_, x, shape, [&](int k) {
-    const auto at = std::lower_bound(cell.nodes.begin(), cell.nodes.end(), shape.nodes[k]);
-    if (at == cell.nodes.end() || *at != shape.nodes[k])
-      return true;
-    return cell.gradient_at(at - cell.nodes.begin(), lane).isZero(0);
-  });
 }
 
 void SmallBoxes::add_cell(const topology::Domain& domain, const BackgroundBox& cell) {
@@ -143,14 +95,14 @@ void SmallBoxes::add_cell(const topology::Domain& domain, const BackgroundBox& c
     cells_.push_back(std::move(shapes));
 }
 
-void SmallBoxes::evaluate_all() {
+void SmallBoxes::evaluate(const Spheres& spheres) {
   parallel_ranges(static_cast<int>(cells_.size()), 16, [&](int begin, int end) {
     std::array<ShapeFunctions, BoxShapes::lanes> at;
     for (int c = begin; c < end; ++c) {
       BoxShapes& cell = cells_[c];
       for (int lane = 0; lane < cell.boxes; ++lane) {
         const Vector3& x = boxes_[cell.first_box + lane].middle;
-        if (!solvers::evaluate(spheres_, x, at[lane]))
+        if (!solvers::evaluate(spheres, x, at[lane]))
           throw NumericalError(fmt::format("the quadrature point ({:.6g}, {:.6g}, {:.6g}) m has {} supporting nodes: "
                                            "the nodes leave a hole there",
                                            x.x(), x.y(), x.z(), at[lane].size()));

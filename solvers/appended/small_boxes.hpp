@@ -33,7 +33,7 @@ struct BoxShapes {
 
 class SmallBoxes {
  public:
-  /// The spheres outlive this. Throws NumericalError where the middle of a box has no sound support.
+  /// Throws NumericalError where the middle of a box has no sound support.
   SmallBoxes(const topology::Domain& domain, const NodeCloud& nodes, const Spheres& spheres, double cell_size);
 
   [[nodiscard]] const std::vector<SmallBox>& boxes() const { return boxes_; }
@@ -49,9 +49,6 @@ class SmallBoxes {
   [[nodiscard]] std::span<const int> neighbours(int box) const {
     return std::span(neighbours_).subspan(neighbour_start_[box], neighbour_start_[box + 1] - neighbour_start_[box]);
   }
-  /// Shape functions evaluated at x, but for those of spheres that its box does not feel: no equation knows of their
-  /// unknowns there. Throws NumericalError where no sound support covers x.
-  void evaluate(int box, const Vector3& x, ShapeFunctions& shape) const;
   /// The box that holds x, or the nearest where none does.
   [[nodiscard]] int locate(const Vector3& x) const;
   /// Boxes that may meet the region, ascending.
@@ -61,12 +58,11 @@ class SmallBoxes {
 
  private:
   void add_cell(const topology::Domain& domain, const BackgroundBox& cell);
-  void evaluate_all();
+  void evaluate(const Spheres& spheres);
   void sort_into_bins(const BoundingBox& bounds);
   void find_neighbours();
   [[nodiscard]] std::array<int, 3> bin_of(const Vector3& x) const;
 
-  const Spheres& spheres_;
   std::vector<SmallBox> boxes_;
   std::vector<BoxShapes> cells_;
   std::vector<int> cell_of_, order_;
@@ -77,27 +73,8 @@ class SmallBoxes {
   std::vector<int> bin_start_, bin_boxes_;
 };
 
-/// Takes out the functions for which is_out(k), and corrects the others so that they reproduce linear functions as
-/// before.
-template <class IsOut>
-void take_out(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape, IsOut&& is_out);
-/// h + h M p with p = (1, (x_J - x) / R), so that constants and linear functions are reproduced.
-void reproduce_linear(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape);
-
 /// Part of a small box inside the body: its volume over that of the box, and how far its centroid lies from the box's
 /// centre, m. Exact for a face of the body along a face of the box, of second order otherwise.
 std::pair<double, Vector3> part_inside(const topology::Domain& domain, const Vector3& centre, const Vector3& half);
-
-template <class IsOut>
-void take_out(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape, IsOut&& is_out) {
-  bool any = false;
-  for (int k = 0; k < shape.size(); ++k)
-    if (is_out(k)) {
-      shape.value[k] = shape.dx[k] = shape.dy[k] = shape.dz[k] = 0;
-      any = true;
-    }
-  if (any)
-    reproduce_linear(spheres, x, shape);
-}
 
 } // namespace spherecut::solvers

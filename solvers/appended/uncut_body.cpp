@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace spherecut::solvers {
 
@@ -77,23 +76,6 @@ bool UncutBody::fits(const Problem& problem, int base) const {
   return held == problem_.prescribed.size();
 }
 
-// The weights of a mean by the functions that the boxes integrate.
-void UncutBody::weigh(DisplacementMean& mean) const {
-  std::map<int, double> weights;
-  ShapeFunctions shape;
-  for (const QuadraturePoint& point : mean.share) {
-    boxes_.evaluate(boxes_.locate(point.position), point.position, shape);
-    for (int k = 0; k < shape.size(); ++k)
-      weights[shape.nodes[k]] += point.weight * shape.value[k];
-  }
-  mean.nodes.clear();
-  mean.weights.clear();
-  for (const auto& [node, weight] : weights) {
-    mean.nodes.push_back(node);
-    mean.weights.push_back(weight);
-  }
-}
-
 void UncutBody::assemble() {
   const SurfacePatches patches(*problem_.domain, problem_.nodes);
   if (problem_.prescribed_region)
@@ -101,8 +83,6 @@ void UncutBody::assemble() {
   else
     for (const Prescribed& entry : problem_.prescribed)
       held_.push_back(value_at(spheres_, problem_.nodes.positions[entry.node]));
-  for (DisplacementMean& mean : held_)
-    weigh(mean);
 
   StiffnessTiles tiles(problem_.nodes.positions);
   CellCluster cluster(tiles.groups());

@@ -12,7 +12,7 @@ namespace spherecut::solvers {
 
 struct UncutOptions {
   double support_radius = 1.75; // rho, radius over galerkin_lengths
-  double cell_size = 1;         // largest edge of a background cell in spacings; a small box has half of it
+  double cell_size = 0.625;     // edge of a background cell in spacings; a small box has half of it
   bool estimate_condition = true;
 };
 
@@ -41,7 +41,6 @@ class UncutBody {
 
  private:
   void assemble();
-  void weigh(DisplacementMean& mean) const;
 
   Problem problem_;
   AssemblyReport report_;

@@ -62,9 +62,8 @@ TEST_CASE("A cut that is put off is the same cut in fewer increments") {
 }
 
 TEST_CASE("A pressurised disc opens, by about as much as in an infinite body, and keeps the volume of the block") {
-  const std::string sight = GENERATE(as<std::string>(), "enriched", "appended");
   Session session = session_of(replaced(cut_block, "fine_spacing = 0.005", "fine_spacing = 0.0035") + disc_precut +
-                               "pressure = 100\n[cut]\nsight = \"" + sight + "\"\n");
+                               "pressure = 100\n");
   REQUIRE(session.steps().size() == 1);
   const StepResult result = session.step(session.steps().front());
   REQUIRE(result.cut);
@@ -171,11 +170,10 @@ TEST_CASE("A box cut out of a block: lip nodes keep off the folds of its sheet, 
                               (k & 4) != 0 ? 0.026 : 0.008);
   topology::write_surface(folder.path() / "box.obj", box);
   const std::string coarse = GENERATE(as<std::string>(), "0.012", "0.009", "0.007");
-  const std::string sight = GENERATE(as<std::string>(), "enriched", "appended");
-  const auto file = write_file(folder.path() / "case.toml",
-                               replaced(cut_block, "coarse_spacing = 0.012", "coarse_spacing = " + coarse) +
-                                   "[cut]\nunheld = \"hold\"\nsight = \"" + sight +
-                                   "\"\n[[precut]]\nshape = \"file\"\nfile = \"box.obj\"\npressure = 50\n");
+  const auto file =
+      write_file(folder.path() / "case.toml",
+                 replaced(cut_block, "coarse_spacing = 0.012", "coarse_spacing = " + coarse) +
+                     "[cut]\nunheld = \"hold\"\n[[precut]]\nshape = \"file\"\nfile = \"box.obj\"\npressure = 50\n");
   Session session(read_scenario(file));
   const StepResult last = run(session).back();
   CHECK(last.cut->pieces == 2);
@@ -449,18 +447,15 @@ TEST_CASE("A body that follows the blade gives what building it anew on the same
     CHECK(session.body()->problem().nodes.positions == session.sprinkling().nodes.positions);
     solvers::DiscretisationOptions method = session.scenario().method;
     method.unheld = session.scenario().cut.unheld;
-    if (method_name == "galerkin")
-      method.sight = solvers::SightRule::appended;
     const auto anew = solvers::discretise(session.body()->problem(), method);
     const solvers::Field expected = anew->solve();
     const solvers::Field followed = session.body()->solve();
-    // What a cut has appended may stand in another order.
-    const VectorX moved = session.body()->nodal_displacements(followed),
-                  expected_moved = anew->nodal_displacements(expected);
-    CHECK((moved - expected_moved).norm() < 1e-9 * expected_moved.norm());
+    // A new body of the weak form has finer cells at the front as it is now; the cells of nodes are the same.
+    CHECK((followed.coefficients - expected.coefficients).norm() <
+          (method_name == "galerkin" ? 2e-3 : 1e-9) * expected.coefficients.norm());
     for (const Vector3& x : {Vector3(-0.03, 0.004, 0.02), Vector3(-0.05, -0.01, 0.025), Vector3(0.03, 0, 0.015)})
       CHECK((session.body()->at(x, followed).displacement - anew->at(x, expected).displacement).norm() <
-            1e-9 * expected_moved.lpNorm<Eigen::Infinity>());
+            1e-3 * expected.coefficients.lpNorm<Eigen::Infinity>());
   }
   CHECK(updates >= 2);
   CHECK(session.field().coefficients.norm() > 0);
@@ -487,8 +482,8 @@ TEST_CASE("A run whose systems are updated tells of about the same wound as one 
 TEST_CASE("A body that follows its blade in long increments is built anew, one in short increments is updated") {
   int too_much = 0;
   const auto updates = [&](const std::string& advance) {
-    Session session = session_of(long_block + by_window +
-                                 replaced(incision_at_end, "step = 0.2", "step = 0.1\nadvance = " + advance));
+    Session session =
+        session_of(long_block + replaced(incision_at_end, "step = 0.2", "step = 0.1\nadvance = " + advance));
     std::map<SystemUpdate, int> count;
     too_much = 0;
     for (const StepResult& result : run(session)) {

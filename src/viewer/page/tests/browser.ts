@@ -48,7 +48,7 @@ export async function openPage(
 }
 
 /** How long anything may take at most: a machine that is slow or busy fails no test. */
-export const patience = Number(process.env['SPHERECUT_PATIENCE'] ?? 600); // s
+export const patience = Number(process.env['SPHERECUT_PATIENCE'] ?? 150); // s
 
 /** Waits until `condition` holds in the page; says `what` when it does not in time. */
 export async function until(tab: Tab, what: string, condition: () => boolean, seconds = patience): Promise<void> {

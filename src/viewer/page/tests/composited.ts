@@ -1,10 +1,8 @@
 // What the browser has put together, as a person sees it, and what the camera should show there. Nothing here asks the page to
 // draw: the picture is taken by the browser ten frames after whatever was changed last.
 import assert from 'node:assert/strict';
-import type { Page as Tab } from 'playwright-core';
+import type { CDPSession, Page as Tab } from 'playwright-core';
 import { PNG } from 'pngjs';
-import type { Topology, Vec3 } from '../source/protocol';
-import { castRay, lipEdges } from '../source/surface';
 import { castShadow, type Mask } from './shadow';
 
 export interface Picture {
@@ -12,6 +10,16 @@ export interface Picture {
   height: number;
   ratio: number; // px of the screen per px of the page
   data: Buffer; // RGBA
+}
+
+const sessions = new WeakMap<Tab, CDPSession>();
+
+async function devtools(tab: Tab): Promise<CDPSession> {
+  const known = sessions.get(tab);
+  if (known) return known;
+  const session = await tab.context().newCDPSession(tab);
+  sessions.set(tab, session);
+  return session;
 }
 
 /** Lets the browser show `frames` frames. */
@@ -24,7 +32,9 @@ export async function frames(tab: Tab, count = 10): Promise<void> {
 /** The window as it is composited, ten frames later, as PNG or as JPEG. */
 export async function capture(tab: Tab, format: 'png' | 'jpeg' = 'png', quality = 80, wait = 10): Promise<Buffer> {
   await frames(tab, wait);
-  return tab.screenshot(format === 'png' ? { type: format } : { type: format, quality });
+  const asked = format === 'png' ? { format } : { format, quality };
+  const { data } = await (await devtools(tab)).send('Page.captureScreenshot', asked);
+  return Buffer.from(data, 'base64');
 }
 
 export async function composited(tab: Tab, wait = 10): Promise<Picture> {
@@ -93,10 +103,7 @@ interface Scene {
   covers: Rect[]; // what lies over it
   positions: number[]; // of the surface, m
   triangles: number[];
-  walls: number[]; // triangles of the surface with the walls of its wound
-  parts: number[]; // of those
-  tags: number[]; // of the vertices
-  eye: number[]; // m
+  lips: number[]; // middles of the opened cut, m
   camera: number[]; // column by column: from metres to the cube of what is seen
   tip: number[];
   arrowEnd: number[];
@@ -115,18 +122,20 @@ function scene(tab: Tab): Promise<Scene> {
     };
     const over = [...document.querySelectorAll('#view > :not(canvas)')].filter((part) => part.getClientRects().length > 0);
     const { positions, triangles } = view.body.snapshot()!;
-    const topology = view.body.topology!;
-    const cut = topology.partners.length > 0;
-    const [walls, parts, tags] = cut ? [[...topology.triangles], [...topology.parts], [...topology.tags]] : [[], [], []];
-    const eye = view.orbit.camera.position.toArray();
+    const { partners } = view.body.topology!;
+    const lips: number[] = [];
+    for (let i = 0; i < partners.length; i += 2) {
+      const [a, b] = [3 * partners[i]!, 3 * partners[i + 1]!];
+      for (let d = 0; d < 3; ++d) lips.push(0.5 * (positions[a + d]! + positions[b + d]!));
+    }
     const camera = view.orbit.camera.projectionMatrix.clone().multiply(view.orbit.camera.matrixWorldInverse).toArray();
     const tip = [...frame!.tip];
     const force = Math.hypot(...frame!.force);
     const arrowEnd = tip.map((x, d) => x + frame!.force[d]! / view.tool.scale);
     const toolRadius = session!.tool?.radius ?? 0;
     return {
-      view: rect(view.canvas), covers: over.map(rect), positions: [...positions], triangles: [...triangles], walls, parts, tags, eye, camera, tip,
-      arrowEnd, toolRadius, mode: frame!.mode, force,
+      view: rect(view.canvas), covers: over.map(rect), positions: [...positions], triangles: [...triangles], lips, camera, tip, arrowEnd,
+      toolRadius, mode: frame!.mode, force,
     };
   });
 }
@@ -142,53 +151,10 @@ export interface Seen {
   arrow: number; // px of the arrow about the line from the tip to its end
   arrowLength: number; // px that this line has
   wall: number; // px of the wound's colours
-  lip: number; // px of the colour of its lips
-  lipLength: number; // px that the lips have that the camera sees, and that nothing lies over
-  lipSeen: number; // of them the ones that have a pixel of that colour beside them
+  lip: number;
   hand: number; // px of the hand and its spring
   chart: number; // px of the curve above its zero
   toolPixels: number; // px that the front half of a ball of the tool's radius has; 0: the tip is not in the picture
-}
-
-/** Points on the lips that the camera sees, m, a px of the screen apart. */
-function lipsInSight(told: Scene, project: (x: number, y: number, z: number) => [number, number]): Vec3[] {
-  if (told.walls.length === 0) return [];
-  const { eye, tags, parts, walls } = told;
-  const positions = Float32Array.from(told.positions);
-  const triangles = Uint32Array.from(walls);
-  const edges = lipEdges({ vertexCount: tags.length, triangleCount: parts.length, tags, parts, triangles } as unknown as Topology);
-  const points: Vec3[] = [];
-  for (let i = 0; i < edges.length; i += 2) {
-    const [a, b] = [edges[i]!, edges[i + 1]!].map((v) => [...positions.subarray(3 * v, 3 * v + 3)] as Vec3) as [Vec3, Vec3];
-    const way = a.map((x, d) => 0.5 * (x + b[d]!) - eye[d]!);
-    const far = Math.hypot(...way);
-    const hit = castRay(positions, triangles, positions, eye as Vec3, way.map((x) => x / far) as Vec3);
-    if (hit && hit.distance < far - 5e-4) continue; // behind something else
-    const [from, to] = [project(...a), project(...b)];
-    const steps = Math.max(1, Math.round(Math.hypot(to[0] - from[0], to[1] - from[1])));
-    for (let k = 0; k < steps; ++k) points.push(a.map((x, d) => x + ((k + 0.5) / steps) * (b[d]! - x)) as Vec3);
-  }
-  return points;
-}
-
-/** How many of `places`, px, are in the open, and how many of those have a pixel of a kind within 2 px of the page. */
-function countBeside(picture: Picture, kind: Kind, open: Mask, places: readonly [number, number][]): [number, number] {
-  const { width, height, data } = picture;
-  const reach = Math.ceil(2 * picture.ratio);
-  let [all, found] = [0, 0];
-  for (const [x, y] of places.map(([u, v]) => [Math.floor(u), Math.floor(v)] as const)) {
-    if (x < 0 || x >= width || y < 0 || y >= height || !open[y * width + x]) continue;
-    all += 1;
-    let has = false;
-    for (let v = Math.max(y - reach, 0); !has && v <= Math.min(y + reach, height - 1); ++v) {
-      for (let u = Math.max(x - reach, 0); !has && u <= Math.min(x + reach, width - 1); ++u) {
-        const i = 4 * (v * width + u);
-        has = kinds[kind](data[i]!, data[i + 1]!, data[i + 2]!);
-      }
-    }
-    if (has) found += 1;
-  }
-  return [all, found];
 }
 
 /** Takes a picture and counts what is seen in it against what the camera should see. */
@@ -222,8 +188,6 @@ export async function see(tab: Tab, wait = 10): Promise<Seen> {
     const gap = length > 0 ? Math.hypot(x - (t * (end[0] - tip[0])) / length, y - (t * (end[1] - tip[1])) / length) : Math.hypot(x, y);
     near[i] = gap < 14 * ratio ? 1 : 0;
   }
-  const lips = lipsInSight(told, project).map((x) => project(...x));
-  const [lipLength, lipSeen] = countBeside(picture, 'lip', open, lips);
   const beside = open.map((value, i) => (value && !about[i] ? 1 : 0));
   return {
     picture,
@@ -237,8 +201,6 @@ export async function see(tab: Tab, wait = 10): Promise<Seen> {
     arrowLength: told.force > 0 ? length : 0,
     wall: count(picture, 'wall', organ),
     lip: count(picture, 'lip', organ),
-    lipLength,
-    lipSeen,
     hand: count(picture, 'hand', open),
     chart: count(picture, 'arrow', { ...chart, bottom: chart.bottom - 24 }),
     toolPixels: inside ? 0.5 * Math.PI * radius * radius : 0,
@@ -259,11 +221,4 @@ export function organIsSeen(seen: Seen, when: string): void {
   assert.ok(missing < 0.015 * expected, `${when}: ${missing} of ${expected} px of the organ show what is behind it: ${all}`);
   assert.ok(tissue > 0.6 * expected, `${when}: ${tissue} of ${expected} px have the colours of the organ: ${all}`);
   assert.ok(strays < 0.01 * expected, `${when}: ${strays} px of an organ where none is: ${all}`);
-}
-
-/** The lips of the wound are where the camera sees them; what the tool hides of them is within the share that may be missing. */
-export function woundIsSeen(seen: Seen, least: number, when: string): void {
-  const { lipLength, lipSeen, wall, picture } = seen;
-  assert.ok(lipLength > least * picture.ratio, `${when}: the lips should be ${lipLength} px long`);
-  assert.ok(lipSeen > 0.8 * lipLength, `${when}: ${lipSeen} of ${lipLength} px of the lips are in the picture, ${wall} px of the wound's walls`);
 }

