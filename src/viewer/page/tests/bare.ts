@@ -15,7 +15,7 @@ interface Answer {
 }
 
 export interface Bare {
-  tab: Tab; // `evaluate` and `screenshot`, as PNG, no more
+  tab: Tab; // `evaluate` and a session of the protocol, no more
   send(method: string, params?: object): Promise<Record<string, unknown>>; // to the tab
   toFront(): Promise<void>;
   behindAnother(): Promise<void>;
@@ -53,9 +53,8 @@ export async function openBare(address: string, args: string[]): Promise<Bare> {
     if (exceptionDetails) throw new Error(JSON.stringify(exceptionDetails));
     return (result as { value?: unknown }).value;
   };
-  const screenshot = async (): Promise<Buffer> => Buffer.from((await send('Page.captureScreenshot'))['data'] as string, 'base64');
   return {
-    tab: { evaluate, screenshot } as unknown as Tab,
+    tab: { evaluate, context: () => ({ newCDPSession: async () => ({ send }) }) } as unknown as Tab,
     send,
     toFront: async () => void (await ask('Target.activateTarget', { targetId })),
     behindAnother: async () => {
