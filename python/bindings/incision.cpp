@@ -120,6 +120,7 @@ void bind_incision_class(py::module_& module) {
       .def(py::init(
                [](const std::vector<std::shared_ptr<SurfaceMesh>>& sheets, std::shared_ptr<topology::Domain> domain) {
                  std::vector<SurfaceMesh> copies;
+                 copies.reserve(sheets.size());
                  for (const auto& sheet : sheets)
                    copies.push_back(*sheet);
                  return unlocked([&] { return std::make_shared<Incision>(std::move(copies), std::move(domain)); });

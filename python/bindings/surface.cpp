@@ -85,7 +85,9 @@ topology::LabelVolume volume_from(const py::array& labels, const Doubles& origin
   for (int i = 0; i < ni; ++i)
     for (int j = 0; j < nj; ++j)
       for (int k = 0; k < nk; ++k)
-        volume.labels[static_cast<std::size_t>((k * nj + j) * ni + i)] = values.values[at++];
+        volume.labels[(static_cast<std::size_t>(k) * static_cast<std::size_t>(nj) + static_cast<std::size_t>(j)) *
+                          static_cast<std::size_t>(ni) +
+                      static_cast<std::size_t>(i)] = values.values[at++];
   return volume;
 }
 

@@ -15,6 +15,7 @@ using topology::Wound;
 
 std::vector<SurfaceMesh> sheets_from(const std::vector<std::shared_ptr<SurfaceMesh>>& given) {
   std::vector<SurfaceMesh> sheets;
+  sheets.reserve(given.size());
   for (const auto& sheet : given)
     sheets.push_back(*sheet);
   return sheets;
