@@ -28,6 +28,22 @@ std::vector<Vector3> deformed_nodes(const BodyModel& model) {
   return places;
 }
 
+/// Radius of a node's sphere; of a place without a sphere (on the face of a cut) that of the nearest sphere, m.
+double reach_of(int node, const solvers::Discretisation& body) {
+  if (const double radius = body.sphere_radius(node); radius > 0)
+    return radius;
+  const std::vector<Vector3>& rest = body.problem().nodes.positions;
+  const Vector3& centre = rest[static_cast<std::size_t>(node)];
+  double least = std::numeric_limits<double>::infinity(), reach = 0;
+  for (int other = 0; other < static_cast<int>(rest.size()); ++other)
+    if (const double distance = (rest[static_cast<std::size_t>(other)] - centre).squaredNorm();
+        distance < least && body.sphere_radius(other) > 0) {
+      least = distance;
+      reach = body.sphere_radius(other);
+    }
+  return reach;
+}
+
 PickedNode picked(const ViewerRequest::Pick& pick, const BodyModel& model, const std::vector<Vector3>& deformed) {
   PickedNode result;
   result.key = pick.key;
@@ -44,10 +60,10 @@ PickedNode picked(const ViewerRequest::Pick& pick, const BodyModel& model, const
   const std::vector<Vector3>& rest = model.body->problem().nodes.positions;
   const Vector3& centre = rest[static_cast<std::size_t>(result.node)];
   result.position = deformed[static_cast<std::size_t>(result.node)];
-  result.radius = model.body->sphere_radius(result.node);
+  result.radius = reach_of(result.node, *model.body);
   for (std::size_t i = 0; i < rest.size(); ++i) {
     const int node = static_cast<int>(i);
-    if (node == result.node || (rest[i] - centre).norm() >= result.radius)
+    if (node == result.node || (rest[i] - centre).norm() >= result.radius || model.body->sphere_radius(node) <= 0)
       continue;
     const bool hidden = model.incision != nullptr && model.incision->blocks(centre, rest[i]);
     (hidden ? result.hidden : result.seen).push_back(node);

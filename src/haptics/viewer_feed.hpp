@@ -33,8 +33,8 @@ struct ViewerRequest {
 struct PickedNode {
   int key = 0, node = 0;
   Vector3 position = Vector3::Zero(); // m, deformed
-  double radius = 0;                  // m, of its support
-  std::vector<int> seen, hidden;      // nodes within it, without itself; hidden: by the cut
+  double radius = 0;                  // m, of its sphere; of a place without one, of the nearest sphere
+  std::vector<int> seen, hidden;      // nodes within it that have spheres, without itself; hidden: by the cut
 };
 
 struct FieldSlice {

@@ -131,8 +131,11 @@ inline std::string long_bar(double strain, double toughness, const std::string& 
 }
 
 /// The shallow notch, which tears on in short increments.
+/// A cut whose bodies are followed by updates of a window, or made beside the steps.
+inline const std::string by_window = "[cut]\nsight = \"enriched\"\n";
+
 inline std::string growing_notch(const std::string& method) {
-  return shallow_notch + "[method]\nname = \"" + method + "\"\n[tearing]\nstep = 0.4\n";
+  return shallow_notch + by_window + "[method]\nname = \"" + method + "\"\n[tearing]\nstep = 0.4\n";
 }
 
 inline std::string stretched(const std::string& text) {

@@ -38,13 +38,14 @@ std::string blade_through(const std::vector<std::string>& positions) {
   return text;
 }
 
-const std::string pressed_and_cut =
-    cut_block + press + blade_through({"[-0.02, 0.001, 0.034]", "[-0.022, 0, 0.012]"}) + "[output]\nfigures = false\n";
+const std::string pressed_and_cut = cut_block + by_window + press +
+                                    blade_through({"[-0.02, 0.001, 0.034]", "[-0.022, 0, 0.012]"}) +
+                                    "[output]\nfigures = false\n";
 
 // In on a way that turns, out again, and in beside it.
-const std::string in_and_out =
-    cut_block + blade_through({"[-0.004, 0, 0.034]", "[-0.004, 0, 0.022]", "[0.002, 0.001, 0.020]", "[0.003, 0, 0.036]",
-                               "[0.012, 0, 0.036]", "[0.012, 0, 0.021]"});
+const std::string in_and_out = cut_block + by_window +
+                               blade_through({"[-0.004, 0, 0.034]", "[-0.004, 0, 0.022]", "[0.002, 0.001, 0.020]",
+                                              "[0.003, 0, 0.036]", "[0.012, 0, 0.036]", "[0.012, 0, 0.021]"});
 
 // Of a plain run, m2.
 double cut_area(const Scenario& scenario) {

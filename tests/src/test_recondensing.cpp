@@ -19,7 +19,7 @@ const std::string bar =
     replaced(replaced(replaced(replaced(cut_block, "0.06, 0.06, 0.03]", "0.24, 0.03, 0.03]"), "0.005", "0.004"),
                       "0.012", "0.01"),
              "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]") +
-    R"([blade]
+    by_window + R"([blade]
 edge = [[0, -0.006, 0], [0, 0.006, 0.001]]
 step = 0.125
 [[blade.path]]

@@ -164,7 +164,7 @@ TEST_CASE("Increments of a tear that are refused once each leave the fine zone's
 }
 
 TEST_CASE("A blade's cut that fails once the body has followed it leaves a body in balance and reports no nodes") {
-  Session session = session_of(long_block + incision_at_end);
+  Session session = session_of(long_block + by_window + incision_at_end);
   std::size_t i = 0;
   for (; i < 4; ++i)
     session.step(session.steps()[i]);
@@ -213,7 +213,8 @@ position = [0.003, 0, 0.012]
 }
 
 TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the next one makes up for it") {
-  const std::string text = cut_block + replaced(incision_at_end, "step = 0.2", "step = 0.05\nadvance = 0.3");
+  const std::string text =
+      cut_block + by_window + replaced(incision_at_end, "step = 0.2", "step = 0.05\nadvance = 0.3");
   const Scenario scenario = scenario_of(replaced(replaced(text, "-0.042", "-0.012"), "-0.043", "-0.013"));
   Session plain(scenario), session(scenario);
   session.set_following_aside(true);

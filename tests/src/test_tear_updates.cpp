@@ -103,7 +103,7 @@ TEST_CASE("A tear whose systems are updated goes the way of one that rebuilds th
 }
 
 TEST_CASE("A tear that concerns most of a body rebuilds it at every increment, and says so") {
-  Session session(scenario_of(stretched_bar(0.15, 0.05, bar_notch + "[tearing]\nmost_increments = 2\n")));
+  Session session(scenario_of(stretched_bar(0.15, 0.05, bar_notch + by_window + "[tearing]\nmost_increments = 2\n")));
   const StepResult result = session.step(session.steps().front());
   REQUIRE(result.tear->increments.size() == 3);
   for (std::size_t k = 1; k < 3; ++k) {
