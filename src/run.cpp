@@ -27,31 +27,6 @@ std::string short_text(const Session& session) {
                      1e3 * topology::volume(domain.surface()));
 }
 
-/// Throws NumericalError where what the step found is not finite or larger than any tissue: such rows are not written.
-void require_tissue(const Session& session, const StepResult& step) {
-  const double limit = farthest * session.organ().domain->bounds().extent().maxCoeff();
-  const auto refuse = [&](const std::string& what) {
-    throw NumericalError(fmt::format("t = {:g} s: {}; allowed: up to {:.3g} m, {:g} times the organ's largest extent. "
-                                     "Nodes too coarse for the cut do "
-                                     "that (finer: nodes.fine_spacing, cut.front_spacing, nodes.count), or loads too "
-                                     "large for linear elasticity. The "
-                                     "rows up to then are kept",
-                                     step.time, what, limit, farthest));
-  };
-  const std::vector<Vector3>& positions = session.sprinkling().nodes.positions;
-  const std::vector<solvers::PointState>& states = session.node_states();
-  for (std::size_t i = 0; i < states.size(); ++i)
-    if (const double motion = states[i].displacement.norm(); !(motion <= limit))
-      refuse(fmt::format("the node at [{:.4g}, {:.4g}, {:.4g}] m has moved by {:.3g} m", positions[i].x(),
-                         positions[i].y(), positions[i].z(), motion));
-  if (!step.cut)
-    return;
-  if (!(step.cut->opening <= limit))
-    refuse(fmt::format("the faces of the cut are {:.3g} m apart", step.cut->opening));
-  if (!std::isfinite(step.cut->opening_volume))
-    refuse(fmt::format("the cut encloses {:.3g} m3", step.cut->opening_volume));
-}
-
 std::string findings_text(const Session& session, const RunOutput& output, const std::filesystem::path& out) {
   const RunFindings& found = output.findings();
   std::string text;
@@ -182,6 +157,30 @@ class FolderClaim {
 };
 
 } // namespace
+
+void require_tissue(const Session& session, const StepResult& step) {
+  const double limit = farthest * session.organ().domain->bounds().extent().maxCoeff();
+  const auto refuse = [&](const std::string& what) {
+    throw NumericalError(fmt::format("t = {:g} s: {}; allowed: up to {:.3g} m, {:g} times the organ's largest extent. "
+                                     "Nodes too coarse for the cut do "
+                                     "that (finer: nodes.fine_spacing, cut.front_spacing, nodes.count), or loads too "
+                                     "large for linear elasticity. The "
+                                     "rows up to then are kept",
+                                     step.time, what, limit, farthest));
+  };
+  const std::vector<Vector3>& positions = session.sprinkling().nodes.positions;
+  const std::vector<solvers::PointState>& states = session.node_states();
+  for (std::size_t i = 0; i < states.size(); ++i)
+    if (const double motion = states[i].displacement.norm(); !(motion <= limit))
+      refuse(fmt::format("the node at [{:.4g}, {:.4g}, {:.4g}] m has moved by {:.3g} m", positions[i].x(),
+                         positions[i].y(), positions[i].z(), motion));
+  if (!step.cut)
+    return;
+  if (!(step.cut->opening <= limit))
+    refuse(fmt::format("the faces of the cut are {:.3g} m apart", step.cut->opening));
+  if (!std::isfinite(step.cut->opening_volume))
+    refuse(fmt::format("the cut encloses {:.3g} m3", step.cut->opening_volume));
+}
 
 RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::path& out, std::FILE* screen) {
   const InterruptWatch watch(

@@ -2,7 +2,7 @@
 # never include upward, and the headers of the first two need the standard library and Eigen alone.
 cmake_minimum_required(VERSION 3.25)
 set(floors topology solvers src experiments)
-set(known ${floors} tests) # other folders are made by the build
+set(known ${floors} python tests) # other folders are made by the build
 set(offences "")
 set(below "")
 foreach(floor ${floors})
