@@ -100,10 +100,13 @@ export class Body {
     this.moved();
   }
 
-  setVertices(vertices: Float32Array): void {
-    if (!this.positions || this.positions.array.length !== vertices.length) return;
-    this.positions.array.set(vertices);
+  /** False: they are where they were. A tool that hovers is solved for too. */
+  setVertices(vertices: Float32Array): boolean {
+    const positions = this.positions?.array;
+    if (!positions || positions.length !== vertices.length || vertices.every((x, i) => x === positions[i])) return false;
+    positions.set(vertices);
     this.moved();
+    return true;
   }
 
   /** Colours by value between `low` and `high`; null: the tissue's own. */

@@ -269,7 +269,7 @@ export class Page {
     this.frame = frame;
     this.stylus.answered(frame.poseInSolve);
     if (frame.vertices) this.seenVertices += 1;
-    if (frame.vertices && moves) body.setVertices(frame.vertices);
+    const bodyMoved = frame.vertices !== null && moves && body.setVertices(frame.vertices);
     // What has been switched off since this was asked for stays away.
     const { colours, supports, slice } = this.panels;
     if (frame.vertices || frame.scalars) this.scalars = colours.value === 'none' ? null : frame.scalars;
@@ -284,7 +284,7 @@ export class Page {
     if (frame.mode === 'blade') this.view.follow(frame, this.session.blade?.edge ?? []);
     this.chart.add(frame.tickTime, Math.hypot(...frame.force));
     this.panels.showFrame(frame);
-    if (frame.vertices || frame.scalars || frame.nodes || frame.support || frame.slice) this.view.change();
+    if (bodyMoved || frame.scalars || frame.nodes || frame.support || frame.slice) this.view.change();
     else this.view.moved();
   }
 
