@@ -8,7 +8,6 @@ set(below "")
 foreach(floor ${floors})
   list(APPEND below ${floor})
   file(GLOB_RECURSE files RELATIVE "${ROOT}" "${ROOT}/${floor}/*.hpp" "${ROOT}/${floor}/*.inl" "${ROOT}/${floor}/*.cpp")
-  list(FILTER files EXCLUDE REGEX "^src/main\\.cpp$") # the binary stands on top of all floors
   foreach(file ${files})
     file(STRINGS "${ROOT}/${file}" lines REGEX "^#include ")
     foreach(line ${lines})
