@@ -178,3 +178,39 @@ def test_errors_of_mechanics_are_told():
         body.force_response(np.array([99999]), [[0, 0, 1]])
     with pytest.raises(sc.InputError, match="body: it has no cut"):
         sc.front_states(body, body.solve(), 1.0, 0.01)
+
+
+def test_a_law_as_a_function_gives_what_the_built_in_one_gives():
+    domain, nodes = block_nodes(0.009)
+    built_in = sc.Material(1e4, 0.45, 1100.0)
+
+    def law(strain):
+        return built_in.lame_lambda * np.trace(strain) * np.eye(3) + 2 * built_in.shear_modulus * strain
+
+    told = sc.material_of_law(law, 1100.0)
+    assert abs(told.young_modulus / 1e4 - 1) < 1e-12 and abs(told.poisson_ratio - 0.45) < 1e-12
+    held = [sc.Held(sc.Region.half_space([0, 0, 0], [0, 0, 1]))]
+    fields = []
+    for material in (built_in, told):
+        body = sc.Body(domain, nodes, material, held, body_force=[0, 0, -1e4])
+        fields.append(body.nodal_displacements(body.solve()))
+    assert np.abs(fields[0] - fields[1]).max() < 1e-10 * np.abs(fields[0]).max()
+
+
+def test_a_law_that_the_solvers_do_not_know_is_refused():
+    def stiffening(strain):
+        return 1e4 * (1 + np.trace(strain @ strain)) * strain
+
+    def along_fibres(strain):
+        return 1e4 * strain + 1e4 * np.diag([strain[0, 0], 0, 0])
+
+    for law, words in [
+        (stiffening, "not linear and isotropic"),
+        (along_fibres, "not linear and isotropic"),
+        (lambda strain: strain[0], "shape"),
+        (lambda strain: strain * np.nan, "not finite"),
+        (lambda strain: -1e4 * strain, "mu and lambda"),
+        (lambda strain: 1e4 * np.trace(strain) * np.eye(3), "mu and lambda"),
+    ]:
+        with pytest.raises(sc.InputError, match=words):
+            sc.material_of_law(law)
