@@ -287,7 +287,7 @@ def doxygen(out: Path, used: list[str]) -> None:
         "PROJECT_NAME": "Spherecut", "OUTPUT_DIRECTORY": folder, "GENERATE_HTML": "NO", "GENERATE_LATEX": "NO", "GENERATE_XML": "YES",
         "XML_PROGRAMLISTING": "NO", "INPUT": " ".join(str(ROOT / header) for header in used), "FULL_PATH_NAMES": "YES",
         "STRIP_FROM_PATH": ROOT, "QUIET": "YES", "WARNINGS": "YES", "WARN_IF_UNDOCUMENTED": "NO", "WARN_NO_PARAMDOC": "NO", "WARN_AS_ERROR": "FAIL_ON_WARNINGS",
-        "EXTRACT_ALL": "YES", "EXTRACT_PRIVATE": "NO", "INPUT_FILTER": f"'/usr/bin/python3 {SITE / 'doxygen_filter.py'}'", "MARKDOWN_SUPPORT": "NO",
+        "EXTRACT_ALL": "YES", "EXTRACT_PRIVATE": "NO", "INPUT_FILTER": f'"/usr/bin/python3 {SITE / "doxygen_filter.py"}"', "MARKDOWN_SUPPORT": "NO",
         "AUTOLINK_SUPPORT": "NO", "ENABLE_PREPROCESSING": "YES", "MACRO_EXPANSION": "NO", "JAVADOC_AUTOBRIEF": "NO", "SORT_MEMBER_DOCS": "NO",
         "WARN_FORMAT": '"$file:$line: $text"',
     }
@@ -295,6 +295,10 @@ def doxygen(out: Path, used: list[str]) -> None:
     done = subprocess.run(["doxygen", str(folder / "Doxyfile")], capture_output=True, text=True)
     if done.returncode != 0:
         fail(f"Doxygen has something to say:\n{done.stdout}{done.stderr}")
+    for header in used:
+        name = header.rsplit("/", 1)[1][:-4]
+        if "<inner" not in (folder / "xml" / f"{name.replace('_', '__')}_8hpp.xml").read_text():
+            fail(f"Doxygen has found nothing in {header}")
 
 
 def cpp_reference(staging: Staging, used: list[str]) -> None:

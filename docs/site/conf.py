@@ -1,6 +1,8 @@
 """Settings of Sphinx; docs/site/build.py stages the pages and runs it."""
 
+import logging
 import os
+import re
 
 project = "Spherecut"
 author = "The Spherecut maintainers"
@@ -45,3 +47,16 @@ pygments_style = "friendly"
 highlight_language = "text"
 add_module_names = False
 nitpicky = False
+
+
+# Breathe declares the namespaces of a header on the header's page, and Sphinx warns that they are on another page too. A
+# lambda as a default value is shown as it is written; Sphinx warns that it does not understand it.
+class NotWarnings(logging.Filter):
+    def filter(self, record: logging.LogRecord) -> bool:
+        text = record.getMessage()
+        namespace = re.search(r"Declaration is '\.\. cpp:type:: (spherecut|topology|solvers|app)'", text)
+        fallback = "Using fallback parser" in text and re.search(r"= ?\[\] ?[({]", text)
+        return not namespace and not fallback
+
+
+logging.getLogger("sphinx.sphinx.domains.cpp").addFilter(NotWarnings())
