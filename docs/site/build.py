@@ -15,7 +15,9 @@ import re
 import shutil
 import subprocess
 import sys
+from html import unescape
 from pathlib import Path
+from urllib.parse import unquote
 
 SITE = Path(__file__).resolve().parent
 ROOT = SITE.parent.parent
@@ -371,6 +373,31 @@ def copy_mathjax(html: Path) -> None:
             shutil.copy(source / name, target / name)
 
 
+def check_links(html: Path) -> int:
+    """Every link within the site leads to a file of it, and to a place in that file. Returns how many there are."""
+    places: dict[Path, set[str]] = {}
+
+    def names(file: Path) -> set[str]:
+        if file not in places:
+            places[file] = set(re.findall(r'\b(?:id|name)="([^"]+)"', file.read_text()))
+        return places[file]
+
+    count, broken = 0, []
+    for page in sorted(html.rglob("*.html")):
+        for target in set(re.findall(r'\b(?:href|src)="([^"]+)"', page.read_text())):
+            target = unquote(unescape(target))
+            if re.match(r"[a-z]+:", target) or (target.startswith("#") and not target[1:]):
+                continue
+            count += 1
+            path, _, anchor = target.partition("#")
+            file = (page.parent / path.partition("?")[0]).resolve() if path else page
+            if not file.is_file() or (anchor and file.suffix == ".html" and anchor not in names(file)):
+                broken.append(f"{page.relative_to(html)}: '{target}'")
+    if broken:
+        fail("links that lead nowhere:\n" + "\n".join(broken))
+    return count
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=Path, required=True)
@@ -389,6 +416,7 @@ def main() -> None:
     if done.returncode != 0:
         fail("Sphinx has something to say (above)")
     copy_mathjax(out / "html")
+    print(f"{len(list((out / 'html').rglob('*.html')))} pages, {check_links(out / 'html')} links")
     print(f"The site is {out / 'html' / 'index.html'}")
 
 

@@ -59,4 +59,5 @@ class NotWarnings(logging.Filter):
         return not namespace and not fallback
 
 
-logging.getLogger("sphinx.sphinx.domains.cpp").addFilter(NotWarnings())
+for name in ("sphinx.sphinx.domains.cpp", "sphinx.sphinx.util.cfamily"):
+    logging.getLogger(name).addFilter(NotWarnings())

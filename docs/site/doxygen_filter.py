@@ -12,7 +12,26 @@ MEMBER = re.compile(r"^(?P<code>\s*[^/\s][^/]*[;,{}])?(?P<gap>\s*)//(?P<kind>/?)
 
 def escaped(text: str) -> str:
     text = re.sub(r"([\\@])", r"\\\1", text)
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace('"', "&quot;").replace("#", "\\#").replace("::", "\\::")
+    for plain, safe in [("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;"), ("#", "\\#"), ("::", "\\::")]:
+        text = text.replace(plain, safe)
+    return re.sub(r"`([^`]+)`", r"<tt>\1</tt>", text)
+
+
+def is_formula(line: str) -> bool:
+    return re.match(r"\s*///   ", line) is not None
+
+
+def block(lines: list[str]) -> list[str]:
+    """Formulas stand by themselves in a comment, indented: they keep their lines."""
+    out: list[str] = []
+    inside = False
+    for k, line in enumerate(lines):
+        formula = is_formula(line) and (inside or (k > 0 and lines[k - 1].strip() == "///"))
+        if formula != inside:
+            out.append("/// \\verbatim" if formula else "/// \\endverbatim")
+            inside = formula
+        out.append(line)
+    return out
 
 
 def filtered(lines: list[str]) -> list[str]:
@@ -22,7 +41,9 @@ def filtered(lines: list[str]) -> list[str]:
         line = lines[k]
         k += 1
         if at_top and line.startswith("//"):
-            out.append(("/// \\file\n" if len(out) == 0 else "") + "///" + escaped(line[2:]))
+            if not out:
+                out.append("/// \\file")
+            out.append("///" + (line[2:] if is_formula("/" + line) else escaped(line[2:])))
             continue
         at_top = False
         found = MEMBER.match(line)
@@ -37,7 +58,7 @@ def filtered(lines: list[str]) -> list[str]:
             continue
         code, gap, kind, text = found["code"] or "", found["gap"], found["kind"], found["text"]
         if kind:
-            out.append(f"{code}{gap}///{escaped(text)}")
+            out.append(line if is_formula(line) else f"{code}{gap}///{escaped(text)}")
             behind = False
         elif code and code.rstrip().endswith((";", ",")) and "NOLINT" not in text:
             out.append(f"{code}{gap}///<{escaped(text)}")
@@ -47,7 +68,7 @@ def filtered(lines: list[str]) -> list[str]:
         else:
             out.append(line)
             behind = False
-    return out
+    return block(out)
 
 
 if __name__ == "__main__":
