@@ -45,14 +45,14 @@ logged() {
 
 start=$SECONDS
 logged debootstrap debootstrap --variant=minbase bookworm "$root" "$mirror"
-say "bare Debian: $(du -sm "$root" | cut -f 1) MB, $(inside dpkg-query -W | wc -l) packages, $((SECONDS - start)) s"
+say "bare Debian: $(du -smx "$root" | cut -f 1) MB, $(inside dpkg-query -W | wc -l) packages, $((SECONDS - start)) s"
 mount -t proc proc "$root/proc" 2>/dev/null || mount --bind /proc "$root/proc" || fail "/proc cannot be mounted in the new root"
 
 start=$SECONDS
 cp "$deb" "$root/tmp/"
 logged "apt-get update" inside apt-get -q update
 logged "apt-get install" inside apt-get -q -y install "/tmp/$(basename "$deb")"
-say "with $(basename "$deb") ($(du -k "$deb" | cut -f 1) kB): $(du -sm --exclude=./proc "$root" | cut -f 1) MB, $(inside dpkg-query -W | wc -l) packages, $((SECONDS - start)) s"
+say "with $(basename "$deb") ($(du -k "$deb" | cut -f 1) kB): $(du -smx "$root" | cut -f 1) MB, $(inside dpkg-query -W | wc -l) packages, $((SECONDS - start)) s"
 for compiler in cc gcc g++ c++ clang cmake ninja make; do
   if inside sh -c "command -v $compiler" >/dev/null; then fail "$compiler is there: this shows nothing"; fi
 done
