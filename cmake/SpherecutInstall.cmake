@@ -25,7 +25,12 @@ install(CODE [=[
 ]=])
 install(DIRECTORY "${SPHERECUT_PAGE_FOLDER}/" DESTINATION "${CMAKE_INSTALL_DATADIR}/spherecut/page" OPTIONAL)
 install(DIRECTORY scenarios DESTINATION "${CMAKE_INSTALL_DATADIR}/spherecut" FILES_MATCHING PATTERN "*.toml")
-install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+# Pages and examples lie to each other as they do here, so that links among them hold. The site where it is built
+# (./dev docs).
+install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY docs examples DESTINATION "${CMAKE_INSTALL_DOCDIR}"
+  PATTERN site EXCLUDE PATTERN __pycache__ EXCLUDE)
+install(DIRECTORY "${PROJECT_SOURCE_DIR}/build/docs/html" DESTINATION "${CMAKE_INSTALL_DOCDIR}" OPTIONAL)
 
 configure_package_config_file(cmake/spherecutConfig.cmake.in "${PROJECT_BINARY_DIR}/spherecutConfig.cmake"
   INSTALL_DESTINATION "${SPHERECUT_PACKAGE_FOLDER}")

@@ -1,0 +1,17 @@
+# cpack runs this on the tree that it is going to pack: modules go where Debian's Python looks for those of packages.
+set(from "${CPACK_TEMPORARY_INSTALL_DIRECTORY}${CPACK_PACKAGING_INSTALL_PREFIX}/${CPACK_SPHERECUT_PYTHON_FOLDER}/spherecut")
+set(to "${CPACK_TEMPORARY_INSTALL_DIRECTORY}${CPACK_PACKAGING_INSTALL_PREFIX}/lib/python3/dist-packages")
+if(EXISTS "${from}")
+  file(MAKE_DIRECTORY "${to}")
+  file(RENAME "${from}" "${to}/spherecut")
+  # Folders that are empty now.
+  cmake_path(GET from PARENT_PATH folder)
+  while(NOT folder STREQUAL "${CPACK_TEMPORARY_INSTALL_DIRECTORY}${CPACK_PACKAGING_INSTALL_PREFIX}")
+    file(GLOB left "${folder}/*")
+    if(left)
+      break()
+    endif()
+    file(REMOVE_RECURSE "${folder}")
+    cmake_path(GET folder PARENT_PATH folder)
+  endwhile()
+endif()
