@@ -63,9 +63,7 @@ std::vector<std::array<bool, 3>> axes_held_together(const std::vector<FixedRegio
 solvers::DiscretisationOptions method_of(const Scenario& scenario) {
   solvers::DiscretisationOptions options = scenario.method;
   options.unheld = scenario.cut.unheld;
-  if (cut_appends(scenario))
-    options.sight = solvers::SightRule::appended;
-  else if (scenario.cut.sight)
+  if (scenario.cut.sight)
     options.sight = *scenario.cut.sight;
   return options;
 }
@@ -117,9 +115,7 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
 } // namespace
 
 bool cut_appends(const Scenario& scenario) {
-  const bool cuts = scenario.blade || !scenario.precuts.empty() || scenario.tearing.enabled;
-  return cuts && scenario.method.method == solvers::Method::galerkin &&
-         scenario.cut.sight.value_or(solvers::SightRule::appended) == solvers::SightRule::appended;
+  return scenario.method.method == solvers::Method::galerkin && scenario.cut.sight == solvers::SightRule::appended;
 }
 
 int BodyModel::nearest_seen(const Vector3& x) const {

@@ -20,7 +20,7 @@ class UncutBody;
 
 namespace spherecut::app {
 
-/// Whether a cut of this scenario's body only appends unknowns: method galerkin, unless cut.sight is another rule.
+/// Whether a cut of this scenario's body only appends unknowns (cut.sight = "appended").
 bool cut_appends(const Scenario& scenario);
 
 struct BodyModel {
