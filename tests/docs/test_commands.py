@@ -3,6 +3,7 @@ failure, and so is an entry of the list that no page has any more. The environme
 SPHERECUT_COMMAND."""
 
 import functools
+import importlib.util
 import os
 import re
 import shutil
@@ -21,6 +22,7 @@ S = r"(?:build/release/)?spherecut"
 
 # How a command is tried. The first entry whose pattern is the whole command counts.
 #   run          in a scratch copy of the repository, after what the page has before it; it must end with 0
+#   run_python   likewise, where the Python package is built and matplotlib is there
 #   run_short    likewise, with words replaced so that it takes seconds and neither the network nor the clock
 #   parse        the program, its subcommand, options and files are there, and `spherecut check` accepts its scenario. For
 #                what takes minutes, for servers, for what waits for a hand
@@ -44,7 +46,7 @@ HOW = [
     (rf"{S} run SCENARIO\.toml --out DIR", "run"),
     (rf"{S} experiment run hertz --out out/hertz", "run_short", {"hertz": "hertz --quick"}),
     (rf"{S} haptics scenarios/liver\.toml --duration 10 --out out/hand", "run_short", {"--duration 10": "--duration 0.3 --virtual"}),
-    (r"PYTHONPATH=build/release/python python3 examples/python/press_a_liver\.py --out \.", "run"),
+    (r"PYTHONPATH=build/release/python python3 examples/python/press_a_liver\.py --out \.", "run_python"),
     (r"cmake --install build/release --prefix DIR", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--prefix"),
     (r"cmake --install build/release --component python", "elsewhere", "tests/python/test_package.py", "--component"),
     (r"cmake --install", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--install"),
@@ -220,6 +222,10 @@ def run(text: str, folder: Path) -> None:
     assert done.returncode == 0, f"'{text}' ended with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
 
 
+def can_draw() -> bool:
+    return bool(list((BUILD / "python" / "spherecut").glob("_core*.so"))) and importlib.util.find_spec("matplotlib") is not None
+
+
 WAYS = {"parse": parse, "dev": dev, "ctest": ctest, "page_tests": page_tests, "targets": targets, "elsewhere": elsewhere,
         "packages": packages}
 
@@ -258,7 +264,7 @@ def test_commands_of(page, tmp_path):
         try:
             if isinstance(entry, Written):
                 (folder / entry.name).write_text(entry.text)
-            elif way == "run":
+            elif way == "run" or (way == "run_python" and can_draw()):
                 run(entry.text, folder)
             elif way == "run_short":
                 text = entry.text
@@ -266,7 +272,7 @@ def test_commands_of(page, tmp_path):
                     assert long in text
                     text = re.sub(rf"(?<!/){re.escape(long)}\b", short, text, count=1)
                 run(text, folder)
-            else:
+            elif way != "run_python":
                 WAYS[way](entry.text, *arguments)
         except AssertionError as error:
             raise AssertionError(f"{entry}\n{error}") from None
