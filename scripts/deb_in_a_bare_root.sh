@@ -15,7 +15,7 @@ usage() {
   printf 'Usage: %s DEB [RESULTS]\n' "$0" >&2
   exit 2
 }
-[ $# -ge 1 ] && [ $# -le 2 ] || usage
+if [ $# -lt 1 ] || [ $# -gt 2 ]; then usage; fi
 deb=$(readlink -f "$1")
 results=${2:-$source/out/bare_root}
 [ -f "$deb" ] || fail "$1: there is no such file (./dev package makes it)"

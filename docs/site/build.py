@@ -148,7 +148,7 @@ def run_example(script: Path, build: Path, cache: Path) -> tuple[str, Path]:
         folder.mkdir(parents=True)
         print(f"  running {script.relative_to(ROOT)}", flush=True)
         environment = os.environ | {"PYTHONPATH": str(package.parent), "MPLBACKEND": "Agg", "OPENBLAS_NUM_THREADS": "1"}
-        done = subprocess.run(["/usr/bin/python3", str(script), "--out", str(folder)], env=environment, capture_output=True, text=True)
+        done = subprocess.run([sys.executable, str(script), "--out", str(folder)], env=environment, capture_output=True, text=True)
         if done.returncode != 0 or not picture.exists():
             fail(f"{script.relative_to(ROOT)} ended with {done.returncode}:\n{done.stdout}{done.stderr}")
         said.write_text(done.stdout)
@@ -289,7 +289,7 @@ def doxygen(out: Path, used: list[str]) -> None:
         "PROJECT_NAME": "Spherecut", "OUTPUT_DIRECTORY": folder, "GENERATE_HTML": "NO", "GENERATE_LATEX": "NO", "GENERATE_XML": "YES",
         "XML_PROGRAMLISTING": "NO", "INPUT": " ".join(str(ROOT / header) for header in used), "FULL_PATH_NAMES": "YES",
         "STRIP_FROM_PATH": ROOT, "QUIET": "YES", "WARNINGS": "YES", "WARN_IF_UNDOCUMENTED": "NO", "WARN_NO_PARAMDOC": "NO", "WARN_AS_ERROR": "FAIL_ON_WARNINGS",
-        "EXTRACT_ALL": "YES", "EXTRACT_PRIVATE": "NO", "INPUT_FILTER": f'"/usr/bin/python3 {SITE / "doxygen_filter.py"}"', "MARKDOWN_SUPPORT": "NO",
+        "EXTRACT_ALL": "YES", "EXTRACT_PRIVATE": "NO", "INPUT_FILTER": f'"{sys.executable} {SITE / "doxygen_filter.py"}"', "MARKDOWN_SUPPORT": "NO",
         "AUTOLINK_SUPPORT": "NO", "ENABLE_PREPROCESSING": "YES", "MACRO_EXPANSION": "NO", "JAVADOC_AUTOBRIEF": "NO", "SORT_MEMBER_DOCS": "NO",
         "WARN_FORMAT": '"$file:$line: $text"',
     }
@@ -411,7 +411,7 @@ def main() -> None:
     version = re.search(r"project\(spherecut VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())
     environment = os.environ | {"SPHERECUT_DOXYGEN": "" if given.pages_only else str(out / "doxygen" / "xml"),
                                 "SPHERECUT_DOCS_VERSION": version.group(1) if version else ""}
-    done = subprocess.run(["/usr/bin/python3", "-m", "sphinx", "-b", "html", "-W", "--keep-going", "-q", "-d", str(out / "doctrees"),
+    done = subprocess.run([sys.executable, "-m", "sphinx", "-b", "html", "-W", "--keep-going", "-q", "-d", str(out / "doctrees"),
                            str(out / "source"), str(out / "html")], env=environment)
     if done.returncode != 0:
         fail("Sphinx has something to say (above)")

@@ -1,0 +1,313 @@
+"""Every command in README, CONTRIBUTING and docs/ is tried, as the list below says. A command that it does not know is a
+failure, and so is an entry of the list that no page has any more. The environment has SPHERECUT_SOURCE, SPHERECUT_BUILD,
+SPHERECUT_COMMAND."""
+
+import functools
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from commands import Command, Written, commands_of, pages, words
+
+SOURCE = Path(os.environ["SPHERECUT_SOURCE"])
+BUILD = Path(os.environ["SPHERECUT_BUILD"])
+PROGRAM = Path(os.environ["SPHERECUT_COMMAND"])
+PLACEHOLDERS = {"SCENARIO.toml": "scenarios/block_punch.toml", "SCENARIO": "scenarios/block_punch.toml"}
+S = r"(?:build/release/)?spherecut"
+
+# How a command is tried. The first entry whose pattern is the whole command counts.
+#   run          in a scratch copy of the repository, after what the page has before it; it must end with 0
+#   run_python   likewise, where the Python package is built and matplotlib is there
+#   run_short    likewise, with words replaced so that it takes seconds and neither the network nor the clock
+#   parse        the program, its subcommand, options and files are there, and `spherecut check` accepts its scenario. For
+#                what takes minutes, for servers, for what waits for a hand
+#   dev          ./dev has that command and those options (what they do takes minutes)
+#   ctest        some test has that name
+#   page_tests   tests/page/run.sh has that kind of test (ctest runs them)
+#   targets      CMake has that preset, that option, that target
+#   elsewhere    the test named behind it runs it
+#   packages     the files have the names that packing gives them; scripts/deb_in_a_bare_root.sh is what tries it
+HOW = [
+    (rf"{S} check scenarios/\w+\.toml", "run"),
+    (rf"{S} check press\.toml", "run"),
+    (rf"{S} run press\.toml --out out/press", "run"),
+    (rf"{S} run scenarios/(?:block_punch|block_slice)\.toml --out out/\w+", "run"),
+    (rf"{S} run scenarios/liver\.toml --out out/liver", "run"),
+    (rf"{S} experiment list", "run"),
+    (rf"{S} scenario-help(?: --markdown)?", "run"),
+    (r"\{ sed .*scenario-help --markdown; \} > page\.md && mv page\.md docs/scenario\.md", "run"),
+    (rf"{S} check SCENARIO\.toml", "run"),
+    (rf"{S} check SCENARIO --write mended\.obj", "run"),
+    (rf"{S} run SCENARIO\.toml --out DIR", "run"),
+    (rf"{S} experiment run hertz --out out/hertz", "run_short", {"hertz": "hertz --quick"}),
+    (rf"{S} haptics scenarios/liver\.toml --duration 10 --out out/hand", "run_short", {"--duration 10": "--duration 0.3 --virtual"}),
+    (r"PYTHONPATH=build/release/python python3 examples/python/press_a_liver\.py --out \.", "run_python"),
+    (r"cmake --install build/release --prefix DIR", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--prefix"),
+    (r"cmake --install build/release --component python", "elsewhere", "tests/python/test_package.py", "--component"),
+    (r"cmake --install", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--install"),
+    (r"pip install --no-build-isolation \.", "elsewhere", "tests/python/test_package.py", "--no-build-isolation"),
+    (r"python3 -m venv --system-site-packages env && \. env/bin/activate", "run_short",
+     {"--system-site-packages": "--system-site-packages --without-pip"}),
+    (rf"{S} experiment run \w+(?: --out DIR)?(?: \[--quick\])?", "parse"),
+    (rf"{S} run scenarios/\w+\.toml(?: --out (?:DIR|out/demo))?", "parse"),
+    (rf"{S} run /usr/share/spherecut/scenarios/liver_cut\.toml --out out/demo", "parse"),
+    (rf"{S} serve(?: --open)?", "parse"),
+    (rf"{S} serve \[SCENARIO\.toml\].*", "parse"),
+    (rf"{S} haptics(?: SCENARIO\.toml --duration (?:S|60) --out DIR)?", "parse"),
+    (rf"{S} haptics --replay (?:FILE|DIR/haptic\.recording --out OTHER)", "parse"),
+    (r"spherecut run", "parse"),
+    (r"\./dev \w+.*", "dev"),
+    (r"\.ci/run", "elsewhere", ".ci/run", "./dev test"),
+    (r"ctest .*", "ctest"),
+    (r"tests/page/run\.sh build/release \w+.*", "page_tests"),
+    (r"build/release/tests/haptic_bridge_client/haptic_bridge_client 27510 60", "elsewhere", "tests/CMakeLists.txt", "SPHERECUT_BRIDGE_CLIENT"),
+    (r"cmake -S examples/haptic_bridge_client -B client && cmake --build client", "run"),
+    (r"cmake --preset release -DSPHERECUT_BUILD_REFERENCES=ON", "targets"),
+    (r"ninja -C build/release spherecut_reference_getfem", "targets"),
+    (r"build/release/spherecut_reference_getfem 0\.\d+ experiments/hemisphere_palpation/reference_nu\d+\.csv", "targets"),
+    (r"sudo apt install \./spherecut_.*\.deb", "packages"),
+    (r"sudo scripts/deb_in_a_bare_root\.sh build/release/spherecut_.*\.deb out/bare_root", "packages"),
+]
+
+
+def how(text: str):
+    for pattern, *rest in HOW:
+        if re.fullmatch(pattern, text, re.S):
+            return rest
+    return None
+
+
+def everything() -> list[Command | Written]:
+    return [entry for page in pages(SOURCE) for entry in commands_of(SOURCE, page)]
+
+
+def said_by(*command: str, cwd: Path = SOURCE) -> str:
+    done = subprocess.run([str(word) for word in command], cwd=cwd, capture_output=True, text=True)
+    assert done.returncode == 0, f"{' '.join(map(str, command))}: {done.stdout}{done.stderr}"
+    return done.stdout
+
+
+@functools.cache
+def help_of(*subcommands: str) -> str:
+    return said_by(PROGRAM, *subcommands, "--help")
+
+
+@functools.cache
+def experiments() -> set[str]:
+    return set(said_by(PROGRAM, "experiment", "list", "--names").split())
+
+
+@functools.cache
+def check_scenario(file: str) -> None:
+    assert (SOURCE / file).is_file(), f"{file} is not there"
+    said_by(PROGRAM, "check", file)
+
+
+@functools.cache
+def test_names() -> list[str]:
+    """Of the sources: in a tree that is built in part, ctest does not know them."""
+    cpp = "".join(file.read_text() for file in (SOURCE / "tests").rglob("*.cpp"))
+    cmake = "".join(file.read_text() for file in (SOURCE / "tests").rglob("CMakeLists.txt"))
+    names = re.findall(r'^TEST_CASE\(\s*"((?:[^"\\]|\\.|"\s*")*)"', cpp, re.M)
+    return [re.sub(r'"\s*"', "", name) for name in names] + re.findall(r'add_test\(NAME "([^"]+)"', cmake)
+
+
+test_names.__test__ = False
+
+# --- the ways of trying
+
+
+def parse(text: str) -> None:
+    """Of a command of the program: that what it is made of is there."""
+    _, *rest = words(text)
+    subcommands = []
+    while rest and not rest[0].startswith("-") and re.search(rf"^  {re.escape(rest[0])}\s", help_of(*subcommands).partition("Subcommands:")[2], re.M):
+        subcommands.append(rest.pop(0))
+    assert subcommands, f"'{text}': no such subcommand"
+    options = help_of(*subcommands)
+    takes_subcommand = "Subcommands:" in options
+    assert not (takes_subcommand and rest), f"'{text}': '{rest[0]}' is none of its subcommands"
+    positionals = []
+    while rest:
+        word = rest.pop(0)
+        if not word.startswith("--"):
+            positionals.append(word)
+            continue
+        found = re.search(rf"^  (?:-\w,)?{re.escape(word)}(?: ([A-Z]+)\b)?", options, re.M)
+        assert found, f"'{text}': {' '.join(subcommands)} has no option {word}"
+        if found[1]:
+            assert rest and not rest[0].startswith("--"), f"'{text}': {word} needs a value"
+            rest.pop(0)
+    assert not positionals or "Positionals:" in options, f"'{text}': '{positionals[0]}' is too much"
+    assert len(positionals) <= 1, f"'{text}': '{positionals[-1]}' is too much"
+    for word in positionals:
+        if subcommands == ["experiment", "run"]:
+            assert word == "NAME" or word in experiments(), f"'{text}': there is no experiment '{word}'"
+        else:
+            check_scenario(PLACEHOLDERS.get(word, word.replace("/usr/share/spherecut/", "")))
+
+
+def dev(text: str) -> None:
+    listed = said_by(SOURCE / "dev", "--help")
+    _, command, *rest = words(text)
+    entry = re.search(rf"^  {re.escape(command)}(?: \S+)*", listed, re.M)
+    assert entry, f"'{text}': ./dev has no command '{command}'"
+    for word in rest:
+        known = word in entry[0] or (command == "test" and word.startswith("-"))
+        assert known or not word.startswith("-"), f"'{text}': ./dev {command} has no option {word}"
+        assert known or re.search(r"\[[A-Z]", entry[0]), f"'{text}': ./dev {command} takes no '{word}'"
+
+
+def ctest(text: str) -> None:
+    given = words(text)
+    pattern = given[given.index("-R") + 1]
+    assert set(given) - {pattern} <= {"ctest", "-R", "--test-dir", "build/release"}, text
+    assert any(re.search(pattern, name) for name in test_names()), f"'{text}': no test has such a name"
+
+
+def page_tests(text: str) -> None:
+    kind = words(text)[2]
+    assert re.search(rf"^#   {re.escape(kind)}\b", (SOURCE / "tests/page/run.sh").read_text(), re.M), f"'{text}': no such kind"
+
+
+def targets(text: str) -> None:
+    given = words(text)
+    if given[0] == "cmake":
+        assert f'"{given[2]}"' in said_by("cmake", "--list-presets"), text
+        name = given[3].removeprefix("-D").partition("=")[0]
+        assert f"option({name} " in (SOURCE / "CMakeLists.txt").read_text(), f"'{text}': there is no option {name}"
+        return
+    name = given[3] if given[0] == "ninja" else given[0].rsplit("/", 1)[1]
+    lists = "".join(file.read_text() for file in (SOURCE / "experiments").rglob("CMakeLists.txt"))
+    assert f"add_executable({name}" in lists, f"'{text}': there is no target {name}"
+    for file in given[2:] if given[0] != "ninja" else []:
+        assert (SOURCE / file).is_file(), f"'{text}': {file} is not there"
+
+
+def elsewhere(text: str, file: str, has: str) -> None:
+    assert has in (SOURCE / file).read_text(), f"'{text}': {file} does not try it any more (it has no '{has}')"
+
+
+def packages(text: str) -> None:
+    version = re.search(r"project\(spherecut VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text())[1]
+    for word in words(text):
+        if word.endswith(".deb"):
+            assert word.rsplit("/", 1)[1] == f"spherecut_{version}_amd64.deb", f"'{text}': the version is {version}"
+        if word.startswith("scripts/"):
+            assert os.access(SOURCE / word, os.X_OK), f"'{text}': {word} is not there"
+            assert subprocess.run([SOURCE / word], capture_output=True).returncode == 2  # says how it is used
+
+
+def scratch_copy(folder: Path) -> Path:
+    """What commands of a reader find in their clone, and the program on the PATH."""
+    for name in ["scenarios", "examples", "docs"]:
+        shutil.copytree(SOURCE / name, folder / name, ignore=shutil.ignore_patterns("images", "__pycache__"))
+    (folder / "build").mkdir()
+    (folder / "build" / "release").symlink_to(BUILD)
+    return folder
+
+
+def run(text: str, folder: Path) -> None:
+    for placeholder, value in PLACEHOLDERS.items():
+        text = re.sub(rf"\b{re.escape(placeholder)}(?![\w.])", value, text)
+    environment = os.environ | {"PATH": f"{PROGRAM.parent}:{Path(sys.executable).parent}:{os.environ['PATH']}", "MPLCONFIGDIR": str(folder / "mpl"), "MPLBACKEND": "Agg",
+                                "OPENBLAS_NUM_THREADS": "1"}
+    environment.pop("PYTHONPATH", None)
+    done = subprocess.run(["bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, f"'{text}' ended with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+
+
+def can_draw() -> bool:
+    return bool(list((BUILD / "python" / "spherecut").glob("_core*.so"))) and importlib.util.find_spec("matplotlib") is not None
+
+
+WAYS = {"parse": parse, "dev": dev, "ctest": ctest, "page_tests": page_tests, "targets": targets, "elsewhere": elsewhere,
+        "packages": packages}
+
+
+# --- the tests
+
+
+def test_every_command_is_in_the_list():
+    unknown = [str(entry) for entry in everything() if isinstance(entry, Command) and how(entry.text) is None]
+    assert not unknown, "say in HOW how these are tried:\n" + "\n".join(unknown)
+
+
+def test_every_entry_of_the_list_is_a_command():
+    texts = [entry.text for entry in everything() if isinstance(entry, Command)]
+    unused = [pattern for pattern, *_ in HOW if not any(re.fullmatch(pattern, text, re.S) for text in texts)]
+    assert not unused, "no page has these any more:\n" + "\n".join(unused)
+
+
+def test_there_are_commands():
+    kinds = [how(entry.text)[0] for entry in everything() if isinstance(entry, Command) and how(entry.text)]
+    assert len(kinds) > 80 and kinds.count("run") >= 10
+
+
+@pytest.mark.parametrize("page", pages(SOURCE), ids=lambda page: str(page.relative_to(SOURCE)))
+def test_commands_of(page, tmp_path):
+    entries = commands_of(SOURCE, page)
+    if not entries:
+        return
+    folder = None
+    for entry in entries:
+        if isinstance(entry, Command):
+            way, *arguments = how(entry.text) or ["none"]
+            assert way != "none", f"{entry}: say in HOW how it is tried"
+        if isinstance(entry, Written) or way.startswith("run"):
+            folder = folder or scratch_copy(tmp_path)
+        try:
+            if isinstance(entry, Written):
+                (folder / entry.name).write_text(entry.text)
+            elif way == "run" or (way == "run_python" and can_draw()):
+                run(entry.text, folder)
+            elif way == "run_short":
+                text = entry.text
+                for long, short in arguments[0].items():
+                    assert long in text
+                    text = re.sub(rf"(?<!/){re.escape(long)}\b", short, text, count=1)
+                run(text, folder)
+            elif way != "run_python":
+                WAYS[way](entry.text, *arguments)
+        except AssertionError as error:
+            raise AssertionError(f"{entry}\n{error}") from None
+
+
+# The ways must see what is wrong.
+@pytest.mark.parametrize("text", [
+    "spherecut frobnicate", "spherecut run scenarios/none.toml", "spherecut run scenarios/liver.toml --output DIR",
+    "spherecut run scenarios/liver.toml more.toml", "spherecut experiment run herz --out DIR", "spherecut haptics --replay",
+    "spherecut experiment show", "spherecut scenario-help --json",
+])
+def test_parse_refuses(text):
+    with pytest.raises(AssertionError):
+        parse(text)
+
+
+@pytest.mark.parametrize("way, text", [
+    ("dev", "./dev frobnicate"), ("dev", "./dev lint --shallow"), ("dev", "./dev demo liver"),
+    ("ctest", 'ctest -R "no test has this name"'), ("page_tests", "tests/page/run.sh build/release nothing"),
+    ("targets", "cmake --preset fast -DSPHERECUT_BUILD_REFERENCES=ON"), ("targets", "cmake --preset release -DSPHERECUT_NOTHING=ON"),
+    ("targets", "ninja -C build/release spherecut_nothing"), ("packages", "sudo apt install ./spherecut_9.9.9_amd64.deb"),
+])
+def test_others_refuse(way, text):
+    with pytest.raises(AssertionError):
+        WAYS[way](text)
+
+
+def test_run_refuses(tmp_path):
+    with pytest.raises(AssertionError):
+        run("spherecut check scenarios/none.toml", scratch_copy(tmp_path))
+
+
+def test_an_unknown_command_on_a_page_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("Text with `spherecut paint liver`.\n\n```sh\n./dev demo   # why\nspherecut bake \\\n  --hot\n```\n\n    spherecut fry # it\n")
+    found = [entry.text for entry in commands_of(tmp_path, page)]
+    assert found == ["spherecut paint liver", "./dev demo", "spherecut bake \\\n--hot", "spherecut fry"]
+    assert [how(text) is None for text in found] == [True, False, True, True]

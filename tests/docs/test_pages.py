@@ -1,0 +1,80 @@
+"""Links among the Markdown pages, and the code that the tutorials quote: what needs no Sphinx."""
+
+import os
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from commands import pages
+
+SOURCE = Path(os.environ["SPHERECUT_SOURCE"])
+sys.path.insert(0, str(SOURCE / "docs" / "site"))
+import build  # noqa: E402
+
+ALL = pages(SOURCE) + [SOURCE / "CHANGELOG.md"]
+
+
+def anchors(page: Path) -> set[str]:
+    """As GitHub makes them of the headings."""
+    found: set[str] = set()
+    for heading in re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", page.read_text(), flags=re.S | re.M), re.M):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").strip().lower()
+        found.add(re.sub(r"[^\w\- ]", "", plain).replace(" ", "-"))
+    return found
+
+
+def broken_links(page: Path, text: str) -> list[str]:
+    prose = re.sub(r"^```.*?^```|(?<!\[)`[^`\n]+`", "", text, flags=re.S | re.M)
+    broken = []
+    for target in re.findall(r"!?\[[^\]]*\]\(([^)\s]+)\)", prose):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        if not file.exists() or (anchor and (file.suffix != ".md" or anchor not in anchors(file))):
+            broken.append(target)
+    return broken
+
+
+@pytest.mark.parametrize("page", ALL, ids=lambda page: str(page.relative_to(SOURCE)))
+def test_links(page):
+    assert broken_links(page, page.read_text()) == []
+
+
+def test_links_that_lead_nowhere_are_found():
+    page = SOURCE / "docs" / "start.md"
+    text = "[a](scenario.md) [b](none.md) [c](scenario.md#no-such) [d](#get-it) ![e](images/none.png) [f](https://example.org/x)"
+    assert broken_links(page, text) == ["none.md", "scenario.md#no-such", "images/none.png"]
+
+
+def test_every_example_has_a_tutorial():
+    scripts = {file.stem for file in (SOURCE / "examples" / "python").glob("*.py")}
+    tutorials = {file.stem for file in (SOURCE / "docs" / "tutorials").glob("*.md")} - {"README"}
+    assert scripts == tutorials
+    listed = (SOURCE / "docs" / "tutorials" / "README.md").read_text()
+    assert all(f"({name}.md)" in listed for name in tutorials)
+
+
+@pytest.mark.parametrize("page", sorted((SOURCE / "docs" / "tutorials").glob("[a-z]*.md")), ids=lambda page: page.stem)
+def test_tutorials_quote_their_scripts(page):
+    script = SOURCE / "examples" / "python" / f"{page.stem}.py"
+    text = page.read_text()
+    assert text.count("```python") >= 2
+    build.check_quotes(page.stem, text, script)
+    with pytest.raises(SystemExit):
+        build.check_quotes(page.stem, text + "```python\nsc.does_not_exist()\n```\n", script)
+
+
+def test_every_page_has_its_place_on_the_site(tmp_path):
+    """Pages come by pattern: one that no section names is a how-to page."""
+    listed = {str(page.relative_to(SOURCE).with_suffix("")) for page in ALL}
+    assert set(build.pages()) == listed
+    named = {name for names in build.SECTIONS.values() for name in names if not name.startswith("reference/")}
+    assert named <= listed
+
+
+def test_public_headers():
+    found = build.headers()
+    assert "solvers/discretisation.hpp" in found and len(found) > 40
+    assert all((SOURCE / header).is_file() and len(build.what_for(header)) > 10 for header in found)
