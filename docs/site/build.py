@@ -297,6 +297,11 @@ def doxygen(out: Path, used: list[str]) -> None:
     done = subprocess.run(["doxygen", str(folder / "Doxyfile")], capture_output=True, text=True)
     if done.returncode != 0:
         fail(f"Doxygen has something to say:\n{done.stdout}{done.stderr}")
+    for file in (folder / "xml").glob("*.xml"):  # Doxygen leaves the slashes of the comment in what is verbatim
+        text = file.read_text()
+        plain = re.sub(r"(?<=<verbatim>).*?(?=</verbatim>)", lambda found: re.sub(r"^ *///? ?", "", found[0], flags=re.M), text, flags=re.S)
+        if plain != text:
+            file.write_text(plain)
     for header in used:
         name = header.rsplit("/", 1)[1][:-4]
         if "<inner" not in (folder / "xml" / f"{name.replace('_', '__')}_8hpp.xml").read_text():
