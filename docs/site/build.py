@@ -297,6 +297,11 @@ def doxygen(out: Path, used: list[str]) -> None:
     done = subprocess.run(["doxygen", str(folder / "Doxyfile")], capture_output=True, text=True)
     if done.returncode != 0:
         fail(f"Doxygen has something to say:\n{done.stdout}{done.stderr}")
+    for file in (folder / "xml").glob("*.xml"):  # Doxygen leaves the slashes of the comment in what is verbatim
+        text = file.read_text()
+        plain = re.sub(r"(?<=<verbatim>).*?(?=</verbatim>)", lambda found: re.sub(r"^ *///? ?", "", found[0], flags=re.M), text, flags=re.S)
+        if plain != text:
+            file.write_text(plain)
     for header in used:
         name = header.rsplit("/", 1)[1][:-4]
         if "<inner" not in (folder / "xml" / f"{name.replace('_', '__')}_8hpp.xml").read_text():
@@ -361,6 +366,15 @@ def stage(out: Path, build: Path, pages_only: bool) -> Staging:
     return staging
 
 
+def remove_old(source: Path, html: Path) -> None:
+    """Pages of the site whose sources are no more."""
+    for page in html.rglob("*.html"):
+        inside = page.relative_to(html).with_suffix("")
+        made_by_sphinx = str(inside) in ("genindex", "search", "py-modindex") or inside.parts[0] == "_static"
+        if not made_by_sphinx and not any((source / f"{inside}{suffix}").exists() for suffix in (".md", ".rst")):
+            page.unlink()
+
+
 def copy_mathjax(html: Path) -> None:
     """What of Debian's MathJax the pages load: they need no network."""
     source, target = Path("/usr/share/javascript/mathjax"), html / "_static" / "mathjax"
@@ -374,7 +388,8 @@ def copy_mathjax(html: Path) -> None:
 
 
 def check_links(html: Path) -> int:
-    """Every link within the site leads to a file of it, and to a place in that file. Returns how many there are."""
+    """Every link within the site leads to a file of it, and to a place in that file; nothing is loaded from elsewhere. Returns
+    how many links there are."""
     places: dict[Path, set[str]] = {}
 
     def names(file: Path) -> set[str]:
@@ -384,6 +399,8 @@ def check_links(html: Path) -> int:
 
     count, broken = 0, []
     for page in sorted(html.rglob("*.html")):
+        for tag in re.findall(r'<(?:script|link|img|iframe)\b[^>]*\b(?:src|href)="(?:https?:)?//[^>]*>', page.read_text()):
+            broken.append(f"{page.relative_to(html)}: needs the network: {tag}")
         for target in set(re.findall(r'\b(?:href|src)="([^"]+)"', page.read_text())):
             target = unquote(unescape(target))
             if re.match(r"[a-z]+:", target) or (target.startswith("#") and not target[1:]):
@@ -394,7 +411,7 @@ def check_links(html: Path) -> int:
             if not file.is_file() or (anchor and file.suffix == ".html" and anchor not in names(file)):
                 broken.append(f"{page.relative_to(html)}: '{target}'")
     if broken:
-        fail("links that lead nowhere:\n" + "\n".join(broken))
+        fail("links that lead nowhere, or elsewhere:\n" + "\n".join(broken))
     return count
 
 
@@ -408,6 +425,7 @@ def main() -> None:
     if not given.pages_only and not list((build / "python" / "spherecut").glob("_core.*.so")):
         fail(f"{build} has no Python package (ninja -C {build} spherecut_python): the tutorials cannot be run")
     stage(out, build, given.pages_only)
+    remove_old(out / "source", out / "html")
     version = re.search(r"project\(spherecut VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())
     environment = os.environ | {"SPHERECUT_DOXYGEN": "" if given.pages_only else str(out / "doxygen" / "xml"),
                                 "SPHERECUT_DOCS_VERSION": version.group(1) if version else ""}
