@@ -8,6 +8,7 @@
 #include "src/process_settings.hpp"
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
+#include "src/sweep.hpp"
 #include "src/version.hpp"
 #include "src/viewer/serve.hpp"
 #include "topology/errors.hpp"
@@ -21,6 +22,7 @@
 #include <exception>
 #include <fmt/core.h>
 #include <poll.h>
+#include <string_view>
 #include <system_error>
 #include <thread>
 #include <unistd.h>
@@ -180,6 +182,8 @@ void require_resources(bool is_real_time) {
 }
 
 int run(int argc, char** argv) {
+  if (argc > 1 && argv[1] == std::string_view("sweep"))
+    app::become_sweep({argv + 2, argv + argc});
   CLI::App commands("Spherecut: pressing, cutting and tearing of soft tissue by the method of finite spheres",
                     "spherecut");
   commands.set_version_flag("--version", fmt::format("spherecut {}", app::version()));
@@ -254,6 +258,8 @@ int run(int argc, char** argv) {
       ->check(named);
   run_one->add_flag("--quick", quick, "Smaller variant");
   add_threads(run_one, "1, as times are compared");
+
+  commands.add_subcommand("sweep", "Run a scenario over many values of its keys: one table, figures; sweep --help");
 
   auto* help = commands.add_subcommand("scenario-help", "Every key of a scenario file");
   bool markdown = false;

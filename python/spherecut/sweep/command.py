@@ -97,7 +97,10 @@ def _wanted_figures(study: Study, given: list[str]) -> list[Figure]:
 
 
 def _say(line: str) -> None:
-    print(line, flush=True)
+    try:
+        print(line, flush=True)
+    except BrokenPipeError:  # nobody reads on; the study goes on
+        sys.stdout = open(os.devnull, "w")
 
 
 def _list(study: Study, out: Path) -> None:
