@@ -132,6 +132,9 @@ def _sweep(options: argparse.Namespace) -> int:
         if missing and not options.collect:
             if options.slurm:
                 arguments = ["--slurm", "--jobs", str(options.jobs)]
+                # Snakemake 7.21 takes a rate over one a second for one every 33 seconds, for all jobs together.
+                if "--max-status-checks-per-second" not in options.snakemake:
+                    arguments += ["--max-status-checks-per-second", "1"]
                 if "--default-resources" not in options.snakemake:
                     arguments += ["--default-resources", f"mem_mb={options.memory}"]
             else:
