@@ -11,7 +11,7 @@ from typing import NoReturn, Optional
 
 from .._core import InputError
 from . import figures, table, workflow
-from .study import Figure, Study, check_figure, read_study, shown
+from .study import Figure, Run, Study, check_figure, read_study, shown
 
 DONE, NOT_ALL_DONE, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -74,9 +74,10 @@ def _program() -> str:
     """The program that runs a scenario: the one that called, the one beside the package, or one on the PATH."""
     given = os.environ.get("SPHERECUT_COMMAND")
     package = Path(__file__).absolute().parents[2]
-    for place in [given] if given else [package.parent / "spherecut", package.parents[2] / "bin" / "spherecut"]:
+    places = [Path(given)] if given else [package.parent / "spherecut", package.parents[2] / "bin" / "spherecut"]
+    for place in places:
         if os.path.isfile(place) and os.access(place, os.X_OK):
-            return str(Path(place).absolute())
+            return str(place.absolute())
     found = None if given else shutil.which("spherecut")
     if found is None:
         raise InputError("the program spherecut is not there" + (f": SPHERECUT_COMMAND = {given}" if given else "")
@@ -145,7 +146,7 @@ def _sweep(options: argparse.Namespace) -> int:
         os.close(lock)
 
 
-def _collect(out: Path, study: Study, named: list[tuple[str, "workflow.Run"]], wanted: list[Figure], status: int, interrupted: bool) -> int:
+def _collect(out: Path, study: Study, named: list[tuple[str, Run]], wanted: list[Figure], status: int, interrupted: bool) -> int:
     rows = table.rows_of(out, [{"run": number, "values": run.values} for number, run in named])
     table.write_csv(out / "table.csv", rows)
     written = ["table.csv"]

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Optional
 
 import numpy as np
+import numpy.typing as npt
 
 from .._core import InputError, Scenario, scenario_keys
 
@@ -212,11 +213,12 @@ class _Reader:
         return value
 
 
-def latin_hypercube(count: int, dimensions: int, seed: int) -> np.ndarray[Any, Any]:
+def latin_hypercube(count: int, dimensions: int, seed: int) -> npt.NDArray[Any]:
     """(count, dimensions) in [0, 1): in every column one number in each of count equal parts."""
     random = np.random.default_rng(seed)
     strata = np.stack([random.permutation(count) for _ in range(dimensions)], axis=1)
-    return np.minimum((strata + random.random((count, dimensions))) / count, np.nextafter(1, 0))
+    unit: npt.NDArray[Any] = (strata + random.random((count, dimensions))) / count
+    return unit.clip(max=np.nextafter(1, 0))
 
 
 def _sampled(reader: _Reader, table: dict[str, Any]) -> list[dict[str, Any]]:
