@@ -6,6 +6,7 @@
 #include "src/program.hpp"
 #include "src/run.hpp"
 #include "src/scenario_keys.hpp"
+#include "src/sweep.hpp"
 #include "src/version.hpp"
 #include "src/viewer/serve.hpp"
 
@@ -39,9 +40,11 @@ int default_threads(bool is_real_time) {
 }
 
 int run(int argc, char** argv) {
-  // A program of its own: most of what there is to compile is in the experiments.
+  // Most of what there is to compile is in the experiments: a program of its own.
   if (argc > 1 && argv[1] == std::string_view("experiment"))
     return program::pass_on("spherecut-experiment", argv + 2);
+  if (argc > 1 && argv[1] == std::string_view("sweep"))
+    app::become_sweep({argv + 2, argv + argc});
   CLI::App commands("Spherecut: pressing, cutting and tearing of soft tissue by the method of finite spheres",
                     "spherecut");
   commands.set_version_flag("--version", fmt::format("spherecut {}", app::version()));
@@ -103,6 +106,8 @@ int run(int argc, char** argv) {
   add_threads(serve, "one a core but one, at most 16");
 
   commands.add_subcommand("experiment", "List or run the experiments");
+  commands.add_subcommand("sweep", "Run a scenario over many values of its keys: one table, figures; sweep --help");
+
   auto* help = commands.add_subcommand("scenario-help", "Every key of a scenario file");
   bool markdown = false;
   help->add_flag("--markdown", markdown, "As the reference part of docs/scenario.md");

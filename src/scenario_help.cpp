@@ -8,7 +8,25 @@ namespace {
 
 using enum KeyKind;
 
-std::string_view name_of(KeyKind kind) {
+bool is_table(const ScenarioKey& key) {
+  return key.kind == table || key.kind == array_of_tables;
+}
+
+std::string heading(const ScenarioKey& key) {
+  return key.kind == table ? fmt::format("[{}]", key.path) : fmt::format("[[{}]]", key.path);
+}
+
+std::string type_and_unit(const ScenarioKey& key) {
+  return key.unit.empty() ? std::string(type_name(key.kind)) : fmt::format("{}, {}", type_name(key.kind), key.unit);
+}
+
+std::string fallback_text(const ScenarioKey& key) {
+  return key.fallback.empty() ? "see meaning" : std::string(key.fallback);
+}
+
+} // namespace
+
+std::string_view type_name(KeyKind kind) {
   switch (kind) {
   case table:
     return "table";
@@ -34,24 +52,6 @@ std::string_view name_of(KeyKind kind) {
   }
   return "";
 }
-
-bool is_table(const ScenarioKey& key) {
-  return key.kind == table || key.kind == array_of_tables;
-}
-
-std::string heading(const ScenarioKey& key) {
-  return key.kind == table ? fmt::format("[{}]", key.path) : fmt::format("[[{}]]", key.path);
-}
-
-std::string type_and_unit(const ScenarioKey& key) {
-  return key.unit.empty() ? std::string(name_of(key.kind)) : fmt::format("{}, {}", name_of(key.kind), key.unit);
-}
-
-std::string fallback_text(const ScenarioKey& key) {
-  return key.fallback.empty() ? "see meaning" : std::string(key.fallback);
-}
-
-} // namespace
 
 std::string scenario_help() {
   std::string out = "A scenario is a TOML file in SI units: metres, newtons, pascals, seconds, kilograms.\n";

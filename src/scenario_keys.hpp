@@ -45,6 +45,9 @@ struct ScenarioKey {
 
 std::span<const ScenarioKey> scenario_keys();
 
+/// What a value of this kind is: "number", "[x, y, z]".
+std::string_view type_name(KeyKind kind);
+
 /// The entry of a path, or nullptr.
 const ScenarioKey* find_scenario_key(std::string_view path);
 

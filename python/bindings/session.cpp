@@ -5,6 +5,7 @@
 #include "src/output_file.hpp"
 #include "src/run.hpp"
 #include "src/run_output.hpp"
+#include "src/scenario_keys.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/LU>
@@ -67,7 +68,20 @@ std::shared_ptr<RunningSession> session_from(const Scenario& scenario, const py:
   return self;
 }
 
+py::list keys_of_scenarios() {
+  py::list keys;
+  for (const app::ScenarioKey& key : app::scenario_keys())
+    keys.append(py::dict("path"_a = key.path, "type"_a = app::type_name(key.kind), "unit"_a = key.unit,
+                         "allowed"_a = app::allowed_values(key), "default"_a = key.fallback, "meaning"_a = key.meaning,
+                         "when"_a = key.when));
+  return keys;
+}
+
 void bind_scenario(py::module_& module) {
+  module.def("scenario_keys", keys_of_scenarios,
+             "Every key of a scenario in the order of docs/scenario.md: dicts of texts with path ('fixed[].lower'), "
+             "type, unit, "
+             "allowed, default, meaning, when ('shape = block': only beside that).");
   py::class_<Scenario, std::shared_ptr<Scenario>>(module, "Scenario",
                                                   "A scenario as its file has it; every key: docs/scenario.md.")
       .def_static(

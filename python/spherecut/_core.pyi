@@ -718,6 +718,11 @@ def seed_radius(material: Material, toughness: float, strength: float) -> float:
 def averaged_stress(body: Body, field: Field, point: npt.ArrayLike, radius: float) -> tuple[float, npt.NDArray[Any]]:
     """Largest principal stress, Pa, of the mean over a ball of radius m about point, (3,), m, and its direction, (3,)."""
 
+def scenario_keys() -> list[Any]:
+    """Every key of a scenario in the order of docs/scenario.md: dicts of texts with path ('fixed[].lower'), type,
+    unit, allowed, default, meaning, when ('shape = block': only beside that).
+    """
+
 class Scenario:
     """A scenario as its file has it; every key: docs/scenario.md."""
     @staticmethod
