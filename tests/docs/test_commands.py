@@ -17,13 +17,14 @@ from commands import Command, Written, commands_of, pages, words
 SOURCE = Path(os.environ["SPHERECUT_SOURCE"])
 BUILD = Path(os.environ["SPHERECUT_BUILD"])
 PROGRAM = Path(os.environ["SPHERECUT_COMMAND"])
-PLACEHOLDERS = {"SCENARIO.toml": "scenarios/block_punch.toml", "SCENARIO": "scenarios/block_punch.toml"}
+PLACEHOLDERS = {"STUDY.toml": "examples/studies/press_spacing.toml", "SCENARIO.toml": "scenarios/block_punch.toml", "SCENARIO": "scenarios/block_punch.toml"}
 S = r"(?:build/release/)?spherecut"
 
 # How a command is tried. The first entry whose pattern is the whole command counts.
 #   run          in a scratch copy of the repository, after what the page has before it; it must end with 0
 #   run_python   likewise, where the Python package is built and matplotlib is there
 #   run_short    likewise, with words replaced so that it takes seconds and neither the network nor the clock
+#   run_study    likewise, where the Python package is built, as far as --dry-run goes: every run is checked and listed
 #   parse        the program, its subcommand, options and files are there, and `spherecut check` accepts its scenario. For
 #                what takes minutes, for servers, for what waits for a hand
 #   dev          ./dev has that command and those options (what they do takes minutes)
@@ -60,7 +61,11 @@ HOW = [
     (rf"{S} serve \[SCENARIO\.toml\].*", "parse"),
     (rf"{S} haptics(?: SCENARIO\.toml --duration (?:S|60) --out DIR)?", "parse"),
     (rf"{S} haptics --replay (?:FILE|DIR/haptic\.recording --out OTHER)", "parse"),
-    (r"spherecut run", "parse"),
+    (r"spherecut (?:run|check|sweep)", "parse"),
+    (rf"{S} sweep examples/studies/press_spacing\.toml --out out/\w+(?: --slurm)?", "run_study"),
+    (rf"{S} sweep STUDY\.toml --out FOLDER -- .*", "run_study"),
+    (r"python3 -m spherecut\.sweep", "elsewhere", "tests/python/test_sweep.py", "spherecut.sweep"),
+    (r"python3 examples/studies/scaling\.py examples/studies/press_spacing\.toml", "run_short", {"examples/studies/press_spacing.toml": "--help"}),
     (r"\./dev \w+.*", "dev"),
     (r"\.ci/run", "elsewhere", ".ci/run", "./dev test"),
     (r"ctest .*", "ctest"),
@@ -272,7 +277,9 @@ def test_commands_of(page, tmp_path):
                     assert long in text
                     text = re.sub(rf"(?<!/){re.escape(long)}\b", short, text, count=1)
                 run(text, folder)
-            elif way != "run_python":
+            elif way == "run_study" and can_draw():
+                run(entry.text.replace(" --out", " --dry-run --out", 1), folder)
+            elif way not in ("run_python", "run_study"):
                 WAYS[way](entry.text, *arguments)
         except AssertionError as error:
             raise AssertionError(f"{entry}\n{error}") from None

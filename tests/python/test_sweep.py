@@ -272,3 +272,15 @@ def test_parquet_has_what_the_csv_has(tmp_path):
 def test_the_example_is_a_study():
     study = read_study(SOURCE / "examples" / "studies" / "press_spacing.toml")
     assert len(study.runs) == 24 and len(study.figures) == 2
+
+
+@needs_snakemake
+def test_what_stands_behind_the_dashes_is_for_snakemake_alone(tmp_path):
+    study = write_study(tmp_path, head("[grid]\nnodes.random_seed = [1]"))
+    said = sweep(study, tmp_path / "st", "--cores", "1", "--", "--no-such-option")
+    assert said.returncode != 0
+    assert "--no-such-option" in (tmp_path / "st" / "snakemake.log").read_text()
+    again = sweep(study, tmp_path / "st", "--cores", "1", "--", "--printshellcmds")
+    assert again.returncode == 0, again.stderr
+    stray = sweep(study, tmp_path / "other", "stray")
+    assert stray.returncode == 2 and "unrecognized arguments: stray" in stray.stderr

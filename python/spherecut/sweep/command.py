@@ -33,6 +33,8 @@ The study file has a scenario and what is varied, products of up to three parts 
   y = "peak_force.newtons"
   by = "nodes.random_seed"
 
+Options behind -- are passed on to Snakemake: spherecut sweep STUDY.toml --out FOLDER -- OPTIONS
+
 Exit status: 0 every run is done, 1 runs have failed or are missing, 2 unusable input, 130 interrupted.
 """
 
@@ -66,8 +68,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--dry-run", action="store_true", help="check everything and list the runs; write nothing")
     parser.add_argument("--collect", action="store_true", help="run nothing; table and figures of what is there")
     parser.add_argument("--figure", action="append", default=[], metavar="Y,X[,BY]", help="one more figure: a column over a key, for each value of another key")
-    parser.add_argument("snakemake", nargs="*", default=[], metavar="-- OPTIONS", help="options for Snakemake, behind --")
     return parser
+
+
+def _parsed(arguments: list[str]) -> argparse.Namespace:
+    at = arguments.index("--") if "--" in arguments else len(arguments)
+    return _parser().parse_args(arguments[:at], argparse.Namespace(snakemake=arguments[at + 1:]))
 
 
 def _program() -> str:
@@ -190,7 +196,7 @@ def _complain(text: str) -> None:
 def main(arguments: Optional[list[str]] = None) -> int:
     """Runs the command line; returns the exit status."""
     try:
-        return _sweep(_parser().parse_args(arguments))
+        return _sweep(_parsed(sys.argv[1:] if arguments is None else arguments))
     except InputError as error:
         _complain(str(error))
         return BAD_INPUT
