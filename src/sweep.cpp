@@ -68,6 +68,7 @@ void become_sweep(const std::vector<std::string>& arguments) {
   std::vector<std::string> words{interpreter(), "-c", hand_over, package_folder(program).string()};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> pointers;
+  pointers.reserve(words.size() + 1);
   for (std::string& word : words)
     pointers.push_back(word.data());
   pointers.push_back(nullptr);
