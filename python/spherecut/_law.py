@@ -22,7 +22,7 @@ def _probes() -> list[npt.NDArray[np.float64]]:
             strain = np.zeros((3, 3))
             strain[i, j] = strain[j, i] = 1e-3
             probes += [strain, -strain, 0.1 * strain, _TURN @ strain @ _TURN.T]
-    return probes + [sum(probes[::4])]  # type: ignore[list-item]
+    return probes + [sum(probes[::4])]
 
 
 def material_of_law(
