@@ -24,15 +24,16 @@ results=${2:-$source/out/bare_root}
 mirror=${SPHERECUT_MIRROR:-http://deb.debian.org/debian}
 command -v debootstrap >/dev/null || DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends debootstrap >/dev/null
 
-work=$(mktemp -d /var/tmp/spherecut-bare-root-XXXXXX)
+work=$(mktemp -d -p "${TMPDIR:-/var/tmp}")
 root=$work/root
+home=/srv/demo # of the ordinary user in there
 cleanup() {
   if mountpoint -q "$root/proc"; then umount "$root/proc"; fi
   rm -rf --one-file-system "$work"
 }
 trap cleanup EXIT
 inside() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive chroot "$root" "$@"; }
-as_user() { inside setpriv --reuid=1000 --regid=1000 --clear-groups env HOME=/home/user "$@"; }
+as_user() { inside setpriv --reuid=1000 --regid=1000 --clear-groups env HOME="$home" "$@"; }
 # logged WHAT COMMAND...: quiet, with the end of what was said when it fails.
 logged() {
   local what=$1
@@ -49,24 +50,24 @@ say "bare Debian: $(du -smx "$root" | cut -f 1) MB, $(inside dpkg-query -W | wc 
 mount -t proc proc "$root/proc" 2>/dev/null || mount --bind /proc "$root/proc" || fail "/proc cannot be mounted in the new root"
 
 start=$SECONDS
-cp "$deb" "$root/tmp/"
+cp "$deb" "$root/srv/"
 logged "apt-get update" inside apt-get -q update
-logged "apt-get install" inside apt-get -q -y install "/tmp/$(basename "$deb")"
+logged "apt-get install" inside apt-get -q -y install "/srv/$(basename "$deb")"
 say "with $(basename "$deb") ($(du -k "$deb" | cut -f 1) kB): $(du -smx "$root" | cut -f 1) MB, $(inside dpkg-query -W | wc -l) packages, $((SECONDS - start)) s"
 for compiler in cc gcc g++ c++ clang cmake ninja make; do
   if inside sh -c "command -v $compiler" >/dev/null; then fail "$compiler is there: this shows nothing"; fi
 done
 say "no compiler, no CMake"
 
-mkdir -p "$root/home/user"
-chown 1000:1000 "$root/home/user"
+mkdir -p "$root$home"
+chown 1000:1000 "$root$home"
 start=$SECONDS
-as_user sh -c 'cd && spherecut run /usr/share/spherecut/scenarios/liver_cut.toml --out demo' || fail "the demonstration failed"
+as_user sh -c 'cd && spherecut run /usr/share/spherecut/scenarios/liver_cut.toml --out results' || fail "the demonstration failed"
 say "the demonstration took $((SECONDS - start)) s"
 for file in forces.csv cuts.csv summary.json series.pvd; do
-  [ -s "$root/home/user/demo/$file" ] || fail "the demonstration has not written $file"
+  [ -s "$root$home/results/$file" ] || fail "the demonstration has not written $file"
 done
-[ "$(find "$root/home/user/demo" -name '*.png' -size +1k | wc -l)" -ge 1 ] || fail "the demonstration has drawn no figure"
+[ "$(find "$root$home/results" -name '*.png' -size +1k | wc -l)" -ge 1 ] || fail "the demonstration has drawn no figure"
 
 as_user python3 -c '
 import numpy as np, spherecut as sc
@@ -80,7 +81,7 @@ for installed in include/spherecut/solvers/discretisation.hpp lib/cmake/spherecu
 done
 
 mkdir -p "$(dirname "$results")"
-cp -r "$root/home/user/demo" "$results"
+cp -r "$root$home/results" "$results"
 start=$SECONDS
 logged "apt-get purge" inside apt-get -q -y purge spherecut
 left=$(find "$root/usr" -name '*spherecut*' | head -n 3)

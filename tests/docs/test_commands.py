@@ -17,7 +17,7 @@ from commands import Command, Written, commands_of, pages, words
 SOURCE = Path(os.environ["SPHERECUT_SOURCE"])
 BUILD = Path(os.environ["SPHERECUT_BUILD"])
 PROGRAM = Path(os.environ["SPHERECUT_COMMAND"])
-PLACEHOLDERS = {"STUDY.toml": "examples/studies/press_spacing.toml", "SCENARIO.toml": "scenarios/block_punch.toml", "SCENARIO": "scenarios/block_punch.toml"}
+STANDS_FOR = {"STUDY.toml": "examples/studies/press_spacing.toml", "SCENARIO.toml": "scenarios/block_punch.toml", "SCENARIO": "scenarios/block_punch.toml"}
 S = r"(?:build/release/)?spherecut"
 
 # How a command is tried. The first entry whose pattern is the whole command counts.
@@ -154,7 +154,7 @@ def parse(text: str) -> None:
         if subcommands == ["experiment", "run"]:
             assert word == "NAME" or word in experiments(), f"'{text}': there is no experiment '{word}'"
         else:
-            check_scenario(PLACEHOLDERS.get(word, word.replace("/usr/share/spherecut/", "")))
+            check_scenario(STANDS_FOR.get(word, word.replace("/usr/share/spherecut/", "")))
 
 
 def dev(text: str) -> None:
@@ -218,8 +218,8 @@ def scratch_copy(folder: Path) -> Path:
 
 
 def run(text: str, folder: Path) -> None:
-    for placeholder, value in PLACEHOLDERS.items():
-        text = re.sub(rf"\b{re.escape(placeholder)}(?![\w.])", value, text)
+    for word, value in STANDS_FOR.items():
+        text = re.sub(rf"\b{re.escape(word)}(?![\w.])", value, text)
     environment = os.environ | {"PATH": f"{PROGRAM.parent}:{Path(sys.executable).parent}:{os.environ['PATH']}", "MPLCONFIGDIR": str(folder / "mpl"), "MPLBACKEND": "Agg",
                                 "OPENBLAS_NUM_THREADS": "1"}
     environment.pop("PYTHONPATH", None)

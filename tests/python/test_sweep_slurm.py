@@ -60,7 +60,7 @@ def free_ports(count):
 
 
 @pytest.fixture
-def slurm():
+def slurm(tmp_path):
     folder = Path(tempfile.mkdtemp(prefix="spherecut-slurm-"))
     folder.chmod(0o755)  # munge looks at the folders of its socket
     for name in ("state", "spool", "munge"):
@@ -97,6 +97,13 @@ def slurm():
             daemon.send_signal(signal.SIGTERM)
         for daemon in daemons:
             daemon.wait(60)
+        # Without control groups the step of a cancelled job can outlive it.
+        for process in Path("/proc").glob("[0-9]*/cmdline"):
+            try:
+                if bytes(tmp_path) in process.read_bytes():
+                    os.kill(int(process.parent.name), signal.SIGKILL)
+            except OSError:
+                pass  # it has ended meanwhile
         shutil.rmtree(folder, ignore_errors=True)
 
 
