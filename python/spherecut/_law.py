@@ -39,7 +39,11 @@ def material_of_law(
     strains = _probes()
     stresses = []
     for strain in strains:
-        stress = np.asarray(law(strain.copy()), dtype=float)
+        said = law(strain.copy())
+        try:
+            stress = np.asarray(said, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the law gives {said!r}, which is no array of numbers") from error
         if stress.shape != (3, 3):
             raise InputError(f"the law gives an array of shape {stress.shape}; a stress has (3, 3)")
         if not np.isfinite(stress).all():

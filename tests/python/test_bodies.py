@@ -207,6 +207,7 @@ def test_a_law_that_the_solvers_do_not_know_is_refused():
     for law, words in [
         (stiffening, "not linear and isotropic"),
         (along_fibres, "not linear and isotropic"),
+        (lambda strain: "stiff", "no array of numbers"),
         (lambda strain: strain[0], "shape"),
         (lambda strain: strain * np.nan, "not finite"),
         (lambda strain: -1e4 * strain, "mu and lambda"),
