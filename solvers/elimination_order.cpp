@@ -28,10 +28,11 @@ namespace {
 
 using Word = std::uint64_t;
 constexpr int word_bits = 64;
-constexpr int small_graph = 1500;                        // nodes
-constexpr int added_with_in_small = 3, added_with = 2;   // nodes that one which goes with another may add
-constexpr int most_nodes = 8192, fewest_neighbours = 50; // of a graph that rows of bits suit
-constexpr int first_samples = 4;                         // of a node's neighbours, before anything is eliminated
+constexpr int small_graph = 1500;                      // nodes
+constexpr int added_with_in_small = 3, added_with = 2; // nodes that one which goes with another may add
+constexpr int most_nodes = 3000;      // of a graph that minimum fill suits better than nested dissection
+constexpr int fewest_neighbours = 50; // of a node of a dense graph, in the mean
+constexpr int first_samples = 4;      // of a node's neighbours, before anything is eliminated
 constexpr int smoothing_passes = 8;
 constexpr double fill_per_edge = 8; // per neighbour, that is accepted for a node one edge nearer to the beginning
 
@@ -341,7 +342,8 @@ std::vector<int> postordered(const std::vector<int>& order, std::span<const int>
 
 std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std::vector<int>& neighbours) {
   const int n = static_cast<int>(start.size()) - 1;
-  if (n > 0 && n <= most_nodes && std::ssize(neighbours) >= static_cast<std::ptrdiff_t>(n) * fewest_neighbours)
+  const bool is_dense = n > 0 && std::ssize(neighbours) >= static_cast<std::ptrdiff_t>(n) * fewest_neighbours;
+  if (is_dense && n <= most_nodes)
     return postordered(MinimumFill(start, neighbours).order(), start, neighbours);
   // The lower triangle by columns: rows come in ascending order, so every column's do.
   std::vector<int> begin(static_cast<std::size_t>(n) + 1, 0);
@@ -366,6 +368,10 @@ std::vector<int> fill_reducing_ordering(const std::vector<int>& start, const std
   pattern.xtype = CHOLMOD_PATTERN;
   pattern.sorted = pattern.packed = 1;
   CholmodWorkspace workspace(CHOLMOD_SIMPLICIAL); // there are no values
+  if (is_dense) { // CHOLMOD would not try it: minimum degree seems good enough to it, with twice the operations
+    workspace.common.nmethods = 1;
+    workspace.common.method[0].ordering = CHOLMOD_METIS;
+  }
   cholmod_factor* factor = cholmod_analyze(&pattern, &workspace.common);
   if (factor == nullptr)
     throw NumericalError("ordering the node graph ran out of memory");

@@ -3,7 +3,7 @@
 #include "solvers/cholmod_workspace.inl"
 #include "solvers/dense_products.hpp"
 #include "solvers/large_pages.hpp"
-#include "solvers/sparse_compliance.hpp"
+#include "solvers/supernodal_cholesky.hpp"
 #include "topology/errors.hpp"
 #include "topology/interruption.hpp"
 
@@ -11,7 +11,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
-#include <dlfcn.h>
 #include <fmt/format.h>
 #include <limits>
 #include <optional>
@@ -21,32 +20,6 @@
 namespace spherecut::solvers {
 
 namespace {
-
-/// No OpenMP threads for the calling thread while this lives: Debian's CHOLMOD opens four to add up its fronts,
-/// whatever it is told, which then spin for more work on the cores of the others.
-class WithoutOpenMp {
- public:
-  WithoutOpenMp() {
-    using Get = int (*)();
-    if (void* const get = dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"))
-      if (void* const set = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels")) {
-        set_ = reinterpret_cast<Set>(set);
-        levels_ = reinterpret_cast<Get>(get)();
-        set_(0);
-      }
-  }
-  ~WithoutOpenMp() {
-    if (set_ != nullptr)
-      set_(levels_);
-  }
-  WithoutOpenMp(const WithoutOpenMp&) = delete;
-  WithoutOpenMp& operator=(const WithoutOpenMp&) = delete;
-
- private:
-  using Set = void (*)(int);
-  Set set_ = nullptr;
-  int levels_ = 0;
-};
 
 /// SuiteSparse takes its memory in large pages, from before main on: it keeps one allocator for the whole program. One
 /// that the program has given it before stays.
@@ -165,35 +138,25 @@ cholmod_factor* analysed_by_blocks(const SparseMatrix& graph, long& nonzeros, ch
 
 class CholeskyFactorisation final : public OrderedCholesky {
  public:
-  CholeskyFactorisation(const SparseMatrix& lower, bool ordered) {
-    cholmod_sparse matrix = view(lower, -1);
+  explicit CholeskyFactorisation(const SparseMatrix& lower) {
     cholmod_common& common = workspace_.common;
-    if (ordered) {
-      common.nmethods = 1;
-      common.method[0].ordering = CHOLMOD_NATURAL;
-      common.postorder = 0;
-    }
-    if (const auto graph = ordered ? block_graph(lower) : std::nullopt)
+    common.nmethods = 1;
+    common.method[0].ordering = CHOLMOD_NATURAL;
+    common.postorder = 0;
+    if (const auto graph = block_graph(lower)) {
       factor_ = analysed_by_blocks(*graph, nonzeros_, common);
-    else if ((factor_ = cholmod_analyze(&matrix, &common)) != nullptr)
+    } else {
+      cholmod_sparse matrix = view(lower, -1);
+      factor_ = cholmod_analyze(&matrix, &common);
       nonzeros_ = static_cast<long>(common.lnz);
+    }
     if (factor_ == nullptr)
       throw NumericalError(fmt::format("Cholesky analysis failed (CHOLMOD status {})", common.status));
-    {
-      const WithoutOpenMp one_thread;
-      cholmod_factorize(&matrix, factor_, &common);
-    }
-    if (common.status == CHOLMOD_NOT_POSDEF || factor_->minor < factor_->n) {
-      const std::size_t column = factor_->minor;
+    try {
+      find_values(lower);
+    } catch (...) {
       cholmod_free_factor(&factor_, &common);
-      throw NumericalError(fmt::format("the stiffness matrix is not positive definite (column {} of {} in elimination "
-                                       "order): the body is not held, or a support is unsound",
-                                       column, lower.cols()));
-    }
-    if (common.status != CHOLMOD_OK) {
-      const int status = common.status;
-      cholmod_free_factor(&factor_, &common);
-      throw NumericalError(fmt::format("Cholesky factorisation failed (CHOLMOD status {})", status));
+      throw;
     }
   }
   ~CholeskyFactorisation() override { cholmod_free_factor(&factor_, &workspace_.common); }
@@ -245,6 +208,19 @@ class CholeskyFactorisation final : public OrderedCholesky {
   long nonzeros() const override { return nonzeros_; }
 
  private:
+  /// Fills the supernodes that the analysis has found.
+  void find_values(const SparseMatrix& lower) {
+    factor_->x = cholmod_malloc(factor_->xsize, sizeof(double), &workspace_.common);
+    if (factor_->x == nullptr)
+      throw NumericalError(fmt::format("Cholesky factorisation failed: no memory for {:.1f} GB of factor",
+                                       1e-9 * static_cast<double>(factor_->xsize * sizeof(double))));
+    factor_->xtype = CHOLMOD_REAL;
+    const int column = factor_supernodes(lower, supernodes(), static_cast<double*>(factor_->x));
+    if (column >= 0)
+      throw NumericalError(fmt::format("the stiffness matrix is not positive definite (column {} of {} in elimination "
+                                       "order): the body is not held, or a support is unsound",
+                                       column, lower.cols()));
+  }
   [[nodiscard]] SupernodalFactor supernodes() const {
     const auto indices = [](const void* array) { return static_cast<const int*>(array); };
     return {static_cast<int>(factor_->n),
@@ -430,14 +406,9 @@ class LuFactorisation final : public Factorisation {
 
 } // namespace
 
-std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower) {
-  interruption_point();
-  return std::make_unique<CholeskyFactorisation>(lower, false);
-}
-
 std::unique_ptr<OrderedCholesky> factor_ordered(const SparseMatrix& lower) {
   interruption_point();
-  return std::make_unique<CholeskyFactorisation>(lower, true);
+  return std::make_unique<CholeskyFactorisation>(lower);
 }
 
 std::unique_ptr<Factorisation> factor_general(const SparseMatrix& matrix, const std::vector<int>& ordering) {

@@ -1,5 +1,5 @@
-// Sparse direct factorisations kept behind plain Eigen types: CHOLMOD for symmetric positive definite systems, UMFPACK
-// for the others.
+// Sparse direct factorisations kept behind plain Eigen types: symmetric positive definite systems by
+// supernodes that CHOLMOD finds, the others by UMFPACK.
 #pragma once
 
 #include "topology/types.hpp"
@@ -39,13 +39,10 @@ class OrderedCholesky : public Factorisation {
   [[nodiscard]] virtual MatrixX trailing(int count) const = 0;
 };
 
-/// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle; CHOLMOD orders it. Throws
-/// NumericalError naming the column where the matrix is not
-/// positive definite.
-std::unique_ptr<Factorisation> factor_symmetric(const SparseMatrix& lower);
-
-/// The same for a matrix that already stands in its elimination order (postordered, as fill_reducing_ordering gives
-/// it): nothing is permuted.
+/// Supernodal L L^T of a symmetric positive definite matrix given by its lower triangle, which stands in its
+/// elimination order (postordered, as fill_reducing_ordering gives it): nothing is permuted. Threads share the work;
+/// the bits do not depend on their number. Throws NumericalError naming the column where the matrix is not positive
+/// definite.
 std::unique_ptr<OrderedCholesky> factor_ordered(const SparseMatrix& lower);
 
 /// L U with partial pivoting and iterative refinement. Throws NumericalError when the matrix is singular.

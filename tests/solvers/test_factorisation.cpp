@@ -1,8 +1,11 @@
 #include "solvers/factorisation.hpp"
 
+#include "solvers/elimination_order.hpp"
+#include "solvers/parallel.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/Dense>
+#include <array>
 #include <catch2/catch.hpp>
 #include <numeric>
 #include <random>
@@ -62,8 +65,7 @@ TEST_CASE("Cholesky and LU factorisations solve what dense solvers solve") {
     const Eigen::PartialPivLU<MatrixX> dense(general);
     const MatrixX exact = symmetric.llt().solve(right);
     for (const std::vector<int>& order : {std::vector<int>{}, reversed(size)}) {
-      const auto cholesky =
-          order.empty() ? solvers::factor_symmetric(lower(symmetric)) : solvers::factor_ordered(lower(symmetric));
+      const auto cholesky = solvers::factor_ordered(lower(symmetric));
       CHECK((cholesky->solve(right) - exact).norm() < 1e-10 * exact.norm());
       CHECK((cholesky->solve_transposed(right) - exact).norm() < 1e-10 * exact.norm());
       CHECK(cholesky->nonzeros() >= size);
@@ -109,7 +111,7 @@ TEST_CASE("Cholesky reads the lower triangle alone") {
   for (int k = 0; k + 1 < 40; ++k)
     spoiled(k, k + 1) += 100;
   const MatrixX right = random_right(40, 1), exact = symmetric.llt().solve(right);
-  CHECK((solvers::factor_symmetric(sparse(spoiled))->solve(right) - exact).norm() < 1e-10 * exact.norm());
+  CHECK((solvers::factor_ordered(sparse(spoiled))->solve(right) - exact).norm() < 1e-10 * exact.norm());
 }
 
 TEST_CASE("The 1-norm is the dense one, from all entries or from the lower triangle") {
@@ -138,7 +140,7 @@ TEST_CASE("The condition estimate is a lower bound within a factor of three") {
   difference.diagonal(-1).setConstant(-1);
   difference(n - 1, n - 1) = 1;
   const double exact = one_norm(difference) * one_norm(difference.inverse());
-  const auto cholesky = solvers::factor_symmetric(lower(difference));
+  const auto cholesky = solvers::factor_ordered(lower(difference));
   const double estimate = solvers::condition_estimate(*cholesky, solvers::one_norm(lower(difference), true), n);
   CHECK(estimate == Approx(exact).epsilon(0.01)); // the inverse is positive: the estimate is exact
 }
@@ -148,10 +150,10 @@ TEST_CASE("Singular and indefinite matrices are refused") {
   singular.row(7).setZero();
   CHECK_THROWS_AS(solvers::factor_general(sparse(singular)), NumericalError);
   const MatrixX indefinite = Eigen::Vector4d(1, 2, -1, 3).asDiagonal();
-  CHECK_THROWS_AS(solvers::factor_symmetric(lower(indefinite)), NumericalError);
-  CHECK_THROWS_WITH(solvers::factor_symmetric(lower(indefinite)), Catch::Contains("not positive definite"));
+  CHECK_THROWS_AS(solvers::factor_ordered(lower(indefinite)), NumericalError);
+  CHECK_THROWS_WITH(solvers::factor_ordered(lower(indefinite)), Catch::Contains("not positive definite"));
   const MatrixX empty_row = Eigen::Vector4d(1, 2, 0, 3).asDiagonal();
-  CHECK_THROWS_AS(solvers::factor_symmetric(lower(empty_row)), NumericalError);
+  CHECK_THROWS_AS(solvers::factor_ordered(lower(empty_row)), NumericalError);
 }
 
 TEST_CASE("A matrix of 3 x 3 blocks is factored as the same matrix without blocks") {
@@ -200,4 +202,54 @@ TEST_CASE("A matrix of 3 x 3 blocks is factored as the same matrix without block
   MatrixX indefinite = symmetric;
   indefinite(40, 40) = -1;
   CHECK_THROWS_WITH(solvers::factor_ordered(lower(indefinite)), Catch::Contains("(column 40 of 210"));
+}
+
+TEST_CASE("The factor of a body has the same bits whatever the number of threads") {
+  // Nodes on a grid, coupled as overlapping spheres are: wide supernodes, and subtrees side by side.
+  const int side = 12, nodes = side * side * side, reach = 2, size = 3 * nodes;
+  const auto place = [&](int node) {
+    return std::array<int, 3>{node / (side * side), node / side % side, node % side};
+  };
+  std::vector<int> start{0}, neighbours;
+  for (int node = 0; node < nodes; ++node) {
+    for (int other = 0; other < nodes; ++other) {
+      const auto a = place(node), b = place(other);
+      if (std::abs(a[0] - b[0]) <= reach && std::abs(a[1] - b[1]) <= reach && std::abs(a[2] - b[2]) <= reach)
+        neighbours.push_back(other);
+    }
+    start.push_back(static_cast<int>(neighbours.size()));
+  }
+  const std::vector<int> order = solvers::fill_reducing_ordering(start, neighbours);
+  std::vector<int> rank(nodes);
+  for (int k = 0; k < nodes; ++k)
+    rank[order[k]] = k;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int node = 0; node < nodes; ++node)
+    for (int k = start[node]; k < start[node + 1]; ++k)
+      if (const int row = rank[node], column = rank[neighbours[k]]; row >= column)
+        for (int a = 0; a < 3; ++a)
+          for (int b = 0; b < 3; ++b)
+            if (row > column || a >= b)
+              entries.emplace_back(3 * row + a, 3 * column + b, row == column && a == b ? 300.0 : uniform(random));
+  SparseMatrix matrix(size, size);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  const MatrixX right = random_right(size, 2);
+  const auto alone = solvers::factor_ordered(matrix);
+  const MatrixX solution = alone->solve(right);
+  CHECK((matrix.selfadjointView<Eigen::Lower>() * solution - right).norm() < 1e-12 * right.norm());
+  const MatrixX trailing = alone->trailing(1000);
+  struct Threads {
+    explicit Threads(int count) { solvers::set_thread_count(count); }
+    ~Threads() { solvers::set_thread_count(1); }
+  } const two(2);
+  const auto together = solvers::factor_ordered(matrix);
+  CHECK(together->trailing(1000) == trailing);
+  CHECK(together->solve(right) == solution);
+  // The first column that fails is told, whichever thread comes to it.
+  SparseMatrix indefinite = matrix;
+  for (const int column : {700, 40, 4000})
+    indefinite.coeffRef(column, column) = -1;
+  CHECK_THROWS_WITH(solvers::factor_ordered(indefinite), Catch::Contains("(column 40 of 5184"));
 }
