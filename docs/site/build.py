@@ -8,7 +8,6 @@ Exits 1 where Sphinx or Doxygen has a warning, or a tutorial quotes what its scr
 """
 
 import argparse
-import ast
 import hashlib
 import os
 import re
@@ -177,79 +176,41 @@ def tutorial(name: str, text: str, staging: Staging, build: Path, cache: Path, r
     return text + f"\n## The whole script\n\n```{{literalinclude}} {name}.source\n:language: python\n```\n"
 
 
-# --- reference of the Python package, from its types and docstrings
+# --- reference of the Python package, by autodoc
+
+# Modules of the package: name, title, what it is for.
+MODULES = {  # sweep.md has studies
+    "spherecut": "Floors, sessions and runs",
+    "spherecut.env": "Environment",
+}
+# All names of a staged module are told as those of the module that a user imports.
+AS_IMPORTED = """
+for _value in list(globals().values()):
+    if getattr(_value, "__module__", "").startswith("spherecut._"):
+        _value.__module__ = "spherecut"
+"""
 
 
-def described(node: ast.AST, indent: str, text_only: bool) -> str:
-    """The docstring as reST. Those of the compiled module are plain text: what reST would take for markup is literal."""
-    text = ast.get_docstring(node) or ""  # type: ignore[arg-type]
-    if text_only:
-        text = re.sub(r"(?<!`)\b((?:\w+\.)*\w+\(\))", r"``\1``", text.replace("\\", "\\\\").replace("*", "\\*").replace("|", "\\|"))
-        text = re.sub(r"(?<![`\w])(\w+_)(?!\w)", r"``\1``", text)
-    return "".join(f"{indent}{line}".rstrip() + "\n" for line in text.splitlines()) + "\n" if text else ""
-
-
-def signature(function: ast.FunctionDef, method: bool) -> str:
-    arguments = function.args
-    if method and arguments.args and arguments.args[0].arg in ("self", "cls"):
-        arguments.args.pop(0)
-    returned = "" if function.returns is None or function.name == "__init__" else f" -> {ast.unparse(function.returns)}"
-    return f"({ast.unparse(arguments)}){returned}"
-
-
-def members(owner: ast.ClassDef, indent: str, text_only: bool) -> str:
-    out, seen = "", set()
-    for node in owner.body:
-        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and not node.target.id.startswith("_"):
-            out += f"{indent}.. py:attribute:: {node.target.id}\n{indent}   :type: {ast.unparse(node.annotation)}\n\n"
-        if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
-            continue
-        decorators = [ast.unparse(d) for d in node.decorator_list]
-        if any(d.endswith(".setter") for d in decorators):
-            continue
-        again = f"{indent}   :noindex:\n" if node.name in seen else ""  # an overload
-        seen.add(node.name)
-        if "property" in decorators:
-            kind = f":type: {ast.unparse(node.returns)}" if node.returns is not None else ""
-            out += f"{indent}.. py:property:: {node.name}\n{again}" + (f"{indent}   {kind}\n" if kind else "")
-        else:
-            out += f"{indent}.. py:method:: {node.name}{signature(node, 'staticmethod' not in decorators)}\n{again}"
-            if "staticmethod" in decorators:
-                out += f"{indent}   :staticmethod:\n"
-        out += "\n" + described(node, indent + "   ", text_only)
-    return out
-
-
-def python_module(file: Path, module: str, text_only: bool) -> str:
-    tree = ast.parse(file.read_text())
-    out, seen = f".. py:currentmodule:: {module}\n\n", set()
-    for node in tree.body:
-        if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name.startswith("_"):
-            continue
-        again = "   :noindex:\n" if node.name in seen else ""
-        seen.add(node.name)
-        if isinstance(node, ast.FunctionDef):
-            out += f".. py:function:: {node.name}{signature(node, False)}\n{again}\n{described(node, '   ', text_only)}"
-            continue
-        makers = [m for m in node.body if isinstance(m, ast.FunctionDef) and m.name == "__init__"]
-        kind = "exception" if any("Error" in ast.unparse(base) for base in node.bases) else "class"
-        out += f".. py:{kind}:: {node.name}"
-        out += (signature(makers[0], True) if makers else "") + "\n" + again + "\n" + described(node, "   ", text_only)
-        for maker in makers:
-            out += described(maker, "   ", text_only)
-        out += members(node, "   ", text_only)
-    return out
+def stage_package(out: Path, version: str) -> None:
+    """The package as autodoc imports it: the compiled module is its stub file, which has types and docstrings."""
+    package, target = ROOT / "python" / "spherecut", out / "package" / "spherecut"
+    shutil.rmtree(target, ignore_errors=True)
+    shutil.copytree(package, target, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    stub = target / "_core.pyi"
+    stub.rename(target / "_core.py")
+    (target / "_core.py").write_text("from __future__ import annotations\n" + (target / "_core.py").read_text()
+                                     + f'\n__version__ = "{version}"\n')
+    with (target / "__init__.py").open("a") as file:
+        file.write(AS_IMPORTED)
 
 
 def python_reference() -> str:
-    package = ROOT / "python" / "spherecut"
     title = "Python reference"
-    return (f"{title}\n{'=' * len(title)}\n\nThe package ``spherecut``: every name with its types. "
-            "A worked example and what holds everywhere are on :doc:`the page of the package </docs/python>`.\n\n"
-            ".. py:module:: spherecut\n\n"
-            "Runs\n----\n\n" + python_module(package / "_run.py", "spherecut", False)
-            + "Floors and sessions\n-------------------\n\n" + python_module(package / "_core.pyi", "spherecut", True)
-            + "Environment\n-----------\n\n.. py:module:: spherecut.env\n\n" + python_module(package / "env.py", "spherecut.env", False))
+    text = (f"{title}\n{'=' * len(title)}\n\nThe package ``spherecut``: every name with its types. "
+            "A worked example and what holds everywhere are on :doc:`the page of the package </docs/python>`.\n\n")
+    for module, what in MODULES.items():
+        text += f"{what}\n{'-' * len(what)}\n\n.. automodule:: {module}\n   :members:\n   :undoc-members:\n\n"
+    return text
 
 
 # --- reference of the C++ headers
@@ -424,11 +385,13 @@ def main() -> None:
     out, build = given.out.resolve(), given.build.resolve()
     if not given.pages_only and not list((build / "python" / "spherecut").glob("_core.*.so")):
         fail(f"{build} has no Python package (ninja -C {build} spherecut_python): the tutorials cannot be run")
+    found = re.search(r"project\(spherecut VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())
+    version = found.group(1) if found else ""
     stage(out, build, given.pages_only)
+    stage_package(out, version)
     remove_old(out / "source", out / "html")
-    version = re.search(r"project\(spherecut VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())
     environment = os.environ | {"SPHERECUT_DOXYGEN": "" if given.pages_only else str(out / "doxygen" / "xml"),
-                                "SPHERECUT_DOCS_VERSION": version.group(1) if version else ""}
+                                "SPHERECUT_DOCS_VERSION": version, "SPHERECUT_DOCS_PACKAGE": str(out / "package")}
     done = subprocess.run([sys.executable, "-m", "sphinx", "-b", "html", "-W", "--keep-going", "-q", "-d", str(out / "doctrees"),
                            str(out / "source"), str(out / "html")], env=environment)
     if done.returncode != 0:

@@ -3,13 +3,16 @@
 import logging
 import os
 import re
+import sys
+
+sys.path.insert(0, os.environ["SPHERECUT_DOCS_PACKAGE"])
 
 project = "Spherecut"
 author = "The Spherecut maintainers"
 copyright = author
 version = release = os.environ["SPHERECUT_DOCS_VERSION"]
 
-extensions = ["myst_parser", "sphinx.ext.mathjax"]
+extensions = ["myst_parser", "sphinx.ext.mathjax", "sphinx.ext.autodoc"]
 doxygen = os.environ["SPHERECUT_DOXYGEN"]
 if doxygen:
     extensions.append("breathe")
@@ -46,6 +49,10 @@ html_last_updated_fmt = None
 pygments_style = "friendly"
 highlight_language = "text"
 add_module_names = False
+autoclass_content = "both"
+autodoc_preserve_defaults = True
+autodoc_typehints_format = "short"
+autodoc_type_aliases = {"npt.ArrayLike": "npt.ArrayLike", "Array": "Array", "Observation": "Observation", "Reward": "Reward"}
 nitpicky = False
 
 
@@ -61,3 +68,19 @@ class NotWarnings(logging.Filter):
 
 for name in ("sphinx.sphinx.domains.cpp", "sphinx.sphinx.util.cfamily"):
     logging.getLogger(name).addFilter(NotWarnings())
+
+
+def plain_docstrings(app, what, name, obj, options, lines):
+    """Docstrings of the compiled module are plain text: what reST would take for markup is literal."""
+    module = sys.modules.get("spherecut._core")
+    owner = name.split(".")[1] if name.count(".") else ""
+    if name.startswith("spherecut.env") or name.startswith("spherecut.sweep") or not hasattr(module, owner):
+        return
+    for k, line in enumerate(lines):
+        line = line.replace("\\", "\\\\").replace("*", "\\*").replace("|", "\\|")
+        line = re.sub(r"(?<!`)\b((?:\w+\.)*\w+\(\))", r"``\1``", line)
+        lines[k] = re.sub(r"(?<![`\w])(\w+_)(?!\w)", r"``\1``", line)
+
+
+def setup(app):
+    app.connect("autodoc-process-docstring", plain_docstrings)
