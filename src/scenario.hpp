@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -119,6 +120,7 @@ struct Scenario {
   solvers::Material material;
   double toughness = 0; // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
   std::vector<ToughnessLayer> layers;
+  std::function<double(const Vector3&)> toughness_function; // J/m2, a program's own, in place of both; empty: theirs
   TearSettings tearing;
   std::vector<FixedRegion> fixed;
   NodeSettings nodes;
@@ -133,6 +135,10 @@ struct Scenario {
   HapticSettings haptics;
   OutputSettings output;
 };
+
+/// Toughness in the tissue at rest, J/m2: the scenario's function, or that of the last layer that holds the place, or
+/// that of the material. A function's value that is not positive and finite is an InputError that names the place.
+std::function<double(const Vector3&)> toughness_field(const Scenario& scenario);
 
 /// Reads and checks a scenario file. Throws InputError with one line for every offence: file:line, key, value and what
 /// is allowed.

@@ -84,7 +84,7 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
   }
   watch_blade_way();
   make_blade_force();
-  toughness_ = toughness_field(scenario_.toughness, scenario_.layers);
+  toughness_ = toughness_field(scenario_);
   if (!computes())
     return;
   if (touch_)

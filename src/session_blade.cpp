@@ -17,7 +17,7 @@ void Session::make_blade_force() {
   blade_force_ = std::make_unique<BladeForce>(
       scenario_, organ_.domain, zone_.spacing.fine,
       [this](const BodyModel& model) { return [this, &model](const Vector3& x) { return rest_position(x, model); }; },
-      toughness_field(scenario_.toughness, scenario_.layers));
+      toughness_field(scenario_));
   if (blade_force_->finer_than_nodes())
     warn("edge",
          fmt::format("the contact of the blade's edge is narrower than the nodes; it is taken as {:.3g} m wide: "

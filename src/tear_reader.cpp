@@ -1,5 +1,9 @@
 #include "src/tear_reader.hpp"
 
+#include "src/scenario.hpp"
+#include "topology/errors.hpp"
+
+#include <cmath>
 #include <fmt/format.h>
 
 namespace spherecut::app {
@@ -11,8 +15,16 @@ bool ToughnessLayer::holds(const Vector3& x) const {
   return std::abs(slab.normal.dot(x - slab.point)) <= 0.5 * slab.thickness;
 }
 
-std::function<double(const Vector3&)> toughness_field(double everywhere, std::vector<ToughnessLayer> layers) {
-  return [everywhere, layers = std::move(layers)](const Vector3& x) {
+std::function<double(const Vector3&)> toughness_field(const Scenario& scenario) {
+  if (const auto& own = scenario.toughness_function)
+    return [own](const Vector3& x) {
+      const double toughness = own(x);
+      if (!(toughness > 0) || !std::isfinite(toughness))
+        throw InputError(fmt::format("toughness at ({:.6g}, {:.6g}, {:.6g}) m: {} J/m2; allowed: above 0, finite",
+                                     x.x(), x.y(), x.z(), toughness));
+      return toughness;
+    };
+  return [everywhere = scenario.toughness, layers = scenario.layers](const Vector3& x) {
     double toughness = everywhere;
     for (const ToughnessLayer& layer : layers)
       if (layer.holds(x))

@@ -34,7 +34,4 @@ struct TearSettings {
   double most_area = 0;     // m2 torn, beyond which a run tears no more; 0: no limit
 };
 
-/// Toughness in the tissue at rest, J/m2: `everywhere`, or that of the last layer that holds the place.
-std::function<double(const Vector3&)> toughness_field(double everywhere, std::vector<ToughnessLayer> layers);
-
 } // namespace spherecut::app

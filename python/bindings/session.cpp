@@ -119,7 +119,7 @@ void bind_scenario(py::module_& module) {
       .def(
           "toughness_at",
           [](const Scenario& self, const Doubles& points) {
-            const auto field = app::toughness_field(self.toughness, self.layers);
+            const auto field = app::toughness_field(self);
             std::vector<double> values;
             for (const Vector3& x : one_or_more_points(points, "points"))
               values.push_back(field(x));
@@ -136,8 +136,25 @@ void bind_scenario(py::module_& module) {
             return copy;
           },
           "seed"_a, "The same scenario with other nodes: nodes.random_seed. Its text stays what it was.")
+      .def(
+          "with_toughness",
+          [](const Scenario& self, const py::object& toughness) {
+            if (!(self.toughness > 0))
+              throw InputError("with_toughness: the scenario has no material.toughness; allowed: with one above 0");
+            auto copy = std::make_shared<Scenario>(self);
+            copy->toughness_function = number_function(toughness, "toughness");
+            return copy;
+          },
+          "toughness"_a,
+          "The same scenario with another toughness, J/m2: a number, or a function of a point of the body at rest, "
+          "(3,), m. Blade and tears meet it in every session; a function is asked on the threads of the session. Its "
+          "text stays what it was, and it cannot be pickled.")
       .def(py::pickle(
-          [](const Scenario& self) { return py::make_tuple(self.text, self.file.string(), self.nodes.random_seed); },
+          [](const Scenario& self) {
+            if (self.toughness_function)
+              throw InputError("pickle: a scenario with a toughness of its own; allowed: one as its file has it");
+            return py::make_tuple(self.text, self.file.string(), self.nodes.random_seed);
+          },
           [](const py::tuple& state) {
             auto scenario = std::make_shared<Scenario>(
                 app::read_scenario_text(state[1].cast<std::string>(), state[0].cast<std::string>()));
@@ -259,7 +276,7 @@ std::vector<solvers::FrontState> fronts_of(RunningSession& self, const std::opti
         if (model.state->lips.closed[p] != 0)
           closed.push_back(model.sprinkling.nodes.positions[static_cast<std::size_t>(model.pairs[p].plus)]);
     if (!resistance) {
-      resistance = app::toughness_field(session.scenario().toughness, session.scenario().layers);
+      resistance = app::toughness_field(session.scenario());
       if (!(session.scenario().toughness > 0))
         resistance = [](const Vector3&) { return 1.0; }; // intensities do not depend on it
     }

@@ -1,6 +1,7 @@
 """Sessions from Python against the command line: same bits, same files, same words."""
 
 import csv
+import pickle
 import re
 import subprocess
 
@@ -151,6 +152,33 @@ def test_toughness_layers_equal_their_function(source):
     by_scenario = session.front_states()
     assert by_scenario and [s.toughness for s in by_function] == [s.toughness for s in by_scenario]
     assert [s.release for s in by_function] == [s.release for s in by_scenario]
+
+
+@pytest.mark.parametrize("name", ["peel.toml", "block_slice.toml"])
+def test_a_session_with_a_function_for_its_toughness(source, name):
+    """Tears and a blade meet the function: the scenario's own as a function gives the same bits, another one does not."""
+    text = (source / "scenarios" / name).read_text()
+    if "toughness" not in text:
+        text = text.replace("[material]\n", "[material]\ntoughness = 5.0\n")
+    scenario = sc.Scenario.from_text(text, source / "scenarios" / name)
+
+    def areas(given):
+        session = sc.Session(given)
+        results = [session.step(step) for step in session.steps[:8]]
+        return [(r.cut or {}).get("area_m2", 0.0) for r in results] + [tuple(r.blade_force) for r in results]
+
+    built_in = areas(scenario)
+    assert max(value for value in built_in if isinstance(value, float)) > 0
+    assert areas(scenario.with_toughness(lambda x: float(scenario.toughness_at(x)[0]))) == built_in
+    assert areas(scenario.with_toughness(1e6)) != built_in
+    with pytest.raises(sc.InputError, match="toughness at .*allowed: above 0"):
+        areas(scenario.with_toughness(lambda x: -1.0))
+    with pytest.raises(sc.InputError, match="pickle"):
+        pickle.dumps(scenario.with_toughness(2.0))
+    plain = sc.Scenario.from_text(text.replace("toughness = 5.0\n", ""), name) if "5.0\n" in text else None
+    if plain is not None and plain.toughness == 0:
+        with pytest.raises(sc.InputError, match="no material.toughness"):
+            plain.with_toughness(2.0)
 
 
 def test_a_session_is_not_asked_within_its_step(source):
