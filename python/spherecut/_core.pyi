@@ -762,6 +762,11 @@ class Scenario:
         """Of its nodes."""
     def with_random_seed(self, seed: int) -> Scenario:
         """The same scenario with other nodes: nodes.random_seed. Its text stays what it was."""
+    def with_toughness(self, toughness: Any) -> Scenario:
+        """The same scenario with another toughness, J/m2: a number, or a function of a point of the body at rest,
+        (3,), m. Blade and tears meet it in every session; a function is asked on the threads of the session. Its
+        text stays what it was, and it cannot be pickled.
+        """
 
 class BladePose:
     """Where the frame of a blade is at a time."""
