@@ -2,10 +2,10 @@
 include(CMakePackageConfigHelpers)
 set(SPHERECUT_PACKAGE_FOLDER "${CMAKE_INSTALL_LIBDIR}/cmake/spherecut")
 
-install(TARGETS spherecut_topology spherecut_solvers spherecut_app spherecut_options spherecut_suitesparse spherecut_mumps spherecut_voro
+install(TARGETS spherecut_topology spherecut_solvers spherecut_app spherecut_live spherecut_options spherecut_suitesparse spherecut_mumps spherecut_voro
   EXPORT spherecutTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(EXPORT spherecutTargets NAMESPACE spherecut:: DESTINATION "${SPHERECUT_PACKAGE_FOLDER}")
-install(TARGETS spherecut spherecut_experiment RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+install(TARGETS spherecut spherecut_live_program spherecut_experiment RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
 # Headers are installed under spherecut/ and say so when they include one another: a folder named src or topology on the
 # include path of a program must not come before theirs.
 install(CODE "set(source \"${PROJECT_SOURCE_DIR}\")

@@ -4,7 +4,6 @@
 #include "src/interrupt.hpp"
 #include "src/printable.hpp"
 #include "src/process_settings.hpp"
-#include "src/run.hpp"
 #include "topology/errors.hpp"
 #include "topology/interruption.hpp"
 
@@ -134,6 +133,26 @@ int say_interrupted(const std::string& text) {
   fmt::print("{}\n", text);
   std::fflush(stdout);
   return app::status_of_interrupted;
+}
+
+int status_of(app::RunEnd end) {
+  switch (end) {
+  case app::RunEnd::complete:
+    return 0;
+  case app::RunEnd::interrupted:
+    return app::status_of_interrupted;
+  case app::RunEnd::differs:
+    break;
+  }
+  return status_check_failed;
+}
+
+int threads_unless_told(int reserved) {
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()) - reserved, 1, 16);
+}
+
+std::string about_threads(const std::string& by_default) {
+  return "Threads of a solve, 1 to 256; the results do not depend on it; default " + by_default;
 }
 
 int pass_on(const std::string& name, char** arguments) {

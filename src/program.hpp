@@ -1,6 +1,8 @@
 // What the programs have in common: they end in words and with one of these statuses.
 #pragma once
 
+#include "src/run.hpp"
+
 #include <string>
 
 namespace CLI {
@@ -30,6 +32,15 @@ std::string what_is_wrong(const CLI::App& commands, int argc, char** argv, const
 int ended(int status);
 
 int say_interrupted(const std::string& text);
+
+/// Status of a run or a session that has come to this end.
+int status_of(app::RunEnd end);
+
+/// Threads of a solve where the command line does not say: one a core but `reserved` of them, 1 to 16.
+int threads_unless_told(int reserved);
+
+/// What the option --threads is for.
+std::string about_threads(const std::string& by_default);
 
 /// Becomes the program `name` that lies beside this one, with these arguments (ended by null). Returns where it cannot.
 int pass_on(const std::string& name, char** arguments);

@@ -4,7 +4,7 @@
 #include "solvers/contact_solver.hpp"
 #include "solvers/discretisation.hpp"
 #include "src/cut_settings.hpp"
-#include "src/haptics/haptic_settings.hpp"
+#include "src/haptic_settings.hpp"
 #include "src/tear_settings.hpp"
 #include "topology/surface_check.hpp"
 #include "topology/tool.hpp"

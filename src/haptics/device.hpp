@@ -6,7 +6,7 @@
 // has no clock, it is asked once a tick and answers with the newest it has.
 #pragma once
 
-#include "src/haptics/haptic_settings.hpp"
+#include "src/haptic_settings.hpp"
 #include "src/schedule.hpp"
 
 #include <Eigen/Geometry>

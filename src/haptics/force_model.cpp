@@ -1,10 +1,8 @@
 #include "src/haptics/force_model.hpp"
 
 #include "src/haptics/tangent_model.hpp"
-#include "topology/errors.hpp"
 
 #include <algorithm>
-#include <fmt/format.h>
 
 namespace spherecut::app {
 namespace {
@@ -51,25 +49,6 @@ class LinearInTimeModel : public ForceModel {
 };
 
 } // namespace
-
-std::string_view to_string(ForceModelKind kind) {
-  switch (kind) {
-  case ForceModelKind::hold:
-    return "hold";
-  case ForceModelKind::linear_in_time:
-    return "linear_in_time";
-  case ForceModelKind::tangent:
-    return "tangent";
-  }
-  return "unknown";
-}
-
-ForceModelKind force_model_from_string(std::string_view name) {
-  for (const ForceModelKind kind : {ForceModelKind::hold, ForceModelKind::linear_in_time, ForceModelKind::tangent})
-    if (name == to_string(kind))
-      return kind;
-  throw InputError(fmt::format("force model '{}' does not exist; there are: hold, linear_in_time, tangent", name));
-}
 
 std::unique_ptr<ForceModel> make_force_model(ForceModelKind kind, const topology::ToolShape& tool) {
   switch (kind) {

@@ -1,7 +1,7 @@
 // Energy at the tool port, and the damping that keeps the loop from giving more than it got.
 #pragma once
 
-#include "src/haptics/haptic_settings.hpp"
+#include "src/haptic_settings.hpp"
 #include "topology/types.hpp"
 
 #include <array>
