@@ -1,10 +1,24 @@
 // Dual numbers: a value and its derivatives by `n` variables, carried through arithmetic (automatic differentiation).
+// And the functions that material laws need, for doubles too; law_lanes.inl has them for packs.
 #pragma once
 
 #include <array>
 #include <cmath>
 
 namespace spherecut::solvers {
+
+[[nodiscard]] inline double logarithm(double a) {
+  return std::log(a);
+}
+[[nodiscard]] inline double exponential(double a) {
+  return std::exp(a);
+}
+[[nodiscard]] inline double root(double a) {
+  return std::sqrt(a);
+}
+[[nodiscard]] inline double positive_part(double a) {
+  return a > 0 ? a : 0;
+}
 
 template <int n>
 struct Dual {
@@ -19,7 +33,7 @@ struct Dual {
     x.slope[k] = 1;
     return x;
   }
-  /// f(a) with f' = derivative.
+  /// f(a), where f has that value and derivative.
   static Dual chain(double f, double derivative, const Dual& a) {
     Dual x(f);
     for (int k = 0; k < n; ++k)
@@ -51,16 +65,12 @@ struct Dual {
   friend Dual operator*(const Dual& a, double b) { return b * a; }
   friend Dual operator/(const Dual& a, const Dual& b) { return a * chain(1 / b.value, -1 / (b.value * b.value), b); }
   friend Dual operator/(const Dual& a, double b) { return (1 / b) * a; }
-  friend Dual log(const Dual& a) { return chain(std::log(a.value), 1 / a.value, a); }
-  friend Dual exp(const Dual& a) {
+  friend Dual logarithm(const Dual& a) { return chain(std::log(a.value), 1 / a.value, a); }
+  friend Dual exponential(const Dual& a) {
     const double f = std::exp(a.value);
     return chain(f, f, a);
   }
   friend Dual positive_part(const Dual& a) { return a.value > 0 ? a : Dual(); }
 };
-
-[[nodiscard]] inline double positive_part(double a) {
-  return a > 0 ? a : 0;
-}
 
 } // namespace spherecut::solvers

@@ -1,7 +1,7 @@
 // Material laws: strain energy and stress as functions of the deformation gradient.
 //
-// Every law but the linear one splits its energy, per volume of the stress-free state, as W(F) = W_iso(F) + U(J) with
-// J = det F and U(J) = kappa/4 (J^2 - 1 - 2 ln J) [Simo and Taylor 1991], which is convex and infinite at J = 0. W_iso
+// Energy, per volume of the stress-free state, is split as W(F) = W_iso(F) + U(J) with J = det F. Of every law but the
+// linear one, U(J) = kappa/4 (J^2 - 1 - 2 ln J) [Simo and Taylor 1991], which is convex and infinite at J = 0. W_iso
 // takes shape changes from F J^(-1/3) alone (the fibres of holzapfel_gasser_ogden excepted, see there).
 // Matrices of nine numbers are column-major: entry (i, j) at i + 3 j.
 #pragma once
@@ -41,7 +41,8 @@ struct ElasticConstants {
   return 2 * shear_modulus * (1 + poisson_ratio) / (3 * (1 - 2 * poisson_ratio));
 }
 
-/// Small strain: W = mu e:e + (kappa/2 - mu/3) (tr e)^2 with e = sym(F) - I. Exact superposition, no rotation.
+/// Small strain: W = mu dev e : dev e + kappa/2 (tr e)^2 with e = sym(F) - I. Exact superposition, no rotation. 1 + tr
+/// e stands in the place of J.
 struct LinearLaw {
   double shear_modulus = 0; // mu, Pa
 };
@@ -71,7 +72,9 @@ struct HolzapfelLaw {
   double fibre_modulus = 0;        // k1, Pa
   double fibre_exponent = 0;       // k2
   double dispersion = 0;           // d, 0 (aligned) to 1/3 (isotropic)
-  std::vector<Vector3> directions; // one or two, unit; where a point has no frame of its own
+  int families = 1;                // one or two
+  bool same_everywhere = true;     // false: every point is given its own frame
+  std::vector<Vector3> directions; // of the families, where they are the same everywhere; unit
 };
 
 /// One term of a Prony series: the share of the isochoric stress that fades, and in what time.
@@ -112,8 +115,9 @@ class Law {
   /// Frame of the law's own directions; zero where it has none.
   [[nodiscard]] virtual FibreFrame own_fibres() const = 0;
 
-  /// U(J), J/m3, U'(J), Pa, and U''(J), Pa. The linear law has no such part: its `evaluate_isochoric` is `evaluate`,
-  /// and these are zero.
+  /// True of the linear law: 1 + tr e in place of J, stress that does not turn with the body.
+  [[nodiscard]] virtual bool small_strain_only() const = 0;
+  /// U(J), J/m3, U'(J), Pa, and U''(J), Pa.
   [[nodiscard]] virtual double volumetric_energy(double jacobian) const = 0;
   [[nodiscard]] virtual double pressure(double jacobian) const = 0;
   [[nodiscard]] virtual double bulk_slope(double jacobian) const = 0;
@@ -123,7 +127,9 @@ class Law {
   [[nodiscard]] virtual std::string name() const = 0; // as in a scenario
 };
 
-/// Throws InputError naming the constant, its value and its limit.
+/// Throws InputError naming the constant, its value and its limit: constants of the wrong sign, a Poisson ratio outside
+/// [0, 0.499], fibres without direction, Prony shares that add to one, and constants that lose strong ellipticity
+/// between stretches of 0.5 and 2, with the strain where they do.
 std::unique_ptr<Law> make_law(const LawSpec& spec);
 
 } // namespace spherecut::solvers

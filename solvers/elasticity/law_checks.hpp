@@ -1,0 +1,45 @@
+// What a law's constants say, and what they may be.
+#pragma once
+
+#include "solvers/elasticity/law.hpp"
+
+#include <array>
+#include <optional>
+
+namespace spherecut::solvers {
+
+/// The constants of a law as its model in this folder takes them.
+struct LawConstants {
+  std::array<double, 6> values{};
+};
+[[nodiscard]] LawConstants law_constants(const LawSpec& spec);
+/// Moduli in the rest state, Pa.
+[[nodiscard]] ElasticConstants law_moduli(const LawSpec& spec);
+/// Frame of the law's own directions; zero where it has none.
+[[nodiscard]] FibreFrame law_fibres(const LawSpec& spec);
+/// As in a scenario.
+[[nodiscard]] const char* law_name(const LawSpec& spec);
+
+/// Throws InputError naming law, constant, value and limit: constants that are not finite or of the wrong sign, Poisson
+/// ratios outside [0, 0.499] ([0, 0.5) of the linear law), fibres without direction, Prony shares that add to one, and
+/// constants with which the law loses strong ellipticity between stretches of 0.5 and 2 (see find_loss), with that
+/// strain and the value of the constant up to which it does not.
+void check_law(const LawSpec& spec);
+
+/// A law from constants that nobody has looked at.
+[[nodiscard]] std::unique_ptr<Law> make_law_unchecked(const LawSpec& spec);
+
+/// Where a law first loses strong ellipticity: its acoustic tensor, Q_ik = A_ijkl n_j n_l, is no longer positive
+/// definite.
+struct EllipticityLoss {
+  std::string path;  // how it is strained: "uniaxial tension", ...
+  double strain = 0; // stretch - 1, the least in magnitude of all paths
+};
+
+/// Looks along six paths from the rest state, to stretches 1 / `reach` and `reach`, by steps of at most 2 %: uniaxial,
+/// equibiaxial and pure shear, their free stretches such that no stress acts there (isotropic laws) or no volume
+/// changes (fibres); confined; and, to half as far in ln J, all around. Directions n: 145 over the half sphere. Loss
+/// between them is not seen.
+[[nodiscard]] std::optional<EllipticityLoss> find_loss(const LawSpec& spec, double reach);
+
+} // namespace spherecut::solvers
