@@ -90,6 +90,9 @@ struct LawSpec {
   std::vector<PronyTerm> prony; // up to three
 };
 
+/// Throws InputError naming the term, its value and the limit.
+void check_prony_terms(std::span<const PronyTerm> terms);
+
 /// Hyperelastic law. Constant after it is made: threads may share it.
 class Law {
  public:

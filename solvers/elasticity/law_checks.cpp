@@ -80,25 +80,6 @@ void check_constants(const LawSpec& spec, const HolzapfelLaw& law) {
                                a[2], a.norm()));
 }
 
-void check_prony(const LawSpec& spec) {
-  if (spec.prony.size() > most_terms)
-    refuse(spec, fmt::format("it has {} Prony terms; up to {} are possible", spec.prony.size(), most_terms));
-  double sum = 0;
-  for (std::size_t p = 0; p < spec.prony.size(); ++p) {
-    const PronyTerm& term = spec.prony[p];
-    if (!(term.share > 0 && term.share < 1))
-      refuse(spec, fmt::format("the share of Prony term {} is {}; it must lie between 0 and 1", p + 1, term.share));
-    if (!(term.time > 0) || !std::isfinite(term.time))
-      refuse(spec, fmt::format("the time of Prony term {} is {} s; it must be positive and finite", p + 1, term.time));
-    sum += term.share;
-  }
-  if (!(sum < 1 - 1e-9))
-    refuse(spec,
-           fmt::format("the shares of the Prony terms add to {}; the sum must be below 1, for nothing would bear a "
-                       "load that stays",
-                       sum));
-}
-
 void check_bulk(const LawSpec& spec) {
   const ElasticConstants moduli = law_moduli(spec);
   if (!(moduli.bulk_modulus > 0) || !std::isfinite(moduli.bulk_modulus))
@@ -305,10 +286,30 @@ const char* law_name(const LawSpec& spec) {
   return names[spec.law.index()];
 }
 
+void check_prony_terms(std::span<const PronyTerm> terms) {
+  if (terms.size() > most_terms)
+    throw InputError(fmt::format("Prony series: it has {} terms; up to {} are possible", terms.size(), most_terms));
+  double sum = 0;
+  for (std::size_t p = 0; p < terms.size(); ++p) {
+    if (!(terms[p].share > 0 && terms[p].share < 1))
+      throw InputError(
+          fmt::format("Prony series: the share of term {} is {}; it must lie between 0 and 1", p + 1, terms[p].share));
+    if (!(terms[p].time > 0) || !std::isfinite(terms[p].time))
+      throw InputError(fmt::format("Prony series: the time of term {} is {} s; it must be positive and finite", p + 1,
+                                   terms[p].time));
+    sum += terms[p].share;
+  }
+  if (!(sum < 1 - 1e-9))
+    throw InputError(
+        fmt::format("Prony series: the shares add to {}; the sum must be below 1, for nothing would bear a "
+                    "load that stays",
+                    sum));
+}
+
 void check_law(const LawSpec& spec) {
   std::visit([&](const auto& law) { check_constants(spec, law); }, spec.law);
   check_bulk(spec);
-  check_prony(spec);
+  check_prony_terms(spec.prony);
   check_ellipticity(spec);
 }
 
