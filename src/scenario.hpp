@@ -5,6 +5,7 @@
 #include "solvers/discretisation.hpp"
 #include "src/cut_settings.hpp"
 #include "src/haptics/haptic_settings.hpp"
+#include "src/law_settings.hpp"
 #include "src/tear_settings.hpp"
 #include "topology/surface_check.hpp"
 #include "topology/tool.hpp"
@@ -116,8 +117,9 @@ struct Scenario {
   std::string text; // of the file, for the summary
   std::string title;
   OrganSettings organ;
-  solvers::Material material;
-  double toughness = 0; // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
+  LawSettings law;
+  solvers::Material material; // small-strain moduli of the law, and the density
+  double toughness = 0;       // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
   std::vector<ToughnessLayer> layers;
   TearSettings tearing;
   std::vector<FixedRegion> fixed;

@@ -127,7 +127,7 @@ State solve_free(const LawSpec& spec, const char* what, double stretch, std::arr
   check_fibres(spec);
   if (!(stretch > 0) || !std::isfinite(stretch))
     throw InputError(fmt::format("homogeneous state, {}: the stretch is {}; it must be positive", what, stretch));
-  const ElasticConstants moduli = law_moduli(spec);
+  const ElasticConstants moduli = small_strain_moduli(spec);
   const double tiny = 1e-13 * (moduli.bulk_modulus + moduli.shear_modulus);
   const int steps = 1 + static_cast<int>(std::abs(std::log(stretch)) / 0.05);
   Vector3 logs = Vector3::Zero(), stress = Vector3::Zero();

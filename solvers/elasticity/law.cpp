@@ -18,8 +18,8 @@ template <class Model>
 class ModelLaw final : public Law {
  public:
   ModelLaw(const LawSpec& spec, const LawConstants& constants)
-      : constants_(constants), model_(constants_.values.data()), moduli_(law_moduli(spec)), own_(law_fibres(spec)),
-        index_(spec.law.index()) {}
+      : constants_(constants), model_(constants_.values.data()), moduli_(small_strain_moduli(spec)),
+        own_(law_fibres(spec)), index_(spec.law.index()) {}
 
   void evaluate(std::span<const Matrix3> gradients, std::span<const FibreFrame> fibres, std::span<double> energy,
                 std::span<Matrix3> stress) const override {

@@ -90,6 +90,19 @@ struct LawSpec {
   std::vector<PronyTerm> prony; // up to three
 };
 
+/// As in a scenario.
+[[nodiscard]] const char* law_name(const LawSpec& spec);
+/// Moduli in the rest state, Pa; of holzapfel_gasser_ogden those of the ground matter.
+[[nodiscard]] ElasticConstants small_strain_moduli(const LawSpec& spec);
+/// What a family of fibres adds to the stress along itself per small strain along itself, Pa, where volume is kept:
+/// 4 k1 (1 - 3 d)^2.
+[[nodiscard]] double fibre_stiffness(const HolzapfelLaw& law);
+
+/// Throws InputError naming law, constant, value and limit: constants that are not finite or of the wrong sign, Poisson
+/// ratios outside [0, 0.499] ([0, 0.5) of the linear law), fibres without direction, Prony shares that add to one, and
+/// constants with which the law loses strong ellipticity between stretches of 0.5 and 2, with the strain where it does
+/// and the value of the constant up to which it does not.
+void check_law(const LawSpec& spec);
 /// Throws InputError naming the term, its value and the limit.
 void check_prony_terms(std::span<const PronyTerm> terms);
 
@@ -130,9 +143,7 @@ class Law {
   [[nodiscard]] virtual std::string name() const = 0; // as in a scenario
 };
 
-/// Throws InputError naming the constant, its value and its limit: constants of the wrong sign, a Poisson ratio outside
-/// [0, 0.499], fibres without direction, Prony shares that add to one, and constants that lose strong ellipticity
-/// between stretches of 0.5 and 2, with the strain where they do.
+/// Throws InputError as check_law.
 std::unique_ptr<Law> make_law(const LawSpec& spec);
 
 } // namespace spherecut::solvers

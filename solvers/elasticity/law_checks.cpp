@@ -81,7 +81,7 @@ void check_constants(const LawSpec& spec, const HolzapfelLaw& law) {
 }
 
 void check_bulk(const LawSpec& spec) {
-  const ElasticConstants moduli = law_moduli(spec);
+  const ElasticConstants moduli = small_strain_moduli(spec);
   if (!(moduli.bulk_modulus > 0) || !std::isfinite(moduli.bulk_modulus))
     refuse(spec,
            fmt::format("the bulk modulus is {} Pa; it must be positive and finite: Poisson's ratio must lie in [0, "
@@ -219,12 +219,12 @@ void check_ellipticity(const LawSpec& spec) {
   const double given = constant;
   std::string limit;
   constant = 0;
-  const bool without = law_moduli(tried).shear_modulus > 0 && !find_loss(tried, reach_of_check);
+  const bool without = small_strain_moduli(tried).shear_modulus > 0 && !find_loss(tried, reach_of_check);
   if (without) { // between the given value and 0
     double good = 0, bad = given;
     for (int k = 0; k < 12; ++k) {
       constant = 0.5 * (good + bad);
-      (law_moduli(tried).shear_modulus > 0 && !find_loss(tried, reach_of_check) ? good : bad) = constant;
+      (small_strain_moduli(tried).shear_modulus > 0 && !find_loss(tried, reach_of_check) ? good : bad) = constant;
     }
     limit = fmt::format("; with the other constants it holds {} {:.4g} Pa", given < 0 ? "from" : "up to", good);
   }
@@ -257,7 +257,7 @@ LawConstants law_constants(const LawSpec& spec) {
   return std::visit(Flat{}, spec.law);
 }
 
-ElasticConstants law_moduli(const LawSpec& spec) {
+ElasticConstants small_strain_moduli(const LawSpec& spec) {
   struct Shear {
     double operator()(const LinearLaw& law) const { return law.shear_modulus; }
     double operator()(const NeoHookeanLaw& law) const { return law.shear_modulus; }
@@ -271,6 +271,11 @@ ElasticConstants law_moduli(const LawSpec& spec) {
     double operator()(const HolzapfelLaw& law) const { return law.shear_modulus; }
   };
   return {std::visit(Shear{}, spec.law), spec.bulk_modulus};
+}
+
+double fibre_stiffness(const HolzapfelLaw& law) {
+  const double aligned = 1 - 3 * law.dispersion;
+  return 4 * law.fibre_modulus * aligned * aligned;
 }
 
 FibreFrame law_fibres(const LawSpec& spec) {

@@ -13,18 +13,8 @@ struct LawConstants {
   std::array<double, 6> values{};
 };
 [[nodiscard]] LawConstants law_constants(const LawSpec& spec);
-/// Moduli in the rest state, Pa.
-[[nodiscard]] ElasticConstants law_moduli(const LawSpec& spec);
 /// Frame of the law's own directions; zero where it has none.
 [[nodiscard]] FibreFrame law_fibres(const LawSpec& spec);
-/// As in a scenario.
-[[nodiscard]] const char* law_name(const LawSpec& spec);
-
-/// Throws InputError naming law, constant, value and limit: constants that are not finite or of the wrong sign, Poisson
-/// ratios outside [0, 0.499] ([0, 0.5) of the linear law), fibres without direction, Prony shares that add to one, and
-/// constants with which the law loses strong ellipticity between stretches of 0.5 and 2 (see find_loss), with that
-/// strain and the value of the constant up to which it does not.
-void check_law(const LawSpec& spec);
 
 /// A law from constants that nobody has looked at.
 [[nodiscard]] std::unique_ptr<Law> make_law_unchecked(const LawSpec& spec);
