@@ -22,16 +22,28 @@ solvers::OgdenLaw ogden(const Section& material) {
   return law;
 }
 
-solvers::HolzapfelLaw holzapfel(const Section& material, Offences& offences) {
+solvers::HolzapfelLaw holzapfel(const Section& material, LawSettings& settings, Offences& offences) {
   solvers::HolzapfelLaw law;
   law.shear_modulus = shear_modulus(material);
   law.fibre_modulus = material.number("fibre_modulus");
   law.fibre_exponent = material.number("fibre_exponent");
   law.dispersion = material.number("fibre_dispersion");
-  for (const Section& fibre : material.tables("fibre"))
-    law.directions.push_back(direction(fibre, fmt::format("material.fibre[{}].direction", law.directions.size() + 1),
-                                       "direction", offences));
-  law.families = static_cast<int>(law.directions.size());
+  for (const Section& fibre : material.tables("fibre")) {
+    const std::string name = fmt::format("material.fibre[{}]", settings.fibres.size() + 1);
+    if (fibre.text("course") == "radial") {
+      RadialFibres radial{fibre.vector("centre")};
+      if (fibre.has("axis"))
+        radial.axis = direction(fibre, name + ".axis", "axis", offences);
+      settings.fibres.emplace_back(radial);
+      law.same_everywhere = false;
+    } else {
+      settings.fibres.emplace_back(StraightFibres{direction(fibre, name + ".direction", "direction", offences)});
+    }
+  }
+  law.families = static_cast<int>(settings.fibres.size());
+  if (law.same_everywhere)
+    for (const FibreFamily& family : settings.fibres)
+      law.directions.push_back(std::get<StraightFibres>(family).direction);
   return law;
 }
 
@@ -46,6 +58,22 @@ bool has_directions(const solvers::LawSpec& spec) {
 
 } // namespace
 
+solvers::FibreFrame LawSettings::fibres_at(const Vector3& x) const {
+  solvers::FibreFrame frame;
+  for (std::size_t family = 0; family < fibres.size() && family < frame.direction.size(); ++family) {
+    if (const auto* straight = std::get_if<StraightFibres>(&fibres[family])) {
+      frame.direction[family] = straight->direction;
+      continue;
+    }
+    const auto& radial = std::get<RadialFibres>(fibres[family]);
+    const Vector3 away = x - radial.centre;
+    const Vector3 across = away - radial.axis.dot(away) * radial.axis;
+    if (across.norm() > 1e-9)
+      frame.direction[family] = across.normalized();
+  }
+  return frame;
+}
+
 LawSettings material_law(const Section& material, Offences& offences) {
   LawSettings settings;
   settings.line = static_cast<int>(material.line("law"));
@@ -58,7 +86,7 @@ LawSettings material_law(const Section& material, Offences& offences) {
   else if (name == "ogden")
     spec.law = ogden(material);
   else if (name == "holzapfel_gasser_ogden")
-    spec.law = holzapfel(material, offences);
+    spec.law = holzapfel(material, settings, offences);
   else
     spec.law = solvers::LinearLaw{shear_modulus(material)};
   spec.bulk_modulus =

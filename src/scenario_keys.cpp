@@ -137,8 +137,21 @@ constexpr std::array keys = {
                 {},
                 "",
                 "law = holzapfel_gasser_ogden"},
+    ScenarioKey{"material.fibre[].course",
+                choice,
+                "",
+                "\"straight\"",
+                "How the family runs: alike everywhere, or away from a line or a point.",
+                {},
+                "straight, radial"},
     ScenarioKey{"material.fibre[].direction", vector, "", "required",
-                "Direction of the family in the organ as it is given, any length.", anywhere},
+                "Direction of the family in the organ as it is given, any length.", anywhere, "", "course = straight"},
+    ScenarioKey{"material.fibre[].centre", vector, "m", "required", "Point that it runs away from.", anywhere, "",
+                "course = radial"},
+    ScenarioKey{
+        "material.fibre[].axis", vector, "", "",
+        "Direction of a line through that point, any length: it runs away from the line. Left out: from the point.",
+        anywhere, "", "course = radial"},
     ScenarioKey{
         "material.prony", array_of_tables, "", "",
         "Viscoelasticity beside any law, up to three terms: under held strain the part of the stress that changes "

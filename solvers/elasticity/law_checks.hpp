@@ -26,10 +26,10 @@ struct EllipticityLoss {
   double strain = 0; // stretch - 1, the least in magnitude of all paths
 };
 
-/// Looks along six paths from the rest state, to stretches 1 / `reach` and `reach`, by steps of at most 2 %: uniaxial,
-/// equibiaxial and pure shear, their free stretches such that no stress acts there (isotropic laws) or no volume
-/// changes (fibres); confined; and, to half as far in ln J, all around. Directions n: 145 over the half sphere. Loss
-/// between them is not seen.
+/// Looks along five paths, pulled and pressed, from the rest state to stretches of `reach` and 1 / `reach` by steps of
+/// at most 2 %: uniaxial, equibiaxial and pure shear, their free stretches such that no stress acts there (isotropic
+/// laws) or no volume changes (fibres), equibiaxial to half as far in ln stretch, for its third stretch goes as far;
+/// confined; and, to half as far, all around. Directions n: 184 over the half sphere. Loss between them is not seen.
 [[nodiscard]] std::optional<EllipticityLoss> find_loss(const LawSpec& spec, double reach);
 
 } // namespace spherecut::solvers

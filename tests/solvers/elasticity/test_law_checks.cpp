@@ -70,7 +70,7 @@ TEST_CASE("Laws that are polyconvex are elliptic everywhere") {
       if (std::holds_alternative<LinearLaw>(spec.law))
         CHECK_FALSE(find_loss(spec, 1.2)); // beyond it has no homogeneous state
       else
-        CHECK_FALSE(find_loss(spec, std::holds_alternative<HolzapfelLaw>(spec.law) ? 2 : 3)); // fibres: 1e16 as stiff
+        CHECK_FALSE(find_loss(spec, 3));
     }
 }
 
@@ -87,7 +87,8 @@ TEST_CASE("A Yeoh law with negative c2 loses ellipticity where theory says") {
     for (const int sign : {1, -1})
       for (double strain = 0; strain < 0.8; strain += 1e-4) {
         const double l = 1 + sign * strain;
-        if (lost(l, 1 / std::sqrt(l), 1 / std::sqrt(l)) || lost(l, l, 1 / (l * l)) || lost(l, 1, 1 / l)) {
+        const bool two = l > std::sqrt(0.5) && l < std::sqrt(2); // the third stretch is within 0.5 and 2
+        if (lost(l, 1 / std::sqrt(l), 1 / std::sqrt(l)) || (two && lost(l, l, 1 / (l * l))) || lost(l, 1, 1 / l)) {
           least = std::min(least, strain);
           break;
         }
