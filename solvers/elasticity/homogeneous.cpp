@@ -94,24 +94,23 @@ ThreeStresses principal(const LawSpec& spec, const ThreeStresses& stretch) {
   return t;
 }
 
-/// Fibres must leave the stress diagonal: what each adds off the diagonal goes, for all families are strained alike.
+/// Fibres must leave the stress diagonal: along axes, or mirrored, when they are strained alike and what each adds off
+/// the diagonal cancels.
 void check_fibres(const LawSpec& spec) {
   const auto* law = std::get_if<HolzapfelLaw>(&spec.law);
   if (!law)
     return;
+  if (!law->same_everywhere || law->directions.empty())
+    throw InputError("homogeneous state: the fibres have no direction of their own");
   Matrix3 sum = Matrix3::Zero();
-  for (const Vector3& a : law->directions)
+  bool alike = true, along_axes = true;
+  for (const Vector3& a : law->directions) {
     sum += a * a.transpose();
-  bool alike = true;
-  for (const Vector3& a : law->directions)
     alike = alike && (a.cwiseAbs() - law->directions.front().cwiseAbs()).norm() < 1e-9;
-  const Matrix3 diagonal = sum.diagonal().asDiagonal();
-  const double off = (sum - diagonal).norm();
-  const bool axes = law->directions.size() == 2 && off < 1e-9; // each along an axis: not alike, still diagonal
-  bool along_axes = true;
-  for (const Vector3& a : law->directions)
     along_axes = along_axes && a.cwiseAbs().maxCoeff() > 1 - 1e-12;
-  if (law->directions.empty() || off > 1e-9 || !(alike || (axes && along_axes)))
+  }
+  sum.diagonal().setZero();
+  if (!along_axes && !(alike && sum.norm() < 1e-9))
     throw InputError("homogeneous state: the fibres lie askew; along axes, or two families that mirror each other, the "
                      "stress is diagonal");
 }
@@ -234,13 +233,12 @@ State uniaxial_along(const Law& law, const Vector3& axis, double stretch) {
   if (!(stretch > 0) || !std::isfinite(stretch))
     throw InputError(fmt::format("homogeneous state, uniaxial: the stretch is {}; it must be positive", stretch));
   // In axes of which the first is the given one, F is upper triangular: F11 is given, five entries are free, and the
-  // second Piola stress but its first entry vanishes.
+  // second Piola stress but its first entry vanishes: the same five places.
   const Matrix3 turn = Eigen::Quaterniond::FromTwoVectors(Vector3::UnitX(), axis).toRotationMatrix();
   FibreFrame frame = law.own_fibres();
   for (Vector3& a : frame.direction)
     a = turn.transpose() * a;
   static constexpr int row[5] = {0, 0, 1, 1, 2}, column[5] = {1, 2, 1, 2, 2};
-  static constexpr int other_row[5] = {0, 0, 1, 1, 2}, other_column[5] = {1, 2, 1, 2, 2}; // entries of S
   const double tiny = 1e-12 * (law.small_strain().bulk_modulus + law.small_strain().shear_modulus);
   const int steps = 1 + static_cast<int>(std::abs(std::log(stretch)) / 0.05);
   Matrix3 f = Matrix3::Identity(), stress = Matrix3::Zero();
@@ -253,7 +251,7 @@ State uniaxial_along(const Law& law, const Vector3& axis, double stretch) {
       const Matrix3 inverse = f.inverse(), second = inverse * stress;
       Eigen::Matrix<double, 5, 1> rest;
       for (int i = 0; i < 5; ++i)
-        rest[i] = second(other_row[i], other_column[i]);
+        rest[i] = second(row[i], column[i]);
       found = rest.lpNorm<Eigen::Infinity>() <= tiny + 1e-12 * stress.norm();
       if (found || !rest.allFinite())
         break;
@@ -267,7 +265,7 @@ State uniaxial_along(const Law& law, const Vector3& axis, double stretch) {
         unit(row[k], column[k]) = 1;
         change = inverse * (change - unit * second);
         for (int i = 0; i < 5; ++i)
-          slope(i, k) = change(other_row[i], other_column[i]);
+          slope(i, k) = change(row[i], column[i]);
       }
       const Eigen::Matrix<double, 5, 1> change = slope.partialPivLu().solve(rest);
       const double size = change.lpNorm<Eigen::Infinity>(), share = size > 0.1 ? 0.1 / size : 1;
