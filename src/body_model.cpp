@@ -2,6 +2,7 @@
 
 #include "solvers/appended/appended_body.hpp"
 #include "solvers/bank_pairs.hpp"
+#include "src/law_reader.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
@@ -70,6 +71,7 @@ solvers::DiscretisationOptions method_of(const Scenario& scenario) {
 
 solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                             const BodyModel& model) {
+  require_computed(scenario.file, scenario.law);
   solvers::Problem problem;
   problem.domain = domain;
   problem.incision = model.incision;

@@ -2,6 +2,7 @@
 
 #include "src/blade_account.hpp"
 #include "src/interrupt.hpp"
+#include "src/law_reader.hpp"
 #include "src/output_file.hpp"
 #include "src/printable.hpp"
 #include "src/progress.hpp"
@@ -189,6 +190,7 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
   Scenario scenario = read_scenario(file);
+  require_computed(scenario.file, scenario.law);
   FolderClaim claim(out);
   Session session(std::move(scenario), say);
   say(short_text(session));
@@ -241,6 +243,7 @@ void check_scenario(const std::filesystem::path& file, const std::filesystem::pa
   const Session session(std::move(scenario), say);
   say(short_text(session));
   say(walls_text(session.walls()));
+  say(law_text(session.scenario().law));
   if (session.computes()) {
     say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));

@@ -1,6 +1,7 @@
 #include "src/scenario.hpp"
 
 #include "src/cut_reader.hpp"
+#include "src/law_reader.hpp"
 #include "src/tear_reader.hpp"
 #include "topology/errors.hpp"
 #include "topology/label_volume.hpp"
@@ -312,7 +313,10 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   scenario.title = root.text("title");
   scenario.organ = organ(root.table("organ"), file, offences);
   const Section material = root.table("material");
-  scenario.material = {material.number("young_modulus"), material.number("poisson_ratio"), material.number("density")};
+  scenario.law = material_law(material, offences);
+  scenario.material = {material.has("young_modulus") ? material.number("young_modulus")
+                                                     : solvers::small_strain_moduli(scenario.law.spec).young_modulus(),
+                       material.number("poisson_ratio"), material.number("density")};
   scenario.toughness = material.optional_number("toughness").value_or(0);
   for (const Section& section : material.tables("layer"))
     scenario.layers.push_back(toughness_layer(section, scenario.layers.size() + 1, offences));

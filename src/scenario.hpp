@@ -5,6 +5,7 @@
 #include "solvers/discretisation.hpp"
 #include "src/cut_settings.hpp"
 #include "src/haptic_settings.hpp"
+#include "src/law_settings.hpp"
 #include "src/tear_settings.hpp"
 #include "topology/surface_check.hpp"
 #include "topology/tool.hpp"
@@ -117,8 +118,9 @@ struct Scenario {
   std::string text; // of the file, for the summary
   std::string title;
   OrganSettings organ;
-  solvers::Material material;
-  double toughness = 0; // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
+  LawSettings law;
+  solvers::Material material; // small-strain moduli of the law, and the density
+  double toughness = 0;       // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
   std::vector<ToughnessLayer> layers;
   std::function<double(const Vector3&)> toughness_function; // J/m2, a program's own, in place of both; empty: theirs
   TearSettings tearing;

@@ -3,6 +3,7 @@
 #include "solvers/tangential_force.hpp"
 #include "solvers/tool_gap.hpp"
 #include "src/dropped_nodes.hpp"
+#include "src/law_reader.hpp"
 #include "src/process_settings.hpp"
 #include "src/stage_timer.hpp"
 #include "src/wall_bending.hpp"
@@ -118,7 +119,7 @@ void Session::approach_hanging() {
   const bool is_loaded = scenario_.gravity || !scenario_.pretension.isZero() ||
                          std::any_of(scenario_.precuts.begin(), scenario_.precuts.end(),
                                      [](const PrecutSettings& precut) { return precut.pressure != 0; });
-  if (!is_loaded || !touch_ || !std::holds_alternative<Approach>(scenario_.tool->motion))
+  if (!is_loaded || !is_computed(scenario_.law) || !touch_ || !std::holds_alternative<Approach>(scenario_.tool->motion))
     return;
   assemble(model_, {}, candidates(model_));
   app::condense({}, model_);

@@ -31,6 +31,7 @@ OrderedJson inputs(const Session& session) {
   out["scenario"] = scenario.file.string();
   out["scenario_text"] = scenario.text;
   out["method"] = solvers::to_string(scenario.method.method);
+  out["law"] = solvers::law_name(scenario.law.spec);
   out["young_modulus_Pa"] = scenario.material.young_modulus;
   out["poisson_ratio"] = scenario.material.poisson_ratio;
   out["density_kg_m3"] = scenario.material.density;

@@ -3,6 +3,7 @@
 #include "src/haptics/haptic_report.hpp"
 #include "src/haptics/replay.hpp"
 #include "src/interrupt.hpp"
+#include "src/law_reader.hpp"
 #include "src/output_file.hpp"
 #include "src/printable.hpp"
 #include "src/progress.hpp"
@@ -146,6 +147,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   if (!(command.duration > 0) || command.duration > 1e5)
     throw InputError(fmt::format("--duration {:g} s: allowed: above 0, at most 1e5", command.duration));
   const Scenario scenario = read_scenario(command.scenario);
+  require_computed(scenario.file, scenario.law);
   const HapticSettings& settings = scenario.haptics;
   if (command.in_virtual_time && settings.device == HeldDevice::bridge)
     throw InputError("haptics.device = \"bridge\" cannot follow virtual time; allowed: without --virtual");

@@ -263,6 +263,11 @@ void apply(const SettingsChange& change, Scenario& scenario) {
   };
   put("material.young_modulus", change.young_modulus, scenario.material.young_modulus);
   put("material.poisson_ratio", change.poisson_ratio, scenario.material.poisson_ratio);
+  if (auto* linear = std::get_if<solvers::LinearLaw>(&scenario.law.spec.law)) { // no other law has a session
+    linear->shear_modulus = scenario.material.shear_modulus();
+    scenario.law.spec.bulk_modulus =
+        solvers::bulk_modulus_of(scenario.material.shear_modulus(), scenario.material.poisson_ratio);
+  }
   put("nodes.fine_spacing", change.fine_spacing, scenario.nodes.fine_spacing);
   put("nodes.coarse_spacing", change.coarse_spacing, scenario.nodes.coarse_spacing);
   if (change.toughness && *change.toughness == 0)
