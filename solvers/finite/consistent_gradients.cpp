@@ -1,5 +1,6 @@
 #include "solvers/finite/consistent_gradients.hpp"
 
+#include "solvers/finite/point_kernels.hpp"
 #include "solvers/parallel.hpp"
 #include "topology/errors.hpp"
 
@@ -116,51 +117,11 @@ class LeastChange {
 
   /// P_q S_q v at the points of a group: [slot][axis].
   void changes(int group, const NodeVectors& v, std::vector<LaneValues>& change) const {
-    const int first = table_.start[group], count = table_.start[group + 1] - first;
-    change.resize(3 * static_cast<std::size_t>(count));
-    const double scale = scale_[group];
-    const Vector3* x = table_.positions.data() + static_cast<std::size_t>(point_lanes) * group;
-    LaneValues moments[12]; // of v against p, [axis][4]
-    const auto powers = [&](int k, LaneValues* p) {
-      const Vector3& at = nodes_[table_.nodes[first + k]];
-      const LaneValues* g = table_.gradients.data() + 3 * static_cast<std::size_t>(first + k);
-      for (int lane = 0; lane < point_lanes; ++lane) {
-        const bool inside = g[0].value[lane] != 0 || g[1].value[lane] != 0 || g[2].value[lane] != 0;
-        const double one = inside ? 1 : 0;
-        p[0].value[lane] = one;
-        for (int c = 0; c < 3; ++c)
-          p[1 + c].value[lane] = one * scale * (at[c] - x[lane][c]);
-      }
-    };
-    LaneValues p[4];
-    for (int k = 0; k < count; ++k) {
-      powers(k, p);
-      for (int axis = 0; axis < 3; ++axis) {
-        const double value = v(table_.nodes[first + k], axis);
-        for (int c = 0; c < 4; ++c)
-          for (int lane = 0; lane < point_lanes; ++lane)
-            moments[4 * axis + c].value[lane] += value * p[c].value[lane];
-      }
-    }
-    const LaneValues* inverse = inverse_.data() + 10 * static_cast<std::size_t>(group);
-    static constexpr int at[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
-    LaneValues linear[12];
-    for (int axis = 0; axis < 3; ++axis)
-      for (int a = 0; a < 4; ++a)
-        for (int b = 0; b < 4; ++b)
-          for (int lane = 0; lane < point_lanes; ++lane)
-            linear[4 * axis + a].value[lane] += inverse[at[a][b]].value[lane] * moments[4 * axis + b].value[lane];
-    for (int k = 0; k < count; ++k) {
-      powers(k, p);
-      for (int axis = 0; axis < 3; ++axis) {
-        const double value = v(table_.nodes[first + k], axis);
-        const LaneValues* l = linear + 4 * axis;
-        for (int lane = 0; lane < point_lanes; ++lane)
-          change[3 * k + axis].value[lane] =
-              p[0].value[lane] * value - (l[0].value[lane] * p[0].value[lane] + l[1].value[lane] * p[1].value[lane] +
-                                          l[2].value[lane] * p[2].value[lane] + l[3].value[lane] * p[3].value[lane]);
-      }
-    }
+    const std::span<const int> nodes = table_.nodes_of(group);
+    change.resize(3 * nodes.size());
+    take_linear(nodes.data(), static_cast<int>(nodes.size()), table_.gradients_of(group), nodes_.data(),
+                table_.positions.data() + static_cast<std::size_t>(point_lanes) * group, scale_[group],
+                inverse_.data() + 10 * static_cast<std::size_t>(group), v.data(), change.data());
   }
 
   /// Sums over the slots of each node, in their order.

@@ -1,6 +1,7 @@
 #include "solvers/finite/finite_body.hpp"
 
 #include "solvers/finite/finite_tangent.hpp"
+#include "solvers/finite/held_shares.hpp"
 #include "solvers/finite/point_kernels.hpp"
 #include "solvers/galerkin.hpp"
 #include "solvers/parallel.hpp"
@@ -75,13 +76,7 @@ FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const Fi
                worst_moment_condition, sight_about_cut(problem_, Method::galerkin, options.sight)),
       work_(std::make_unique<Work>()) {
   patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
-  std::vector<DisplacementMean> means;
-  if (problem_.prescribed_region)
-    means = patches_->means(problem_.prescribed, spheres_, problem_.prescribed_region);
-  else
-    for (const Prescribed& entry : problem_.prescribed)
-      means.push_back(value_at(spheres_, problem_.nodes.positions[entry.node]));
-  held_ = std::make_unique<HeldMeans>(problem_.prescribed, std::move(means), size());
+  held_ = std::make_unique<HeldMeans>(problem_.prescribed, held_shares(problem_, spheres_, *patches_), size());
   tabulate();
   assemble_loads();
   supports_ = nodal_supports(spheres_);

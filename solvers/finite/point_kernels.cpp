@@ -80,4 +80,50 @@ group_forces(int count, const LaneValues* gradients, const LaneValues* stress, d
   }
 }
 
+__attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
+take_linear(const int* nodes, int count, const LaneValues* gradients, const Vector3* places, const Vector3* points,
+            double scale, const LaneValues* inverse, const double* vectors, LaneValues* change) {
+  Lanes x{}, y{}, z{};
+  for (int lane = 0; lane < point_lanes; ++lane) {
+    x[lane] = points[lane].x();
+    y[lane] = points[lane].y();
+    z[lane] = points[lane].z();
+  }
+  const auto* g = reinterpret_cast<const Lanes*>(gradients);
+  const Lanes none{}, one = none + 1.0;
+  Lanes moments[3][4]{};
+  for (int k = 0; k < count; ++k) {
+    const Vector3& at = places[nodes[k]];
+    const Lanes in = (g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none) ? one : none;
+    const Lanes px = in * scale * (at.x() - x), py = in * scale * (at.y() - y), pz = in * scale * (at.z() - z);
+    const double* v = vectors + 3 * static_cast<long>(nodes[k]);
+    for (int axis = 0; axis < 3; ++axis) {
+      moments[axis][0] += v[axis] * in;
+      moments[axis][1] += v[axis] * px;
+      moments[axis][2] += v[axis] * py;
+      moments[axis][3] += v[axis] * pz;
+    }
+  }
+  const auto* m = reinterpret_cast<const Lanes*>(inverse);
+  Lanes linear[3][4];
+  for (int axis = 0; axis < 3; ++axis) {
+    const Lanes* a = moments[axis];
+    linear[axis][0] = m[0] * a[0] + m[1] * a[1] + m[2] * a[2] + m[3] * a[3];
+    linear[axis][1] = m[1] * a[0] + m[4] * a[1] + m[5] * a[2] + m[6] * a[3];
+    linear[axis][2] = m[2] * a[0] + m[5] * a[1] + m[7] * a[2] + m[8] * a[3];
+    linear[axis][3] = m[3] * a[0] + m[6] * a[1] + m[8] * a[2] + m[9] * a[3];
+  }
+  auto* out = reinterpret_cast<Lanes*>(change);
+  for (int k = 0; k < count; ++k) {
+    const Vector3& at = places[nodes[k]];
+    const Lanes in = (g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none) ? one : none;
+    const Lanes px = scale * (at.x() - x), py = scale * (at.y() - y), pz = scale * (at.z() - z);
+    const double* v = vectors + 3 * static_cast<long>(nodes[k]);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Lanes* l = linear[axis];
+      out[3 * k + axis] = in * (v[axis] - l[0] - l[1] * px - l[2] * py - l[3] * pz);
+    }
+  }
+}
+
 } // namespace spherecut::solvers
