@@ -32,9 +32,8 @@ Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) 
     throw InputError("a body at finite strain takes no initial strain of small strains; prescribe what stretches it");
   if (!(options.support_radius >= 1 && options.support_radius <= 4))
     throw InputError(fmt::format("support radius of {} spacings; allowed: 1 to 4", options.support_radius));
-  if (!(options.pointwise_share >= 0 && options.pointwise_share <= 1))
-    throw InputError(
-        fmt::format("pointwise share {} of the volumetric energy; allowed: 0 to 1", options.pointwise_share));
+  if (!(options.pointwise_modulus >= 0))
+    throw InputError(fmt::format("pointwise modulus of {} mu; it must not be negative", options.pointwise_modulus));
   if (options.sight == SightRule::appended && problem.incision != nullptr)
     throw InputError("a body at finite strain has spheres that end or bend at a cut, no appended functions; allowed: "
                      "visibility, diffraction, enriched");
@@ -88,7 +87,10 @@ void FiniteBody::tabulate() {
       *problem_.domain, problem_.nodes,
       {options_.cell_size, options_.quadrature, options_.sight == SightRule::enriched}, problem_.incision.get());
   table_ = tabulate_points(cells, spheres_);
-  if (options_.pointwise_share < 1 && minds_volume())
+  const ElasticConstants moduli = law_->small_strain();
+  if (minds_volume())
+    share_ = std::min(1.0, options_.pointwise_modulus * moduli.shear_modulus / moduli.bulk_modulus);
+  if (share_ < 1)
     blocks_ = dilatation_blocks(*problem_.domain, cells, table_, problem_.incision.get());
   if (options_.consistent)
     consistency_ = make_consistent(problem_.nodes.positions, surface_integrals(spheres_, patches_->points()), table_);

@@ -19,10 +19,12 @@ namespace spherecut::solvers {
 class FiniteTangent; // solvers/finite/finite_tangent.hpp
 
 struct FiniteOptions {
-  double support_radius = 1.75;          // rho, radius of a sphere over the node's spacing
-  double cell_size = 0.75;               // edge of a background cell in units of the spacing
-  int quadrature = 2;                    // rule of a cell, 1 to 3
-  double pointwise_share = 0.1;          // s, 0 to 1; 1: every point has a pressure of its own
+  double support_radius = 1.75; // rho, radius of a sphere over the node's spacing
+  double cell_size = 0.75;      // edge of a background cell in units of the spacing
+  int quadrature = 2;           // rule of a cell, 1 to 3
+  /// Modulus of the pointwise part of the pressure over mu: s = that times mu over the bulk modulus, at most 1. 0: the
+  /// mean over blocks alone; infinity: every point has a pressure of its own.
+  double pointwise_modulus = 2.5;
   bool consistent = true;                // whether the gradients are made consistent with the quadrature
   SightRule sight = SightRule::enriched; // only where there is an incision; not `appended`
 };
@@ -63,6 +65,8 @@ class FiniteBody {
   [[nodiscard]] const DilatationBlocks& blocks() const { return blocks_; } // none where every point has its pressure
   [[nodiscard]] const ConsistencyReport& consistency() const { return consistency_; }
   [[nodiscard]] const HeldMeans& held() const { return *held_; }
+  /// Share s of the volumetric energy that is taken point by point.
+  [[nodiscard]] double pointwise_share() const { return share_; }
   [[nodiscard]] double volume() const { return volume_; } // m3, of the points
   /// Whether the law has a volumetric part: states with J <= 0 are then refused.
   [[nodiscard]] bool minds_volume() const { return law_->bulk_slope(1) > 0; }
@@ -101,7 +105,7 @@ class FiniteBody {
   void assemble_loads();
   /// F of all groups, and the mean J of all blocks; returns the least J.
   double deform(const VectorX& coefficients) const;
-  [[nodiscard]] double pointwise_share() const { return blocks_.size() > 0 ? options_.pointwise_share : 1; }
+
   struct Work;
 
   Problem problem_;
@@ -116,7 +120,7 @@ class FiniteBody {
   std::unique_ptr<HeldMeans> held_;
   std::vector<FibreFrame> fibres_; // of every point that weighs something, in the order of the groups; or none
   std::vector<int> point_start_;   // of every group: its first such point
-  double volume_ = 0;
+  double volume_ = 0, share_ = 1;
   VectorX loads_;
   NodalSupports supports_;
   std::unique_ptr<FiniteTangent> tangent_;

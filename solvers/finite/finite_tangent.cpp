@@ -110,7 +110,7 @@ void FiniteTangent::point_tangents(int group, const LaneValues* deformation, dou
                                    LaneValues* cofactor) const {
   const Law& law = body_.law();
   const bool blocks = body_.blocks().size() > 0, minds = body_.minds_volume();
-  const double own = blocks ? body_.options().pointwise_share : 1;
+  const double own = body_.pointwise_share();
   const double shared_pressure = blocks ? (1 - own) * law.pressure(block_jacobian) : 0;
   const FibreFrame frame = law.own_fibres();
   for (int lane = 0; lane < body_.points().count[group]; ++lane) {
@@ -248,7 +248,7 @@ void FiniteTangent::assemble(const std::vector<LaneValues>& deformation, const s
     for (const int group : block_groups_[b])
       for (int k = 0; k < std::ssize(table.nodes_of(group)); ++k)
         sum.segment<3>(3 * place[table.nodes_of(group)[k]]) += swelling[group].segment<3>(3 * k);
-    const double slope = (1 - body_.options().pointwise_share) * body_.law().bulk_slope(jacobian[b]);
+    const double slope = (1 - body_.pointwise_share()) * body_.law().bulk_slope(jacobian[b]);
     scatter(ranks, slope / body_.blocks().volume[b] * sum * sum.transpose(), lower);
     for (const int node : nodes)
       place[node] = -1;
