@@ -78,7 +78,7 @@ std::vector<Check> run_finite_locking(const ExperimentContext& context) {
       return result.force;
     };
     // The finest pair, by second order in the spacing.
-    const int fine = context.quick ? 12 : 16, finer = context.quick ? 16 : 20;
+    constexpr int fine = 12, finer = 16;
     const double force = run(8, false, true), locked = run(8, false, false);
     const double a = run(fine, true, true), b = run(finer, true, true);
     const double ratio = std::pow(static_cast<double>(finer) / fine, 2), converged = b + (b - a) / (ratio - 1);

@@ -3,6 +3,7 @@
 //            on the whole surface, or on the base with the dead tractions P n on the five other faces.
 // Reference: that deformation. Gradients that fit the quadrature reproduce it to what the iteration leaves.
 // Command:   spherecut experiment run finite_patch --out DIR
+#include "experiments/analytic/finite_strain.hpp"
 #include "experiments/registered.hpp"
 #include "experiments/support/finite_block.hpp"
 
@@ -20,9 +21,12 @@ namespace {
 
 constexpr double patch_tolerance = 1e-8;
 
-Matrix3 stretch_with_shear() {
+/// A pull by 40 % away from the base whose sides would bear no stress, and a shear: dead loads that press on free sides
+/// would make the state unstable.
+Matrix3 stretch_with_shear(const solvers::Law& law) {
   Matrix3 gradient;
-  gradient << 1.4, 0.3, 0, 0, 0.85, 0.1, 0.1, 0, 0.9;
+  const double across = block_state(law, {1, 1, 1.4}, {false, false, true}).stretch.x();
+  gradient << across, 0.1, 0.3, 0, across, 0.1, 0, 0, 1.4;
   return gradient;
 }
 
@@ -33,7 +37,7 @@ struct PatchResult {
 
 PatchResult deform_patch(const std::shared_ptr<const solvers::Law>& law, int divisions, std::uint64_t seed, bool loaded,
                          bool consistent) {
-  const Matrix3 gradient = stretch_with_shear();
+  const Matrix3 gradient = stretch_with_shear(*law);
   FiniteBlock block{.spacing = 1.0 / divisions, .seed = seed};
   for (int face = 0; face < 6; ++face)
     block.held[face].fill(!loaded || face == 4);
@@ -69,7 +73,7 @@ double forces_of_rotation(const std::shared_ptr<const solvers::Law>& law, int di
   const solvers::FiniteBody body(finite_block(block), law);
   const Matrix3 turn =
       Eigen::AngleAxisd(std::numbers::pi / 2, Vector3(1, 2, 3).normalized()).toRotationMatrix() - Matrix3::Identity();
-  const Matrix3 slope = stretch_with_shear() - Matrix3::Identity();
+  const Matrix3 slope = stretch_with_shear(*law) - Matrix3::Identity();
   VectorX turned(3 * body.size()), stretched(3 * body.size());
   for (int i = 0; i < body.size(); ++i) {
     turned.segment<3>(3 * i) = turn * body.problem().nodes.positions[i];

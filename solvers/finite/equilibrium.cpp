@@ -155,9 +155,15 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
 
 bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
   maps_ = body_.piola_maps(state_.coefficients);
-  if (contact_)
-    contact_->set_known_forces(state_.contact_forces);
-  const VectorX prediction = predict(target);
+  const double ahead = extrapolation(target);
+  const VectorX prediction = ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
+  if (contact_) {
+    std::vector<double> known = state_.contact_forces;
+    if (ahead != 0 && before_.contact_forces.size() == known.size())
+      for (std::size_t c = 0; c < known.size(); ++c)
+        known[c] = std::max(0.0, known[c] + ahead * (known[c] - before_.contact_forces[c]));
+    contact_->set_known_forces(known);
+  }
   Trial now;
   double part = 1;
   for (int trial = 0; trial < 7; ++trial, part *= 0.5) {
@@ -236,15 +242,17 @@ void Equilibrium::evaluate(const VectorX& coefficients, const State& target, Tri
   trial.usable = residual.allFinite();
 }
 
+/// How many times the last step is to be gone once more; 0 where this one goes elsewhere.
+double Equilibrium::extrapolation(const State& target) const {
+  if (!has_before_)
+    return 0;
+  const VectorX way = motion(state_, target), last = motion(before_, state_);
+  const double along = last.dot(way);
+  return along * along > 0.5 * last.squaredNorm() * way.squaredNorm() ? along / last.squaredNorm() : 0;
+}
+
 VectorX Equilibrium::predict(const State& target) {
   VectorX prediction = VectorX::Zero(state_.coefficients.size());
-  const VectorX way = motion(state_, target);
-  if (has_before_) {
-    const VectorX last = motion(before_, state_);
-    const double along = last.dot(way);
-    if (along > 0.7 * last.norm() * way.norm())
-      return along / last.squaredNorm() * (state_.coefficients - before_.coefficients);
-  }
   const double more = target.load_factor - state_.load_factor;
   bool moved = more != 0 && !body_.loads().isZero(0);
   if (moved)

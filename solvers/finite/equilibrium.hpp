@@ -90,6 +90,7 @@ class Equilibrium {
   /// Iterates with the forces of contact known so far.
   bool iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
   void evaluate(const VectorX& coefficients, const State& target, Trial& trial, EquilibriumStatus& status);
+  [[nodiscard]] double extrapolation(const State& target) const;
   [[nodiscard]] VectorX predict(const State& target);
   [[nodiscard]] VectorX precondition(const VectorX& residual);
   [[nodiscard]] VectorX newton_direction(const Trial& now, EquilibriumStatus& status);
