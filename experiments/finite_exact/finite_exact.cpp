@@ -98,11 +98,12 @@ BendingResult bend(double nu, int divisions) {
 } // namespace
 
 std::vector<Check> run_finite_exact(const ExperimentContext& context) {
-  // Squeezed along two axes beyond a stretch of 0.666 the free faces of a neo-Hookean block wrinkle [Biot 1963].
+  // Squeezed along two axes a neo-Hookean block does not stay homogeneous: its free face wrinkles at 0.666 [Biot 1963],
+  // a block as thick as it is wide bulges before.
   const std::vector<StretchCase> cases = {
       {"uniaxial", {false, false, true}, false, 2},  {"uniaxial", {false, false, true}, false, 0.5},
       {"confined", {true, true, true}, false, 2},    {"confined", {true, true, true}, false, 0.5},
-      {"equibiaxial", {false, true, true}, true, 2}, {"equibiaxial", {false, true, true}, true, 0.7}};
+      {"equibiaxial", {false, true, true}, true, 2}, {"equibiaxial", {false, true, true}, true, 0.8}};
   std::vector<Check> checks;
   app::Table stretches({"case", "stretch", "poisson_ratio", "worst_error"});
   double worst = 0;
