@@ -62,6 +62,10 @@ const std::vector<Experiment>& all_experiments() {
       {"remeshing_ledger", "time an increment of a cut takes at equal error: finite spheres against finite elements",
        run_remeshing_ledger},
       {"method_comparison", "error against time and robustness over node sets of the methods", run_method_comparison},
+      {"finite_patch", "a constant deformation of 40 % with shear is reproduced on irregular nodes", run_finite_patch},
+      {"finite_exact", "blocks stretched to twice and half their length and bent by 120 degrees", run_finite_exact},
+      {"finite_locking", "a bonded block nearly incompressible is compressed by 30 % and does not lock",
+       run_finite_locking},
   };
   return experiments;
 }

@@ -50,6 +50,11 @@ class SurfacePatches {
                  std::shared_ptr<const topology::Incision> incision = nullptr,
                  const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces);
 
+  /// All points that the shares are made of.
+  [[nodiscard]] std::span<const SurfacePoint> points() const { return points_; }
+  /// So many of them, the first, lie on the surface; the others on the faces of the incision.
+  [[nodiscard]] std::size_t skin_points() const { return static_cast<std::size_t>(faces_begin_); }
+
   /// Mean over the share of `node` of the surface that is not held along all axes (`held` empty: all of it) or, for a
   /// lip node, of its face; the node itself when it has no share.
   [[nodiscard]] DisplacementMean mean(int node, const Spheres& spheres, const HeldRegion& held = nullptr) const {

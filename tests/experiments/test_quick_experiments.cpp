@@ -175,3 +175,15 @@ TEST_CASE("Quick solve rate: the steps that are timed give forces") {
 TEST_CASE("Quick real world: what people bring gets its right answer or a clear word") {
   require_quick_run_passes("real_world");
 }
+
+TEST_CASE("Quick finite patch: a constant deformation of 40 % is reproduced") {
+  require_quick_run_passes("finite_patch");
+}
+
+TEST_CASE("Quick finite exact: stretched and bent blocks agree with the closed forms") {
+  require_quick_run_passes("finite_exact");
+}
+
+TEST_CASE("Quick finite locking: a bonded block does not lock") {
+  require_quick_run_passes("finite_locking");
+}

@@ -1,0 +1,229 @@
+#include "solvers/finite/consistent_gradients.hpp"
+
+#include "solvers/finite/point_kernels.hpp"
+#include "solvers/parallel.hpp"
+#include "topology/errors.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+
+namespace {
+
+/// A vector of three a node, node-major.
+using NodeVectors = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+constexpr int groups_together = 64;
+
+/// The operator v -> sum_q w_q S_q^T P_q S_q v: S_q takes the nodes that reach q, P_q takes the nearest linear function
+/// away.
+class LeastChange {
+ public:
+  LeastChange(const std::vector<Vector3>& nodes, const PointTable& table)
+      : nodes_(nodes), table_(table), inverse_(10 * static_cast<std::size_t>(table.groups())),
+        scale_(static_cast<std::size_t>(table.groups())), slots_(9 * table.nodes.size()) {
+    parallel_ranges(table_.groups(), groups_together, [&](int begin, int end) {
+      for (int group = begin; group < end; ++group)
+        prepare(group);
+    });
+    incident_start_.assign(nodes.size() + 1, 0);
+    for (const int node : table_.nodes)
+      ++incident_start_[node + 1];
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      incident_start_[i + 1] += incident_start_[i];
+    incident_.resize(table_.nodes.size());
+    std::vector<int> next(incident_start_.begin(), incident_start_.end() - 1);
+    for (int slot = 0; slot < std::ssize(table_.nodes); ++slot)
+      incident_[next[table_.nodes[slot]]++] = slot;
+  }
+
+  /// y = A v.
+  void apply(const NodeVectors& v, NodeVectors& y) {
+    parallel_ranges(table_.groups(), groups_together, [&](int begin, int end) {
+      std::vector<LaneValues> change;
+      for (int group = begin; group < end; ++group) {
+        changes(group, v, change);
+        const int first = table_.start[group], count = table_.start[group + 1] - first;
+        const LaneValues& weight = table_.weights[group];
+        for (int k = 0; k < count; ++k)
+          for (int axis = 0; axis < 3; ++axis) {
+            double sum = 0;
+            for (int lane = 0; lane < point_lanes; ++lane)
+              sum += weight.value[lane] * change[3 * k + axis].value[lane];
+            slots_[3 * static_cast<std::size_t>(first + k) + axis] = sum;
+          }
+      }
+    });
+    gather(y);
+  }
+
+  /// Adds the change that belongs to v to the gradients; returns the sum of w |change|^2.
+  double add_to(PointTable& table, const NodeVectors& v) const {
+    double size = 0;
+    std::vector<LaneValues> change;
+    for (int group = 0; group < table.groups(); ++group) {
+      changes(group, v, change);
+      const std::size_t first = 3 * static_cast<std::size_t>(table.start[group]);
+      for (std::size_t k = 0; k < change.size(); ++k)
+        for (int lane = 0; lane < table.count[group]; ++lane) {
+          table.gradients[first + k].value[lane] += change[k].value[lane];
+          size += table.weights[group].value[lane] * change[k].value[lane] * change[k].value[lane];
+        }
+    }
+    return size;
+  }
+
+  /// sum_q w g_J(q).
+  void integrals(NodeVectors& y) {
+    for (int group = 0; group < table_.groups(); ++group)
+      for (std::size_t k = 3 * static_cast<std::size_t>(table_.start[group]);
+           k < 3 * static_cast<std::size_t>(table_.start[group + 1]); ++k) {
+        slots_[k] = 0;
+        for (int lane = 0; lane < point_lanes; ++lane)
+          slots_[k] += table_.weights[group].value[lane] * table_.gradients[k].value[lane];
+      }
+    gather(y);
+  }
+
+ private:
+  [[nodiscard]] bool reaches(int slot, int lane) const { return !table_.gradient(slot, lane).isZero(0); }
+
+  /// Inverse of the moments of p = (1, (x_J - x_q) / size) over the nodes that reach each point, ten numbers a point.
+  void prepare(int group) {
+    double size = 0;
+    const Vector3& middle = table_.positions[static_cast<std::size_t>(point_lanes) * group];
+    for (const int node : table_.nodes_of(group))
+      size = std::max(size, (nodes_[node] - middle).norm());
+    scale_[group] = 1 / size;
+    for (int lane = 0; lane < table_.count[group]; ++lane) {
+      Eigen::Matrix4d moments = Eigen::Matrix4d::Zero();
+      const Vector3& x = table_.positions[static_cast<std::size_t>(point_lanes) * group + lane];
+      for (int slot = table_.start[group]; slot < table_.start[group + 1]; ++slot)
+        if (reaches(slot, lane)) {
+          Eigen::Vector4d p;
+          p << 1, scale_[group] * (nodes_[table_.nodes[slot]] - x);
+          moments += p * p.transpose();
+        }
+      const Eigen::Matrix4d inverse = moments.inverse();
+      for (int a = 0, at = 0; a < 4; ++a)
+        for (int b = a; b < 4; ++b, ++at)
+          inverse_[10 * static_cast<std::size_t>(group) + at].value[lane] = inverse(a, b);
+    }
+  }
+
+  /// P_q S_q v at the points of a group: [slot][axis].
+  void changes(int group, const NodeVectors& v, std::vector<LaneValues>& change) const {
+    const std::span<const int> nodes = table_.nodes_of(group);
+    change.resize(3 * nodes.size());
+    take_linear(nodes.data(), static_cast<int>(nodes.size()), table_.gradients_of(group), nodes_.data(),
+                table_.positions.data() + static_cast<std::size_t>(point_lanes) * group, scale_[group],
+                inverse_.data() + 10 * static_cast<std::size_t>(group), v.data(), change.data());
+  }
+
+  /// Sums over the slots of each node, in their order.
+  void gather(NodeVectors& y) const {
+    for (Eigen::Index i = 0; i < y.rows(); ++i) {
+      Vector3 sum = Vector3::Zero();
+      for (int k = incident_start_[i]; k < incident_start_[i + 1]; ++k)
+        sum += Eigen::Map<const Vector3>(slots_.data() + 3 * static_cast<std::size_t>(incident_[k]));
+      y.row(i) = sum;
+    }
+  }
+
+  const std::vector<Vector3>& nodes_;
+  const PointTable& table_;
+  std::vector<LaneValues> inverse_;
+  std::vector<double> scale_; // 1/m, of every group
+  std::vector<double> slots_;
+  std::vector<int> incident_start_, incident_;
+};
+
+/// The part of each column that no linear function of the nodes' places has.
+void take_linear_away(const std::vector<Vector3>& nodes, NodeVectors& y) {
+  Eigen::Matrix<double, Eigen::Dynamic, 4> linear(y.rows(), 4);
+  Vector3 mean = Vector3::Zero();
+  for (const Vector3& x : nodes)
+    mean += x / static_cast<double>(nodes.size());
+  for (Eigen::Index i = 0; i < y.rows(); ++i)
+    linear.row(i) << 1, (nodes[i] - mean).transpose();
+  for (int c = 0; c < 4; ++c)
+    linear.col(c) /= linear.col(c).norm();
+  const Eigen::Matrix4d gram = linear.transpose() * linear;
+  y -= linear * gram.ldlt().solve(linear.transpose() * y);
+}
+
+} // namespace
+
+std::vector<Vector3> surface_integrals(const Spheres& spheres, std::span<const SurfacePoint> surface) {
+  std::vector<Vector3> result(spheres.size(), Vector3::Zero());
+  ShapeFunctions shape;
+  for (const SurfacePoint& point : surface) {
+    if (!evaluate(spheres, point.position, shape))
+      throw NumericalError(fmt::format("no sound support covers the surface point ({:.6g}, {:.6g}, {:.6g}) m",
+                                       point.position.x(), point.position.y(), point.position.z()));
+    for (int k = 0; k < shape.size(); ++k)
+      result[shape.nodes[k]] += point.weight * shape.value[k] * point.normal;
+  }
+  return result;
+}
+
+ConsistencyReport make_consistent(const std::vector<Vector3>& nodes, std::vector<Vector3> boundary, PointTable& table,
+                                  double tolerance, int most_iterations) {
+  ConsistencyReport report;
+  LeastChange change(nodes, table);
+  const auto count = static_cast<Eigen::Index>(nodes.size());
+  NodeVectors integral(count, 3), target(count, 3);
+  change.integrals(integral);
+  // sum_J x_J b_J^T is the volume by the surface; where a curved body's points have another one, theirs counts.
+  double volume = 0;
+  for (int group = 0; group < table.groups(); ++group)
+    for (int lane = 0; lane < table.count[group]; ++lane)
+      volume += table.weights[group].value[lane];
+  Matrix3 first_moment = Matrix3::Zero();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    target.row(i) = boundary[i];
+    first_moment += nodes[i] * boundary[i].transpose();
+  }
+  const Matrix3 missing = Matrix3::Identity() - first_moment / volume;
+  target += integral * missing;
+  const double size = target.norm();
+  NodeVectors residual = target - integral;
+  take_linear_away(nodes, residual);
+  report.before = residual.norm() / size;
+  NodeVectors v = NodeVectors::Zero(count, 3), direction = residual, product(count, 3);
+  Eigen::Array3d square = residual.colwise().squaredNorm().transpose();
+  const Eigen::Array3d enough = Eigen::Array3d::Constant(std::pow(tolerance * size, 2));
+  while (report.iterations < most_iterations && (square > enough).any()) {
+    change.apply(direction, product);
+    const Eigen::Array3d curvature = direction.cwiseProduct(product).colwise().sum().transpose();
+    Eigen::Array3d step;
+    for (int axis = 0; axis < 3; ++axis)
+      step[axis] = curvature[axis] > 0 ? square[axis] / curvature[axis] : 0;
+    v += direction * step.matrix().asDiagonal();
+    residual -= product * step.matrix().asDiagonal();
+    const Eigen::Array3d next = residual.colwise().squaredNorm().transpose();
+    Eigen::Array3d ratio;
+    for (int axis = 0; axis < 3; ++axis)
+      ratio[axis] = square[axis] > 0 ? next[axis] / square[axis] : 0;
+    direction = residual + direction * ratio.matrix().asDiagonal();
+    square = next;
+    ++report.iterations;
+  }
+  double all = 0;
+  for (int group = 0; group < table.groups(); ++group)
+    for (std::size_t k = 3 * static_cast<std::size_t>(table.start[group]);
+         k < 3 * static_cast<std::size_t>(table.start[group + 1]); ++k)
+      for (int lane = 0; lane < table.count[group]; ++lane)
+        all += table.weights[group].value[lane] * std::pow(table.gradients[k].value[lane], 2);
+  report.change = std::sqrt(change.add_to(table, v) / all);
+  change.integrals(integral);
+  residual = target - integral;
+  report.after = residual.norm() / size;
+  return report;
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,374 @@
+#include "solvers/finite/equilibrium.hpp"
+
+#include "topology/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+
+namespace {
+
+constexpr double least_predicted_jacobian = 0.05; // predictions are shortened while they squeeze more
+constexpr int most_trials = 12;                   // of one line search
+constexpr double wanted_decrease = 1e-4;          // of what the slope promises
+constexpr double rounding = 1e-13;                // of an energy
+constexpr int most_contact_rounds = 20;           // updates of the forces of contact in a step
+constexpr double floor_of_forces = 1e-8;          // mu h^2 of it: forces below are none
+
+} // namespace
+
+std::string_view to_string(FiniteMethod method) {
+  return method == FiniteMethod::newton ? "newton" : "quasi_newton";
+}
+
+FiniteMethod finite_method_from_string(std::string_view name) {
+  for (const FiniteMethod method : {FiniteMethod::quasi_newton, FiniteMethod::newton})
+    if (name == to_string(method))
+      return method;
+  throw InputError(fmt::format("solver '{}'; allowed: quasi_newton, newton", name));
+}
+
+Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& options)
+    : body_(body), options_(options), rest_(body, VectorX::Zero(3 * static_cast<Eigen::Index>(body.size()))),
+      memory_(options.memory) {
+  if (!(options.tolerance > 0 && options.tolerance < 1))
+    throw InputError(
+        fmt::format("tolerance {} of the unbalanced forces; allowed: above 0, below 1", options.tolerance));
+  if (options.maximum_iterations < 1 || options.halvings < 0 || options.memory < 0)
+    throw InputError(fmt::format("{} iterations, {} halvings, memory {}: at least 1, 0 and 0",
+                                 options.maximum_iterations, options.halvings, options.memory));
+  if (!(options.penetration > 0))
+    throw InputError(fmt::format("penetration {} spacings; it must be positive", options.penetration));
+  set_coefficients(VectorX::Zero(3 * static_cast<Eigen::Index>(body.size())));
+  reactions_.assign(body.held().entries().size(), Vector3::Zero());
+}
+
+void Equilibrium::set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates) {
+  FiniteContact contact(body_, tool, candidates);
+  contact_.emplace(std::move(contact));
+  responses_.clear();
+  memory_.clear();
+  state_.contact_forces.assign(candidates.size(), 0);
+  state_.tool.reset();
+  has_before_ = false;
+}
+
+void Equilibrium::set_coefficients(const VectorX& coefficients) {
+  if (coefficients.size() != 3 * static_cast<Eigen::Index>(body_.size()) || !coefficients.allFinite())
+    throw InputError(fmt::format("{} coefficients for {} nodes; 3 finite numbers a node are wanted",
+                                 coefficients.size(), body_.size()));
+  state_.coefficients = coefficients;
+  state_.prescribed.clear();
+  for (const DisplacementMean& mean : body_.held().means())
+    state_.prescribed.push_back(mean.of(coefficients));
+  memory_.clear();
+  has_before_ = false;
+}
+
+Equilibrium::State Equilibrium::target_of(const FiniteLoading& loading) const {
+  State target;
+  const std::size_t entries = body_.held().entries().size();
+  target.prescribed = loading.prescribed.empty() ? body_.prescribed_values() : loading.prescribed;
+  if (target.prescribed.size() != entries)
+    throw InputError(fmt::format("{} prescribed displacements; the problem has {}", target.prescribed.size(), entries));
+  for (std::size_t k = 0; k < entries; ++k)
+    if (!target.prescribed[k].allFinite())
+      throw InputError(fmt::format("prescribed displacement {} is not finite", k));
+  if (!std::isfinite(loading.load_factor))
+    throw InputError(fmt::format("load factor {} is not finite", loading.load_factor));
+  target.load_factor = loading.load_factor;
+  if (loading.tool) {
+    if (!contact_)
+      throw InputError("a pose of a tool, but no tool: set_contact comes first");
+    topology::check(*loading.tool);
+    target.tool = loading.tool;
+  }
+  target.contact_forces = state_.contact_forces;
+  return target;
+}
+
+Equilibrium::State Equilibrium::between(const State& from, const State& to, double part) const {
+  State state = to;
+  for (std::size_t k = 0; k < to.prescribed.size(); ++k)
+    state.prescribed[k] = (1 - part) * from.prescribed[k] + part * to.prescribed[k];
+  state.load_factor = (1 - part) * from.load_factor + part * to.load_factor;
+  if (from.tool && to.tool) {
+    state.tool->point = (1 - part) * from.tool->point + part * to.tool->point;
+    const Vector3 axis = (1 - part) * from.tool->axis + part * to.tool->axis;
+    if (axis.norm() > 1e-6)
+      state.tool->axis = axis.normalized();
+  }
+  return state;
+}
+
+/// Everything that moves, as lengths: the way from one state to another.
+VectorX Equilibrium::motion(const State& from, const State& to) const {
+  const auto entries = static_cast<Eigen::Index>(to.prescribed.size());
+  VectorX way = VectorX::Zero(3 * entries + 7);
+  for (Eigen::Index k = 0; k < entries; ++k)
+    way.segment<3>(3 * k) = to.prescribed[k] - from.prescribed[k];
+  const double size = std::cbrt(body_.volume());
+  way[3 * entries] = size * (to.load_factor - from.load_factor);
+  if (from.tool && to.tool) {
+    way.segment<3>(3 * entries + 1) = to.tool->point - from.tool->point;
+    way.segment<3>(3 * entries + 4) = size * (to.tool->axis - from.tool->axis);
+  }
+  return way;
+}
+
+EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
+  const State target = target_of(loading), begin = state_, before = before_;
+  const bool had_before = has_before_;
+  const std::vector<Vector3> reactions = reactions_;
+  EquilibriumStatus status;
+  least_seen_ = 1;
+  if (!go(target, options_.halvings, status)) {
+    const double whole = motion(begin, target).norm();
+    const double reached = whole > 0 ? motion(begin, state_).norm() / whole : 0;
+    state_ = begin;
+    before_ = before;
+    has_before_ = had_before;
+    reactions_ = reactions;
+    memory_.clear();
+    throw NumericalError(fmt::format(
+        "no equilibrium found: {:.3g} of the step was reached in {} iterations and {} halvings; the unbalanced force "
+        "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}; the condition of the rest "
+        "stiffness is {:.3g}",
+        reached, status.iterations, status.halvings, last_residual_, options_.tolerance, least_seen_,
+        least_seen_ <= options_.least_jacobian ? ": the body is about to be inverted" : "", rest_.condition()));
+  }
+  return status;
+}
+
+bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& status) {
+  if (step(target, options_.method, status))
+    return true;
+  if (halvings > 0 && motion(state_, target).norm() > 0) {
+    ++status.halvings;
+    const State middle = between(state_, target, 0.5);
+    return go(middle, halvings - 1, status) && go(target, halvings - 1, status);
+  }
+  return options_.fall_back && options_.method != FiniteMethod::newton && step(target, FiniteMethod::newton, status);
+}
+
+bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
+  maps_ = body_.piola_maps(state_.coefficients);
+  const double ahead = extrapolation(target);
+  const VectorX prediction = ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
+  if (contact_) {
+    std::vector<double> known = state_.contact_forces;
+    if (ahead != 0 && before_.contact_forces.size() == known.size())
+      for (std::size_t c = 0; c < known.size(); ++c)
+        known[c] = std::max(0.0, known[c] + ahead * (known[c] - before_.contact_forces[c]));
+    contact_->set_known_forces(known);
+  }
+  Trial now;
+  double part = 1;
+  for (int trial = 0; trial < 7; ++trial, part *= 0.5) {
+    const VectorX start = trial < 6 ? VectorX(state_.coefficients + part * prediction) : state_.coefficients;
+    evaluate(start, target, now, status);
+    if (now.usable && (!body_.minds_volume() || now.least_jacobian > least_predicted_jacobian))
+      break;
+  }
+  if (!now.usable)
+    return false;
+  bool converged = iterate(target, method, now, status);
+  for (int round = 0; converged && contact_ && target.tool && contact_->deepest() > options_.penetration; ++round) {
+    if (round == most_contact_rounds)
+      converged = false;
+    contact_->accept_forces();
+    evaluate(now.coefficients, target, now, status);
+    converged = converged && iterate(target, method, now, status);
+  }
+  last_residual_ = status.residual;
+  if (!converged)
+    return false;
+  if (method == FiniteMethod::newton)
+    ++status.newton_steps;
+  State next = target;
+  next.coefficients = now.coefficients;
+  if (contact_ && target.tool) {
+    contact_->accept_forces();
+    next.contact_forces = contact_->known_forces();
+    status.touching = contact_->touching();
+    status.penetration = contact_->deepest();
+    status.tool_force = contact_->tool_force();
+  }
+  before_ = std::move(state_);
+  has_before_ = true;
+  state_ = std::move(next);
+  reactions_ = now.reactions;
+  ++status.steps;
+  status.converged = true;
+  status.energy = now.strain_energy;
+  status.least_jacobian = now.least_jacobian;
+  return true;
+}
+
+void Equilibrium::evaluate(const VectorX& coefficients, const State& target, Trial& trial, EquilibriumStatus& status) {
+  ++status.evaluations;
+  VectorX completed = coefficients;
+  body_.held().complete(completed, target.prescribed);
+  trial.coefficients = std::move(completed);
+  body_.evaluate(trial.coefficients, forces_);
+  trial.least_jacobian = forces_.least_jacobian;
+  trial.strain_energy = forces_.energy;
+  trial.usable =
+      std::isfinite(forces_.energy) && (!body_.minds_volume() || forces_.least_jacobian > options_.least_jacobian);
+  if (body_.minds_volume())
+    least_seen_ = std::min(least_seen_, forces_.least_jacobian);
+  if (!trial.usable)
+    return;
+  VectorX& residual = trial.residual;
+  residual = forces_.forces;
+  trial.energy = forces_.energy;
+  trial.acting = 0;
+  if (contact_ && target.tool) {
+    contact_->set_pose(*target.tool);
+    trial.energy += contact_->add(trial.coefficients, residual);
+    trial.acting = contact_->force_norm();
+  }
+  residual -= target.load_factor * body_.loads();
+  trial.energy -= target.load_factor * body_.loads().dot(trial.coefficients);
+  trial.acting = std::max(trial.acting, std::abs(target.load_factor) * body_.loads().norm());
+  VectorX free = residual;
+  body_.held().clear_held(free);
+  trial.acting = std::max(trial.acting, (residual - free).norm());
+  trial.reactions = body_.held().reduce(residual);
+  const double h = std::cbrt(body_.volume() / body_.size());
+  trial.acting = std::max(trial.acting, floor_of_forces * body_.law().small_strain().shear_modulus * h * h);
+  trial.usable = residual.allFinite();
+}
+
+/// How many times the last step is to be gone once more; 0 where this one goes elsewhere.
+double Equilibrium::extrapolation(const State& target) const {
+  if (!has_before_)
+    return 0;
+  const VectorX way = motion(state_, target), last = motion(before_, state_);
+  const double along = last.dot(way);
+  return along * along > 0.5 * last.squaredNorm() * way.squaredNorm() ? along / last.squaredNorm() : 0;
+}
+
+VectorX Equilibrium::predict(const State& target) {
+  VectorX prediction = VectorX::Zero(state_.coefficients.size());
+  const double more = target.load_factor - state_.load_factor;
+  bool moved = more != 0 && !body_.loads().isZero(0);
+  if (moved)
+    prediction = more * body_.loads();
+  for (std::size_t e = 0; e < target.prescribed.size(); ++e) {
+    const Prescribed& entry = body_.held().entries()[e];
+    const DisplacementMean& mean = body_.held().means()[e];
+    const Vector3 way_here = held_part(entry, target.prescribed[e] - state_.prescribed[e]);
+    if (way_here.isZero(0))
+      continue;
+    moved = true;
+    const Vector3 force = body_.penalty_stiffness(static_cast<int>(e), RestOperator::penalty) * way_here;
+    for (std::size_t k = 0; k < mean.nodes.size(); ++k)
+      prediction.segment<3>(3 * mean.nodes[k]) += mean.weights[k] * force;
+  }
+  if (moved) {
+    const VectorX right = prediction;
+    rest_.solve(right, prediction);
+  }
+  return prediction;
+}
+
+VectorX Equilibrium::precondition(const VectorX& residual) {
+  VectorX carried(residual.size()), answer;
+  for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
+    carried.segment<3>(3 * i) = maps_[i].transpose() * residual.segment<3>(3 * i);
+  rest_.solve(carried, answer);
+  if (contact_)
+    contact_->correct(rest_, maps_, responses_, answer);
+  for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
+    answer.segment<3>(3 * i) = (maps_[i] * answer.segment<3>(3 * i)).eval();
+  body_.held().complete(answer, {});
+  return answer;
+}
+
+VectorX Equilibrium::newton_direction(const Trial& now, EquilibriumStatus& status) {
+  double shift = 0;
+  for (int attempt = 0;; ++attempt) {
+    ++status.factorisations;
+    try {
+      const RestOperator tangent(body_, now.coefficients, &rest_, shift);
+      VectorX direction;
+      tangent.solve(VectorX(-now.residual), direction);
+      FiniteContact::Responses responses;
+      if (contact_)
+        contact_->correct(tangent, {}, responses, direction);
+      body_.held().complete(direction, {});
+      return direction;
+    } catch (const NumericalError&) { // not positive definite: the rest stiffness helps
+      if (attempt == 8)
+        throw;
+      shift = shift == 0 ? 0.1 : 4 * shift;
+    }
+  }
+}
+
+bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
+  Trial next;
+  const bool quasi = method == FiniteMethod::quasi_newton;
+  for (int iteration = 0;; ++iteration) {
+    const double norm = now.residual.norm();
+    status.residual = norm / now.acting;
+    if (status.residual < options_.tolerance)
+      return true;
+    if (iteration == options_.maximum_iterations)
+      return false;
+    ++status.iterations;
+    VectorX direction;
+    if (quasi) {
+      direction = -memory_.solve(now.residual, [&](const VectorX& r) { return precondition(r); });
+    } else {
+      try {
+        direction = newton_direction(now, status);
+      } catch (const NumericalError&) {
+        return false;
+      }
+    }
+    double slope = now.residual.dot(direction);
+    if (!(slope < 0)) {
+      memory_.clear();
+      direction = -precondition(now.residual);
+      slope = now.residual.dot(direction);
+      if (!(slope < 0))
+        return false;
+    }
+    double length = 1;
+    bool accepted = false;
+    int trials = 0;
+    for (; trials < most_trials && !accepted; ++trials) {
+      evaluate(now.coefficients + length * direction, target, next, status);
+      if (!next.usable) {
+        length *= 0.5;
+        continue;
+      }
+      const double rise = next.energy - now.energy;
+      accepted = rise <= wanted_decrease * length * slope + rounding * std::abs(now.energy) ||
+                 next.residual.norm() < 0.9 * norm;
+      if (!accepted) {
+        const double curvature = rise - length * slope;
+        length *= curvature > 0 ? std::clamp(-0.5 * length * slope / curvature, 0.15, 0.6) : 0.5;
+      }
+    }
+    if (trials > 1)
+      ++status.line_searches;
+    if (!accepted) {
+      if (quasi && !memory_.empty()) {
+        memory_.clear();
+        evaluate(now.coefficients, target, now, status); // what touches is that of this state again
+        continue;
+      }
+      return false;
+    }
+    if (quasi)
+      memory_.add(next.coefficients - now.coefficients, next.residual - now.residual);
+    std::swap(now, next);
+  }
+}
+
+} // namespace spherecut::solvers

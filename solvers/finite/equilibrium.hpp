@@ -1,0 +1,113 @@
+// Equilibria of a body at finite strain, step by step along a path of prescribed displacements, loads and tool poses.
+//
+// Quasi-Newton: L-BFGS preconditioned by the factor of the rest stiffness, carried by nodal Piola maps that are fixed
+// during a solve, with the memory of steps kept from solve to solve. A line search on the energy refuses states that
+// are inverted. Start: the last two states extrapolated, or the response of the rest operator. A step that does not
+// converge is halved; where that does not help, Newton's method takes over.
+#pragma once
+
+#include "solvers/finite/finite_contact.hpp"
+#include "solvers/finite/step_memory.hpp"
+
+#include <optional>
+
+namespace spherecut::solvers {
+
+enum class FiniteMethod { quasi_newton, newton };
+std::string_view to_string(FiniteMethod method);
+/// Throws InputError naming the value and the two allowed names: quasi_newton, newton.
+FiniteMethod finite_method_from_string(std::string_view name);
+
+struct EquilibriumOptions {
+  FiniteMethod method = FiniteMethod::quasi_newton;
+  /// Norm of the unbalanced forces over that of the forces that act: of loads, held surface and tool.
+  double tolerance = 1e-3;
+  int maximum_iterations = 100; // of one step; then it is halved
+  int halvings = 6;             // of a step, before Newton's method is asked
+  int memory = 20;              // steps that are remembered
+  double least_jacobian = 0.01; // the line search stops short of it
+  double penetration = 1e-3;    // of the tool into the middles of shares, in spacings
+  bool fall_back = true;        // whether Newton's method is asked at all
+};
+
+/// What the body is to be in equilibrium with.
+struct FiniteLoading {
+  std::vector<Vector3> prescribed;        // m, one per entry of the problem; empty: those of the problem
+  double load_factor = 1;                 // of the problem's loads
+  std::optional<topology::ToolPose> tool; // needs a contact; empty: no tool
+};
+
+struct EquilibriumStatus {
+  bool converged = false;
+  int iterations = 0, evaluations = 0, line_searches = 0; // line searches: of more than one evaluation
+  int steps = 0, halvings = 0, factorisations = 0, newton_steps = 0;
+  double residual = 0;                  // unbalanced over acting forces
+  double least_jacobian = 1;            // of all points
+  double energy = 0;                    // J, strain energy
+  int touching = 0;                     // shares that touch the tool
+  double penetration = 0;               // in spacings
+  Vector3 tool_force = Vector3::Zero(); // N, of the body on the tool
+};
+
+class Equilibrium {
+ public:
+  /// The body outlives it, and is used by one of these at a time.
+  explicit Equilibrium(const FiniteBody& body, const EquilibriumOptions& options = {});
+
+  /// The tool that presses, and the nodes that it may touch; as FiniteContact.
+  void set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates);
+
+  /// Goes from the present state to equilibrium with the loading. Throws NumericalError in words when there is none to
+  /// be found (with residual, least J, the part of the step reached and the condition of the rest operator): the state
+  /// is then what it was before. Throws InputError for a loading that does not fit the body.
+  EquilibriumStatus solve(const FiniteLoading& loading);
+
+  [[nodiscard]] const VectorX& coefficients() const { return state_.coefficients; } // m, 3 a node
+  /// Begins from these; nothing is remembered of the way.
+  void set_coefficients(const VectorX& coefficients);
+  /// Force of the constraint of every prescribed entry on the body, N.
+  [[nodiscard]] const std::vector<Vector3>& constraint_forces() const { return reactions_; }
+  [[nodiscard]] const FiniteContact* contact() const { return contact_ ? &*contact_ : nullptr; }
+
+ private:
+  struct State {
+    VectorX coefficients;
+    std::vector<Vector3> prescribed;
+    double load_factor = 0;
+    std::optional<topology::ToolPose> tool;
+    std::vector<double> contact_forces;
+  };
+  struct Trial { // an evaluation
+    VectorX coefficients, residual;
+    double energy = 0, acting = 0, strain_energy = 0, least_jacobian = 0;
+    std::vector<Vector3> reactions;
+    bool usable = false;
+  };
+  [[nodiscard]] State target_of(const FiniteLoading& loading) const;
+  [[nodiscard]] State between(const State& from, const State& to, double part) const;
+  bool go(const State& target, int halvings, EquilibriumStatus& status);
+  bool step(const State& target, FiniteMethod method, EquilibriumStatus& status);
+  /// Iterates with the forces of contact known so far.
+  bool iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
+  void evaluate(const VectorX& coefficients, const State& target, Trial& trial, EquilibriumStatus& status);
+  [[nodiscard]] double extrapolation(const State& target) const;
+  [[nodiscard]] VectorX predict(const State& target);
+  [[nodiscard]] VectorX precondition(const VectorX& residual);
+  [[nodiscard]] VectorX newton_direction(const Trial& now, EquilibriumStatus& status);
+  [[nodiscard]] VectorX motion(const State& from, const State& to) const;
+
+  const FiniteBody& body_;
+  EquilibriumOptions options_;
+  RestOperator rest_;
+  std::optional<FiniteContact> contact_;
+  FiniteContact::Responses responses_; // of the candidates, to the rest operator
+  StepMemory memory_;
+  State state_, before_;
+  bool has_before_ = false;
+  std::vector<Matrix3> maps_;
+  FiniteForces forces_;
+  std::vector<Vector3> reactions_;
+  double least_seen_ = 1, last_residual_ = 0;
+};
+
+} // namespace spherecut::solvers

@@ -1,0 +1,41 @@
+// Prescribed displacements of a body at finite strain, met exactly. Every entry holds the mean displacement over a
+// share of the surface along some axes, sum_J w_J u_J = g; the coefficients of the entries' own nodes follow from the
+// others.
+#pragma once
+
+#include "solvers/factorisation.hpp"
+#include "solvers/surface_patches.hpp"
+
+namespace spherecut::solvers {
+
+class HeldMeans {
+ public:
+  /// `means` belong to the entries. Throws NumericalError where the means do not determine their nodes' coefficients.
+  HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMean> means, int nodes);
+
+  [[nodiscard]] const std::vector<Prescribed>& entries() const { return entries_; }
+  [[nodiscard]] const std::vector<DisplacementMean>& means() const { return means_; }
+
+  /// Sets the coefficients of held nodes such that the means are `values` (one per entry), or zero when it is empty.
+  void complete(VectorX& coefficients, std::span<const Vector3> values) const;
+
+  /// Forces on the coefficients, conjugate to them, with those of held nodes passed on to the others as far as these
+  /// move them: zero in held rows. Returns what the constraints exert on the body, one per entry, N.
+  std::vector<Vector3> reduce(VectorX& forces) const;
+
+  /// Zeros in held rows.
+  void clear_held(VectorX& v) const;
+
+ private:
+  /// Axes that the same entries hold.
+  struct Axes {
+    std::vector<int> axes, entries, nodes;
+    SparseMatrix others; // weights of the nodes that are not held, entries x nodes of the body
+    std::unique_ptr<Factorisation> own;
+  };
+  std::vector<Prescribed> entries_;
+  std::vector<DisplacementMean> means_;
+  std::vector<Axes> groups_;
+};
+
+} // namespace spherecut::solvers
