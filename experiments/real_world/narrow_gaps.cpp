@@ -98,16 +98,16 @@ Pulled pull(double slit, double spacing, solvers::Method method, int seed, bool 
   int count = 0;
   for (int i = 0; i < problem.nodes.size(); ++i)
     if (const Vector3& x = problem.nodes.positions[i]; is_on_top(x) && x.x() > leg + slit + 1e-3) {
-      pulled.dragged += std::abs(moved[3 * i]);
+      pulled.dragged += moved[3 * i];
       ++count;
     }
-  pulled.dragged /= std::max(count, 1);
+  pulled.dragged = std::abs(pulled.dragged) / std::max(count, 1);
   return pulled;
 }
 
-/// Means over node sets, so that the sets' own scatter (2 %) does not decide.
+/// Means over node sets, so that the scatter of one set (galerkin 1 %, collocation 4 %) does not decide.
 Pulled mean_pull(const ExperimentContext& context, double slit, double spacing, solvers::Method method) {
-  const int sets = context.quick ? 1 : 4;
+  const int sets = context.quick ? 1 : 3;
   Pulled mean{0, 0};
   for (int seed = 1; seed <= sets; ++seed) {
     const Pulled pulled = pull(slit, spacing, method, seed);
@@ -121,8 +121,9 @@ Pulled mean_pull(const ExperimentContext& context, double slit, double spacing, 
 
 std::vector<Check> narrow_gaps(const ExperimentContext& context) {
   std::vector<Check> checks;
-  const std::vector<double> spacings = context.quick ? std::vector{0.006} : std::vector{0.008, 0.006, 0.005};
   for (const solvers::Method method : {solvers::Method::galerkin, solvers::Method::collocation}) {
+    const bool has_coarse = !context.quick && method == solvers::Method::galerkin; // two and a half through a leg
+    const std::vector<double> spacings = has_coarse ? std::vector{0.008, 0.006} : std::vector{0.006};
     double worst = 0, dragged = 0;
     for (const double spacing : spacings) {
       const Pulled cut = mean_pull(context, 0, spacing, method);
