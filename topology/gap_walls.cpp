@@ -143,6 +143,7 @@ class GapWall {
   /// Half way from each triangle to the other side.
   [[nodiscard]] std::vector<Vector3> middles() const {
     std::vector<Vector3> places;
+    places.reserve(patch_.triangles.size());
     for (int t = 0; t < std::ssize(patch_.triangles); ++t)
       places.push_back(
           across(middle_of_triangle(patch_, t), triangle_normal(patch_, t)).value_or(middle_of_triangle(patch_, t)));
@@ -268,6 +269,7 @@ std::shared_ptr<const Incision> gap_walls(const std::shared_ptr<const Domain>& d
   const int count = patch_of.empty() ? 0 : 1 + *std::max_element(patch_of.begin(), patch_of.end());
   std::vector<std::pair<double, int>> sizes; // largest first
   std::vector<double> relative(static_cast<std::size_t>(count), 0);
+  sizes.reserve(static_cast<std::size_t>(count));
   for (int p = 0; p < count; ++p)
     sizes.emplace_back(0, p);
   for (int t = 0; t < std::ssize(sides.triangles); ++t) {
