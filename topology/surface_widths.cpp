@@ -110,6 +110,41 @@ SurfaceWidths surface_widths(const SurfaceMesh& mesh, double apart, double reach
   return widths;
 }
 
+class SurfaceRays::Caster : public RayCaster {
+ public:
+  using RayCaster::RayCaster;
+};
+
+SurfaceRays::SurfaceRays(const SurfaceMesh& mesh) : caster_(std::make_unique<const Caster>(mesh)) {}
+SurfaceRays::~SurfaceRays() = default;
+
+std::optional<WidthSample> SurfaceRays::meet(const Vector3& place, const Vector3& normal, const Vector3& direction,
+                                             double reach) const {
+  std::vector<WidthSample> met;
+  caster_->cast(place, normal, direction, reach, 0, met);
+  return met.empty() ? std::nullopt : std::optional(met.front());
+}
+
+std::vector<Vector3> places_of_triangle(const SurfaceMesh& mesh, int triangle,
+                                        const std::function<double(const Vector3&)>& apart) {
+  constexpr int most_parts = 200;
+  const Triangle& corners = mesh.triangles[static_cast<std::size_t>(triangle)];
+  const Vector3 &a = mesh.vertices[corners[0]], &b = mesh.vertices[corners[1]], &c = mesh.vertices[corners[2]];
+  const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+  const double step = std::min({apart(a), apart(b), apart(c), apart((a + b + c) / 3)});
+  const int parts = std::clamp(static_cast<int>(std::ceil(longest / step)), 1, most_parts);
+  std::vector<Vector3> places;
+  const auto add = [&](double u, double v) { places.emplace_back(a + u / parts * (b - a) + v / parts * (c - a)); };
+  constexpr double inner = 1.0 / 3 + 0.01; // off the middle, where rays would meet edges of a regular mesh
+  for (int i = 0; i < parts; ++i)
+    for (int k = 0; i + k < parts; ++k) {
+      add(i + inner, k + 1.0 / 3);
+      if (i + k + 1 < parts)
+        add(i + 2.0 / 3 - 0.01, k + 2.0 / 3);
+    }
+  return places;
+}
+
 std::vector<int> thin_samples(const std::vector<WidthSample>& samples, double width) {
   std::vector<int> thin;
   if (samples.empty())
