@@ -157,11 +157,15 @@ std::optional<std::string> wound_defect(const Wound& wound, double organ_volume)
       return fmt::format("piece of {:.6g} m3 in {} components, recounted {:.6g} m3", wound.pieces[p].volume,
                          wound.pieces[p].components, piece_volumes[p]);
 
-  // Material is held by an outer component: one that encloses something.
+  // Material is held by an outer component: one that encloses something, or a splinter between two sheets, so thin that
+  // its volume is none, which has a face of the organ.
   std::vector<bool> encloses(wound.pieces.size(), false);
   for (const topology::WoundComponent& component : wound.components)
     if (component.volume != 0)
       encloses[component.piece] = true;
+  for (std::size_t t = 0; t < wound.part.size(); ++t)
+    if (wound.part[t] == WoundPart::organ)
+      encloses[wound.piece_of(static_cast<int>(t))] = true;
   if (std::find(encloses.begin(), encloses.end(), false) != encloses.end())
     return "a cavity is counted as a piece of material";
 

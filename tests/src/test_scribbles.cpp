@@ -240,5 +240,7 @@ TEST_CASE("Scribbles over a live block leave no crumbs and never stop cutting wi
       std::cout << "  " << times << " times: " << reason << "\n";
     std::cout << std::flush;
     CHECK(out.crumbs == 0);
+    // What the hand has drawn is cut, or it has been told what is not.
+    CHECK((out.area >= 0.5 * out.swept || out.refused + out.failed > 0));
   }
 }
