@@ -25,21 +25,21 @@ using namespace spherecut::tests;
 
 namespace {
 
-int from_environment(const char* name, int otherwise) {
+int scribble_setting(const char* name, int otherwise) {
   const char* text = std::getenv(name);
   return text == nullptr ? otherwise : std::stoi(text);
 }
 
-double processor_seconds() {
+double scribble_processor_seconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-constexpr double top = 0.03, half_side = 0.03; // m, of the block
+constexpr double block_top = 0.03, block_half_side = 0.03; // m, of the block
 
 // Stretched, so that cuts gape; a scalpel with the belly of the one of the live liver.
-const std::string scenario = stretched(cut_block) + R"([blade]
+const std::string scribbled_block = stretched(cut_block) + R"([blade]
 edge = [[0, 0, 0], [0.010, 0, 0.007], [0.022, 0, 0.024]]
 edge_radius = 0.0001
 [[blade.path]]
@@ -50,7 +50,7 @@ time = 1
 position = [0, 0, 0.045]
 )";
 
-struct Point {
+struct HandPoint {
   Vector3 at;     // m, of the tip
   double heading; // rad
   bool cuts;      // on the way here the tip is in the tissue
@@ -58,15 +58,15 @@ struct Point {
 };
 
 // The way of the hand, a point every so often; 4 ms from one to the next.
-class Hand {
+class ScribblingHand {
  public:
-  explicit Hand(unsigned seed) : random_(seed) {}
+  explicit ScribblingHand(unsigned seed) : random_(seed) {}
 
   double between(double low, double high) {
     return low + (high - low) * (static_cast<double>(random_()) / std::mt19937::max());
   }
 
-  std::vector<Point> scribbles(int count) {
+  std::vector<HandPoint> scribbles(int count) {
     for (int s = 0; s < count; ++s) {
       const Eigen::Vector2d middle{between(-0.012, 0.012), between(-0.012, 0.012)};
       const int strokes = 2 + static_cast<int>(between(0, 5)); // two to six
@@ -75,7 +75,7 @@ class Hand {
         const double length = between(0.012, 0.04), depth = between(0.003, 0.014);
         const Eigen::Vector2d along{std::cos(angle), std::sin(angle)},
             off = middle + Eigen::Vector2d(between(-0.006, 0.006), between(-0.006, 0.006));
-        draw(inside(off - 0.5 * length * along), inside(off + 0.5 * length * along), top - depth,
+        draw(inside(off - 0.5 * length * along), inside(off + 0.5 * length * along), block_top - depth,
              k == 0 || between(0, 1) < 0.6);
         angle += between(0.3, 0.7) * 2 * std::numbers::pi;
       }
@@ -86,7 +86,7 @@ class Hand {
 
  private:
   static Eigen::Vector2d inside(const Eigen::Vector2d& x) {
-    return x.cwiseMin(0.8 * half_side).cwiseMax(-0.8 * half_side);
+    return x.cwiseMin(0.8 * block_half_side).cwiseMax(-0.8 * block_half_side);
   }
   // Straight on, the blade turning into its way as a hand turns it.
   void go(const Vector3& to, bool cuts, int stroke) {
@@ -102,13 +102,13 @@ class Hand {
       way_.push_back({x, heading_, cuts, stroke});
     }
   }
-  void lift() { go({way_.back().at.x(), way_.back().at.y(), top + 0.02}, true, -1); }
+  void lift() { go({way_.back().at.x(), way_.back().at.y(), block_top + 0.02}, true, -1); }
   void draw(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double z, bool anew) {
     if (anew) {
       if (!way_.empty())
         lift();
       heading_ = std::atan2(to.y() - from.y(), to.x() - from.x());
-      go({from.x(), from.y(), top + 0.02}, false, -1);
+      go({from.x(), from.y(), block_top + 0.02}, false, -1);
       go({from.x(), from.y(), z}, true, -1);
     } else {
       go({from.x(), from.y(), z}, true, -1);
@@ -117,12 +117,12 @@ class Hand {
   }
 
   std::mt19937 random_;
-  std::vector<Point> way_;
+  std::vector<HandPoint> way_;
   double heading_ = 0;
   int stroke_ = 0;
 };
 
-struct Outcome {
+struct Scribbled {
   int solves = 0, cuts = 0, refused = 0, failed = 0, strokes = 0, pieces = 1, crumbs = 0;
   double area = 0;                    // m2
   double front = 0;                   // m
@@ -131,20 +131,20 @@ struct Outcome {
   std::map<std::string, int> reasons; // of refusals and failures
 };
 
-Outcome scribble(unsigned seed, int each) {
+Scribbled scribble(unsigned seed, int each) {
   CAPTURE(seed);
-  Outcome out;
-  Hand hand(seed);
-  const std::vector<Point> way = hand.scribbles(each);
+  Scribbled out;
+  ScribblingHand hand(seed);
+  const std::vector<HandPoint> way = hand.scribbles(each);
   const bool aside = seed % 2 == 0;
-  HapticSimulation simulation(scenario_of(scenario));
+  HapticSimulation simulation(scenario_of(scribbled_block));
   const Session& session = simulation.session();
   const double whole = topology::volume(session.organ().domain->surface());
   const double least = session.zone().spacing.fine; // m
   DeviceState device;
   device.mode = static_cast<std::uint16_t>(HandMode::blade);
   const auto pose = [&](std::size_t tick) {
-    const Point& point = way[std::min(tick, way.size() - 1)];
+    const HandPoint& point = way[std::min(tick, way.size() - 1)];
     device.tick = tick;
     device.time = 4e-3 * static_cast<double>(tick);
     device.position = point.at;
@@ -152,7 +152,7 @@ Outcome scribble(unsigned seed, int each) {
   };
   for (std::size_t i = 1; i < way.size(); ++i)
     if (way[i].stroke >= 0)
-      out.swept += (way[i].at - way[i - 1].at).norm() * (top - way[i].at.z());
+      out.swept += (way[i].at - way[i - 1].at).norm() * (block_top - way[i].at.z());
   pose(0);
   simulation.prepare(device);
   SolveEvent event;
@@ -171,9 +171,9 @@ Outcome scribble(unsigned seed, int each) {
     event.sequence += 1;
     event.pose_tick = tick;
     event.swaps = session.recondensing() && hand.between(0, 1) < 0.5;
-    const double begin = processor_seconds();
+    const double begin = scribble_processor_seconds();
     const SolveRecord record = solve_recording(simulation, device, event, snapshot);
-    const double spent = processor_seconds() - begin;
+    const double spent = scribble_processor_seconds() - begin;
     out.solves += 1;
     CAPTURE(tick, record.reason);
     if (record.failed) {
@@ -223,11 +223,11 @@ Outcome scribble(unsigned seed, int each) {
 } // namespace
 
 TEST_CASE("Scribbles over a live block leave no crumbs and never stop cutting without a word", "[cut]") {
-  const int first = from_environment("SPHERECUT_SCRIBBLES_FIRST", 1),
-            count = from_environment("SPHERECUT_SCRIBBLES", 2), each = from_environment("SPHERECUT_SCRIBBLES_EACH", 1);
+  const int first = scribble_setting("SPHERECUT_SCRIBBLES_FIRST", 1),
+            count = scribble_setting("SPHERECUT_SCRIBBLES", 2), each = scribble_setting("SPHERECUT_SCRIBBLES_EACH", 1);
   std::vector<double> all;
   for (int seed = first; seed < first + count; ++seed) {
-    Outcome out = scribble(static_cast<unsigned>(seed), each);
+    Scribbled out = scribble(static_cast<unsigned>(seed), each);
     std::sort(out.seconds.begin(), out.seconds.end());
     all.insert(all.end(), out.seconds.begin(), out.seconds.end());
     std::cout << "seed " << seed << ": " << out.solves << " solves, " << out.cuts << " increments, " << out.refused

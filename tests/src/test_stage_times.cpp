@@ -11,7 +11,7 @@ using namespace spherecut::tests;
 
 namespace {
 
-double sum(const RebuildSeconds& seconds) {
+double told_sum(const RebuildSeconds& seconds) {
   return seconds.visibility + seconds.assembly + seconds.solve;
 }
 
@@ -36,7 +36,7 @@ TEST_CASE("Sight and factorisation are parts of a stage's time, and what was spe
     CHECK(update.seconds.visibility >= 0);
     CHECK(update.seconds.solve >= 0);
     CHECK(update.seconds.assembly >= 0);
-    CHECK(sum(update.seconds) == Approx(elapsed).margin(1e-12));
+    CHECK(told_sum(update.seconds) == Approx(elapsed).margin(1e-12));
   }
 }
 
