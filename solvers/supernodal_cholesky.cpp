@@ -194,6 +194,8 @@ class NumericCholesky {
       for (SparseMatrix::InnerIterator entry(lower_, first + column); entry; ++entry) {
         if (entry.row() < first + column)
           continue;
+        if (entry.row() < row[place]) // rows of a column come in any order
+          place = column;
         while (row[place] < entry.row())
           ++place;
         entries[static_cast<long>(column) * count + place] = entry.value();
