@@ -48,7 +48,7 @@ class SurfacePatches {
   /// `opaque`: Problem::opaque. Of a `part` the shares of those nodes alone are meant to be asked for; of `faces` only
   /// those of lip nodes.
   SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
-                 std::shared_ptr<const topology::Incision> incision = nullptr,
+                 const std::shared_ptr<const topology::Incision>& incision = nullptr,
                  const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces,
                  std::shared_ptr<const topology::Incision> opaque = nullptr);
 
