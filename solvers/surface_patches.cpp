@@ -135,8 +135,9 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
                                const std::shared_ptr<const topology::Incision>& incision,
-                               const std::optional<Part>& part, Of of, std::shared_ptr<const topology::Incision> opaque)
-    : nodes_(nodes), incision_(opaque ? std::move(opaque) : incision), points_of_node_(nodes.size()) {
+                               const std::optional<Part>& part, Of of,
+                               const std::shared_ptr<const topology::Incision>& opaque)
+    : nodes_(nodes), incision_(opaque ? opaque : incision), points_of_node_(nodes.size()) {
   if (of == Of::skin_and_faces)
     points_ = surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision.get(),
                                  part ? &part->points : nullptr);

@@ -50,7 +50,7 @@ class SurfacePatches {
   SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
                  const std::shared_ptr<const topology::Incision>& incision = nullptr,
                  const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces,
-                 std::shared_ptr<const topology::Incision> opaque = nullptr);
+                 const std::shared_ptr<const topology::Incision>& opaque = nullptr);
 
   /// All points that the shares are made of.
   [[nodiscard]] std::span<const SurfacePoint> points() const { return points_; }
