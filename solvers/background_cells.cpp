@@ -192,26 +192,34 @@ class BoxFiller {
     add_groups();
   }
 
+  /// Material that is seen from one place.
+  struct SeenPart {
+    Vector3 eye; // that place
+    double volume;
+    Vector3 moment;
+    double nearness; // m2, sum of volumes over their distances from the front
+  };
+
+  /// Adds a volume at x to the first part that sees x, or as a part of its own. Distances from the front count as
+  /// `least` at least.
+  void add_where_seen(const Vector3& x, double volume, const std::optional<topology::FrontFrame>& front, double least,
+                      std::vector<SeenPart>& visible) const {
+    auto part =
+        std::find_if(visible.begin(), visible.end(), [&](const SeenPart& p) { return !incision_->blocks(p.eye, x); });
+    if (part == visible.end())
+      part = visible.insert(visible.end(), {x, 0, Vector3::Zero(), 0});
+    part->volume += volume;
+    part->moment += volume * x;
+    if (front)
+      part->nearness += volume / std::max(off_front(*front, x).norm(), least);
+  }
+
   /// Pieces of material that see one another make one point; those below the volume do not count.
   void add_seen_together(const std::optional<topology::FrontFrame>& front, double least) {
-    struct Part {
-      Vector3 eye;
-      double volume;
-      Vector3 moment;
-      double nearness; // m2, sum of volumes over their distances from the front
-    };
-    std::vector<Part> visible;
-    for (const BoxPart& piece : material_) {
-      auto part = std::find_if(visible.begin(), visible.end(),
-                               [&](const Part& p) { return !incision_->blocks(p.eye, piece.centroid); });
-      if (part == visible.end())
-        part = visible.insert(visible.end(), {piece.centroid, 0, Vector3::Zero(), 0});
-      part->volume += piece.volume;
-      part->moment += piece.volume * piece.centroid;
-      if (front)
-        part->nearness += piece.volume / std::max(off_front(*front, piece.centroid).norm(), nearest * std::cbrt(least));
-    }
-    for (const Part& part : visible) {
+    std::vector<SeenPart> visible;
+    for (const BoxPart& piece : material_)
+      add_where_seen(piece.centroid, piece.volume, front, nearest * std::cbrt(least), visible);
+    for (const SeenPart& part : visible) {
       if (part.volume <= least)
         continue;
       const Vector3 middle = part.moment / part.volume;
@@ -293,25 +301,9 @@ class BoxFiller {
     }
     // Samples where the body ends, or where one plane does not tell what hides what: those that see one another count
     // together.
-    struct Part {
-      Vector3 eye;
-      double volume;
-      Vector3 moment;
-      double nearness; // m2, sum of volumes over their distances from the front
-    };
-    std::vector<Part> visible;
+    std::vector<SeenPart> visible;
     const int detail = inside ? 4 : 2;
     const Vector3 sample_half = half / detail;
-    const auto add_sample = [&](const Vector3& x, double volume) {
-      auto part =
-          std::find_if(visible.begin(), visible.end(), [&](const Part& p) { return !incision_->blocks(p.eye, x); });
-      if (part == visible.end())
-        part = visible.insert(visible.end(), {x, 0, Vector3::Zero(), 0});
-      part->volume += volume;
-      part->moment += volume * x;
-      if (front)
-        part->nearness += volume / std::max(off_front(*front, x).norm(), nearest * half.minCoeff());
-    };
     for (int a = 0; a < detail; ++a)
       for (int b = 0; b < detail; ++b)
         for (int c = 0; c < detail; ++c) {
@@ -327,10 +319,11 @@ class BoxFiller {
             if (part.volume == 0)
               continue;
             const Vector3 moved = part.centroid + shift;
-            add_sample(incision_->blocks(part.centroid, moved) ? part.centroid : moved, fraction * part.volume);
+            add_where_seen(incision_->blocks(part.centroid, moved) ? part.centroid : moved, fraction * part.volume,
+                           front, nearest * half.minCoeff(), visible);
           }
         }
-    for (const Part& part : visible) {
+    for (const SeenPart& part : visible) {
       if (part.volume <= 1e-4 * 8 * half.prod())
         continue;
       const Vector3 middle = part.moment / part.volume;

@@ -1,5 +1,6 @@
 #include "experiments/real_world/situations.hpp"
 
+#include "experiments/support/slit_block.hpp"
 #include "solvers/elastic_body.hpp"
 #include "topology/gap_walls.hpp"
 #include "topology/organs.hpp"
@@ -12,42 +13,8 @@ namespace spherecut::experiments::real_world {
 
 namespace {
 
-constexpr double leg = 0.02, depth = 0.03, base = 0.01, height = 0.05; // m, along x, y, z, z
-
-/// An outline at y = 0 that turns about -y, divided into triangles, drawn out along y.
-topology::SurfaceMesh extruded(const std::vector<Vector3>& outline, const std::vector<Triangle>& triangles) {
-  topology::SurfaceMesh mesh;
-  const int n = static_cast<int>(outline.size());
-  for (const double y : {0.0, depth})
-    for (const Vector3& corner : outline)
-      mesh.vertices.emplace_back(corner.x(), y, corner.z());
-  for (const Triangle& t : triangles) {
-    mesh.triangles.push_back(t);
-    mesh.triangles.push_back({t[0] + n, t[2] + n, t[1] + n});
-  }
-  for (int i = 0; i < n; ++i) {
-    const int next = (i + 1) % n;
-    mesh.triangles.push_back({i, i + n, next + n});
-    mesh.triangles.push_back({i, next + n, next});
-  }
-  return mesh;
-}
-
-/// Two legs on a base, a slit apart; no width: a whole block.
-topology::SurfaceMesh legs(double slit) {
-  const double right = leg + slit, end = right + leg;
-  if (slit == 0)
-    return extruded({{0, 0, 0}, {end, 0, 0}, {end, 0, height}, {0, 0, height}}, {{0, 1, 2}, {0, 2, 3}});
-  return extruded({{0, 0, 0},
-                   {end, 0, 0},
-                   {end, 0, height},
-                   {right, 0, height},
-                   {right, 0, base},
-                   {leg, 0, base},
-                   {leg, 0, height},
-                   {0, 0, height}},
-                  {{0, 1, 4}, {0, 4, 5}, {1, 2, 3}, {1, 3, 4}, {0, 5, 6}, {0, 6, 7}});
-}
+constexpr SlitBlock shape;
+constexpr double leg = shape.leg, depth = shape.depth, base = shape.base, height = shape.height;
 
 struct Pulled {
   double force;   // N, that moves the top of the left leg by 1 mm away from the slit
@@ -56,8 +23,10 @@ struct Pulled {
 
 /// `slit` 0: the same slit as a cut. `blind`: without what parts the sides of the gap.
 Pulled pull(double slit, double spacing, solvers::Method method, int seed, bool blind = false) {
+  SlitBlock block = shape;
+  block.slit = slit;
   solvers::Problem problem;
-  problem.domain = topology::make_organ_domain(legs(slit));
+  problem.domain = topology::make_organ_domain(block.surface());
   solvers::SprinkleOptions options;
   options.spacing.fine = options.spacing.coarse = spacing;
   options.random_seed = static_cast<std::uint64_t>(seed);

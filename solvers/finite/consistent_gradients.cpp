@@ -2,6 +2,7 @@
 
 #include "solvers/finite/point_kernels.hpp"
 #include "solvers/parallel.hpp"
+#include "topology/disjoint_sets.hpp"
 #include "topology/errors.hpp"
 
 #include <Eigen/LU>
@@ -9,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -145,21 +145,15 @@ class LeastChange {
 
 /// Nodes that groups of points join, piece by piece: a body that is cut apart has several.
 std::vector<std::vector<int>> joined_pieces(const PointTable& table, std::size_t count) {
-  std::vector<int> parent(count);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[i] != i)
-      i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  topology::DisjointSets joined(static_cast<int>(count));
   for (int group = 0; group < table.groups(); ++group) {
     const std::span<const int> nodes = table.nodes_of(group);
     for (const int node : nodes)
-      parent[std::max(root(node), root(nodes.front()))] = std::min(root(node), root(nodes.front()));
+      joined.join(node, nodes.front());
   }
   std::vector<std::vector<int>> of_root(count), pieces;
   for (int i = 0; i < static_cast<int>(count); ++i)
-    of_root[root(i)].push_back(i);
+    of_root[joined.find(i)].push_back(i);
   for (std::vector<int>& piece : of_root)
     if (!piece.empty())
       pieces.push_back(std::move(piece));

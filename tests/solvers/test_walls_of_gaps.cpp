@@ -2,13 +2,13 @@
 #include "solvers/elastic_body.hpp"
 #include "topology/gap_walls.hpp"
 
-#include "tests/support/slit_block.hpp"
+#include "experiments/support/slit_block.hpp"
 
 #include <catch2/catch.hpp>
 
 using namespace spherecut;
 using namespace spherecut::solvers;
-using spherecut::tests::SlitBlock;
+using spherecut::experiments::SlitBlock;
 
 namespace {
 

@@ -2,14 +2,14 @@
 #include "topology/gap_walls.hpp"
 #include "topology/organs.hpp"
 
-#include "tests/support/slit_block.hpp"
+#include "experiments/support/slit_block.hpp"
 
 #include <catch2/catch.hpp>
 #include <random>
 
 using namespace spherecut;
 using namespace spherecut::topology;
-using spherecut::tests::SlitBlock;
+using spherecut::experiments::SlitBlock;
 
 namespace {
 

@@ -1,17 +1,21 @@
-// A block with a slit of its own surface: two legs side by side on a base.
+// A block with a slit of its own surface: two legs side by side on a base, for the experiment real_world and for tests.
 #pragma once
 
 #include "topology/surface_mesh.hpp"
 
 #include <vector>
 
-namespace spherecut::tests {
+namespace spherecut::experiments {
 
 struct SlitBlock {
   double leg = 0.02, slit = 0.001, depth = 0.03, base = 0.01, height = 0.05; // m, along x, x, y, z, z
 
+  /// Without a slit: a whole block.
   [[nodiscard]] topology::SurfaceMesh surface() const {
     const double right = leg + slit;
+    if (slit == 0)
+      return extruded({{0, 0, 0}, {2 * leg, 0, 0}, {2 * leg, 0, height}, {0, 0, height}}, {{0, 1, 2}, {0, 2, 3}},
+                      depth);
     return extruded({{0, 0, 0},
                      {right + leg, 0, 0},
                      {right + leg, 0, height},
@@ -44,4 +48,4 @@ struct SlitBlock {
   }
 };
 
-} // namespace spherecut::tests
+} // namespace spherecut::experiments
