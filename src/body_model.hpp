@@ -6,6 +6,7 @@
 #include "solvers/lip_contact.hpp"
 #include "solvers/tearing.hpp"
 #include "src/recondensing.hpp"
+#include "src/rest_memo.hpp"
 #include "src/scenario.hpp"
 #include "src/surface_watch.hpp"
 
@@ -51,6 +52,7 @@ struct BodyModel {
   std::optional<solvers::CutContactState> state;   // empty: not solved yet
   solvers::Field field;                            // solution
   mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
+  mutable RestMemo rest_memo{};                    // of the solution, likewise
 
   /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
   /// rest before the first solution.

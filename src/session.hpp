@@ -278,6 +278,7 @@ class Session {
   void drop_following();
   [[nodiscard]] Vector3 rest_position(const Vector3& x) const { return rest_position(x, model_); }
   [[nodiscard]] Vector3 rest_position(const Vector3& x, const BodyModel& model) const;
+  [[nodiscard]] Vector3 find_rest(const Vector3& x, const BodyModel& model) const;
   [[nodiscard]] std::vector<Vector3> nearest_moved(const Vector3& x, const BodyModel& model) const;
   void make_blade_force();
   [[nodiscard]] bool blade_enters(const StepSample& sample) const;

@@ -3,6 +3,7 @@
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <fmt/format.h>
 #include <utility>
@@ -15,6 +16,7 @@ constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
 constexpr double difference = 0.05;       // fine spacings, over which the displacement's derivative is taken
 constexpr double outside_reach = 1.5;     // spacings from the nearest node: farther a place is outside the body
+constexpr double surely_out = 0.1;        // fine spacings out of the body by Newton's first step: a place is outside it
 constexpr double on_path = 1e-6;          // of the fine spacing: nearer to its path a blade is on it
 constexpr double way_detail = 0.25;       // fine spacings from pose to pose of the way ahead
 
@@ -52,6 +54,15 @@ std::optional<Vector3> place_in_opening(const Vector3& x, const topology::Incisi
   return std::nullopt;
 }
 
+// Whether Newton's first step from `start`, where the body is in `state`, towards what is now at x ends outside the
+// domain, farther than `margin` m.
+bool leads_out(const Vector3& x, const Vector3& start, const solvers::PointState& state, const topology::Domain& domain,
+               double margin) {
+  const Matrix3 deformation = Matrix3::Identity() + state.gradient;
+  const Vector3 rest = start + deformation.fullPivLu().solve(x - start - state.displacement);
+  return rest.allFinite() && domain.signed_distance(rest) > margin;
+}
+
 } // namespace
 
 // The rest positions of the nodes that are now nearest to x, nearest first.
@@ -72,9 +83,24 @@ std::vector<Vector3> Session::nearest_moved(const Vector3& x, const BodyModel& m
   return starts;
 }
 
+Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
+  RestMemo& memo = model.rest_memo;
+  memo.turn_to(model.body.get(), model.incision, model.state.has_value(), model.field);
+  const RestMemo::Found* found = memo.find(x);
+  if (found == nullptr)
+    try {
+      found = &memo.keep(x, {find_rest(x, model)});
+    } catch (const NumericalError& error) {
+      found = &memo.keep(x, {Vector3::Zero(), error.what()});
+    }
+  if (!found->error.empty())
+    throw NumericalError(found->error);
+  return found->rest;
+}
+
 // Where the material that is now at x was at rest. Outside the body the displacement goes on as at the nearest point of
 // its surface. A place in the opening of a cut, where there is no material, belongs to the sheet.
-Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
+Vector3 Session::find_rest(const Vector3& x, const BodyModel& model) const {
   const topology::Domain& domain = *organ_.domain;
   const auto displacement = [&](const Vector3& rest) {
     return model.at(domain.signed_distance(rest) <= 0 ? rest : domain.closest_surface_point(rest)).displacement;
@@ -83,34 +109,37 @@ Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
   if (model.incision != nullptr)
     if (const auto between = place_in_opening(x, *model.incision, displacement, fine))
       return *between;
-  for (const double tolerance : {rest_tolerance, coarse_tolerance})
-    try {
-      Vector3 rest = topology::rest_position(x, displacement, tolerance * fine);
-      if (tolerance > rest_tolerance && model.incision != nullptr) // the displacement jumps: there is a sheet
-        if (const auto on = model.incision->closest(rest, 2 * tolerance * fine))
-          rest = on->point;
-      return rest;
-    } catch (const NumericalError&) {
-      if (tolerance == rest_tolerance)
-        continue;
-      Vector3 guess = x - displacement(x);
-      if (model.incision != nullptr)
-        if (const auto on = model.incision->closest(guess, gap_reach * fine))
-          return on->point;
-      // Tissue that has turned far: from the nodes that are now nearest.
-      const std::vector<Vector3> starts = nearest_moved(x, model);
-      if (const auto rest =
-              topology::rest_position_from(starts, x, displacement, coarse_tolerance * fine, difference * fine))
-        return *rest;
-      const bool is_far = starts.empty() || (starts.front() + displacement(starts.front()) - x).norm() >
-                                                outside_reach * zone_.spacing(starts.front());
-      // Beyond the opening of a cut the displacement jumps, but by neither side's does the place come to lie inside.
-      const auto is_out = [&](const Vector3& start) { return domain.signed_distance(x - displacement(start)) > 0; };
-      if (domain.signed_distance(guess) <= 0 || !(is_far || std::all_of(starts.begin(), starts.end(), is_out)))
-        throw; // outside no material is cut
+  try {
+    const topology::RestPlace rest =
+        topology::rest_position(x, displacement, rest_tolerance * fine, coarse_tolerance * fine);
+    if (!rest.exact && model.incision != nullptr) // the displacement jumps: there is a sheet
+      if (const auto on = model.incision->closest(rest.position, 2 * coarse_tolerance * fine))
+        return on->point;
+    return rest.position;
+  } catch (const NumericalError&) {
+    const Vector3 guess = x - displacement(x);
+    if (model.incision != nullptr)
+      if (const auto on = model.incision->closest(guess, gap_reach * fine))
+        return on->point;
+    // Tissue that has turned far: from the nodes that are now nearest.
+    const std::vector<Vector3> starts = nearest_moved(x, model);
+    const bool guess_is_out = domain.signed_distance(guess) > 0;
+    // Outside no material is cut, and none is looked for.
+    if (guess_is_out && !starts.empty() && std::all_of(starts.begin(), starts.end(), [&](const Vector3& start) {
+          return leads_out(x, start, model.at(start), domain, surely_out * fine);
+        }))
       return guess;
-    }
-  return x;
+    if (const auto rest =
+            topology::rest_position_from(starts, x, displacement, coarse_tolerance * fine, difference * fine))
+      return *rest;
+    const bool is_far = starts.empty() || (starts.front() + displacement(starts.front()) - x).norm() >
+                                              outside_reach * zone_.spacing(starts.front());
+    // Beyond the opening of a cut the displacement jumps, but by neither side's does the place come to lie inside.
+    const auto is_out = [&](const Vector3& start) { return domain.signed_distance(x - displacement(start)) > 0; };
+    if (!guess_is_out || !(is_far || std::all_of(starts.begin(), starts.end(), is_out)))
+      throw; // nothing is cut where the place is not known
+    return guess;
+  }
 }
 
 // Poses on the next way of the blade, of about this length, m: those of its path, or straight on where something else

@@ -3,16 +3,28 @@
 #include "topology/errors.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 
 namespace spherecut::topology {
 
-Vector3 rest_position(const Vector3& x, const std::function<Vector3(const Vector3&)>& displacement, double tolerance,
-                      int most_steps) {
+RestPlace rest_position(const Vector3& x, const std::function<Vector3(const Vector3&)>& displacement, double tolerance,
+                        double coarse_tolerance, int most_steps) {
+  constexpr int most_in_vain = 20;
   Vector3 rest = x, residual = rest + displacement(rest) - x;
   Matrix3 inverse = Matrix3::Identity(); // of the derivative of the residual
-  for (int step = 0; step < most_steps && residual.norm() > tolerance; ++step) {
+  std::optional<Vector3> coarse;
+  double least = std::numeric_limits<double>::infinity();
+  int step = 0;
+  for (int in_vain = 0; step < most_steps && residual.norm() > tolerance; ++step) {
+    if (!coarse && residual.norm() <= coarse_tolerance)
+      coarse = rest;
+    in_vain = residual.norm() < least ? 0 : in_vain + 1;
+    if (in_vain == most_in_vain)
+      break;
+    least = std::min(least, residual.norm());
     const Vector3 move = -inverse * residual;
     rest += move;
     const Vector3 next = rest + displacement(rest) - x, change = inverse * (next - residual);
@@ -21,10 +33,12 @@ Vector3 rest_position(const Vector3& x, const std::function<Vector3(const Vector
       inverse += (move - change) * (move.transpose() * inverse) / pivot;
     residual = next;
   }
-  if (!(residual.norm() <= tolerance))
-    throw NumericalError(fmt::format("no rest position found for ({}, {}, {}): {} m left after {} steps, {} m wanted",
-                                     x.x(), x.y(), x.z(), residual.norm(), most_steps, tolerance));
-  return rest;
+  if (residual.norm() <= tolerance)
+    return {rest};
+  if (coarse)
+    return {*coarse, false};
+  throw NumericalError(fmt::format("no rest position found for ({}, {}, {}): {} m left after {} steps, {} m wanted",
+                                   x.x(), x.y(), x.z(), residual.norm(), step, std::max(tolerance, coarse_tolerance)));
 }
 
 std::optional<Vector3> rest_position_from(const std::vector<Vector3>& starts, const Vector3& x,

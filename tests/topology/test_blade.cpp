@@ -338,12 +338,12 @@ TEST_CASE("A cut made in deformed tissue lies where the material was", "[blade]"
   const auto displacement = [](const Vector3& x) {
     return Vector3(0.6 * x.y() + 0.3 * x.x(), 0.002 * std::sin(40 * x.x()), 1.2 * x.z());
   };
-  const RestMap to_rest = [&](const Vector3& x) { return rest_position(x, displacement, 1e-12); };
+  const RestMap to_rest = [&](const Vector3& x) { return rest_position(x, displacement, 1e-12).position; };
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> uniform(-0.1, 0.1);
   for (int i = 0; i < 500; ++i) {
     const Vector3 x = Vector3::NullaryExpr([&] { return uniform(random); });
-    const Vector3 rest = rest_position(x, displacement, 1e-12);
+    const Vector3 rest = rest_position(x, displacement, 1e-12).position;
     CHECK((rest + displacement(rest) - x).norm() < 1e-12);
   }
   BladeSweep sweep(scalpel(), block(), options());
@@ -363,9 +363,29 @@ TEST_CASE("A cut made in deformed tissue lies where the material was", "[blade]"
       const double s = (deformed.x() - a.x()) / (b.x() - a.x());
       CHECK(deformed.y() == Approx(a.y() + s * (b.y() - a.y())).margin(1e-9));
     }
+  int evaluations = 0;
   CHECK_THROWS_AS(rest_position(
-                      Vector3(1, 0, 0), [](const Vector3& x) { return Vector3(-x); }, 1e-9),
+                      Vector3(1, 0, 0),
+                      [&](const Vector3& x) {
+                        ++evaluations;
+                        return Vector3(-x);
+                      },
+                      1e-9),
                   NumericalError);
+  CHECK(evaluations < 30); // none lowers the residual
+}
+
+TEST_CASE("Where the displacement jumps a place at rest is found to the coarse tolerance or not at all", "[blade]") {
+  // Faces that have parted by 2 mm: nothing is now between them.
+  const auto displacement = [](const Vector3& x) { return Vector3(x.x() < 0 ? -0.001 : 0.001, 0, 0); };
+  const Vector3 between(0.0005, 0.002, 0.003), beyond(0.004, 0.002, 0.003);
+  const RestPlace coarse = rest_position(between, displacement, 1e-6, 0.0015);
+  CHECK_FALSE(coarse.exact);
+  CHECK((coarse.position + displacement(coarse.position) - between).norm() <= 0.0015);
+  CHECK_THROWS_AS(rest_position(between, displacement, 1e-6, 1e-5), NumericalError);
+  const RestPlace exact = rest_position(beyond, displacement, 1e-6, 0.0015);
+  CHECK(exact.exact);
+  CHECK((exact.position - Vector3(0.003, 0.002, 0.003)).norm() < 1e-6);
 }
 
 TEST_CASE("Tissue that moves while the blade cuts does not tear the sheet", "[blade]") {
