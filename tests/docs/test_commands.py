@@ -50,6 +50,8 @@ HOW = [
     (r"PYTHONPATH=build/release/python python3 examples/python/press_a_liver\.py --out \.", "run_python"),
     (r"cmake --install build/release --prefix DIR", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--prefix"),
     (r"cmake --install build/release --component python", "elsewhere", "tests/python/test_package.py", "--component"),
+    (r"cmake -S examples/libraries -B mine -DCMAKE_PREFIX_PATH=DIR && cmake --build mine", "elsewhere", "tests/install_consumer/CMakeLists.txt",
+     "examples/libraries"),
     (r"cmake --install", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--install"),
     (r"pip install --no-build-isolation \.", "elsewhere", "tests/python/test_package.py", "--no-build-isolation"),
     (r"python3 -m venv --system-site-packages env && \. env/bin/activate", "run_short",

@@ -12,7 +12,7 @@ SOURCE = Path(os.environ["SPHERECUT_SOURCE"])
 sys.path.insert(0, str(SOURCE / "docs" / "site"))
 import build  # noqa: E402
 
-ALL = pages(SOURCE) + [SOURCE / "CHANGELOG.md"]
+ALL = pages(SOURCE) + [SOURCE / "CHANGELOG.md", SOURCE / "SECURITY.md"]
 
 
 def anchors(page: Path) -> set[str]:
