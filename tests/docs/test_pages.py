@@ -1,7 +1,6 @@
-"""Links among the Markdown pages, and the code that the tutorials quote: what needs no Sphinx."""
+"""Pages and their places on the site, and the code that the tutorials quote: what needs no Sphinx."""
 
 import os
-import re
 import sys
 from pathlib import Path
 
@@ -13,39 +12,6 @@ sys.path.insert(0, str(SOURCE / "docs" / "site"))
 import build  # noqa: E402
 
 ALL = pages(SOURCE) + [SOURCE / "CHANGELOG.md", SOURCE / "SECURITY.md"]
-
-
-def anchors(page: Path) -> set[str]:
-    """As GitHub makes them of the headings."""
-    found: set[str] = set()
-    for heading in re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", page.read_text(), flags=re.S | re.M), re.M):
-        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").strip().lower()
-        found.add(re.sub(r"[^\w\- ]", "", plain).replace(" ", "-"))
-    return found
-
-
-def broken_links(page: Path, text: str) -> list[str]:
-    prose = re.sub(r"^```.*?^```|(?<!\[)`[^`\n]+`", "", text, flags=re.S | re.M)
-    broken = []
-    for target in re.findall(r"!?\[[^\]]*\]\(([^)\s]+)\)", prose):
-        if re.match(r"[a-z]+:", target):
-            continue
-        path, _, anchor = target.partition("#")
-        file = (page.parent / path).resolve() if path else page
-        if not file.exists() or (anchor and (file.suffix != ".md" or anchor not in anchors(file))):
-            broken.append(target)
-    return broken
-
-
-@pytest.mark.parametrize("page", ALL, ids=lambda page: str(page.relative_to(SOURCE)))
-def test_links(page):
-    assert broken_links(page, page.read_text()) == []
-
-
-def test_links_that_lead_nowhere_are_found():
-    page = SOURCE / "docs" / "start.md"
-    text = "[a](scenario.md) [b](none.md) [c](scenario.md#no-such) [d](#get-it) ![e](images/none.png) [f](https://example.org/x)"
-    assert broken_links(page, text) == ["none.md", "scenario.md#no-such", "images/none.png"]
 
 
 def test_every_example_has_a_tutorial():
