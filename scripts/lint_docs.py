@@ -16,6 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 BIBLIOGRAPHY = "docs/references.md"
 LONGEST = 160  # letters of a line of prose; tables, code, pictures and entries of the bibliography may be longer
+WRITTEN = "This part is written by"  # what follows on a page comes from a program
 MAY_TELL_HISTORY = {"docs/decisions.md", "CHANGELOG.md"}
 # What a page says that tells how something came about.
 HISTORY = re.compile(r"\b(used to (?:be|take|have|do|give)|no longer|earlier (?:version|run)s?|(?:the )?version before|since then|until then|(?:was|were) tried|"
@@ -120,7 +121,7 @@ def findings(page: Path) -> list[str]:
     known = known_works((ROOT / BIBLIOGRAPHY).read_text())
     said = [f"{name}:{line}: the link '{target}' leads nowhere" for line, target in broken_links(page, text)]
     if name != BIBLIOGRAPHY:
-        said += [f"{name}:{line}: {length} letters, at most {LONGEST}" for line, length in long_lines(text)]
+        said += [f"{name}:{line}: {length} letters, at most {LONGEST}" for line, length in long_lines(text.partition(WRITTEN)[0])]
     cites = text.partition("\n## Bibliography")[0] if name == BIBLIOGRAPHY else text
     said += [f"{name}:{line}: '{work}' has no entry in {BIBLIOGRAPHY}" for line, work in missing_works(cites, known)]
     if name not in MAY_TELL_HISTORY:
