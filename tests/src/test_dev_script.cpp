@@ -53,7 +53,7 @@ TEST_CASE("./dev coverage builds, runs and reports the groups that are asked for
   std::filesystem::create_directories(folder.path() / "build/coverage");
   write_file(folder.path() / "build/coverage/old.gcda", "of a run before");
   const std::string told = "echo \"$(basename \"$0\") $*\" >>told\n";
-  for (const std::string& name : {"cmake", "ninja", "ctest"})
+  for (const char* name : {"cmake", "ninja", "ctest"})
     write_program(folder.path() / "bin" / name, told);
   write_program(folder.path() / "bin/gcovr", told + "echo 'lines: 87.5% (7 out of 8)'\n");
   const auto dev = [&](const std::string& arguments) {
