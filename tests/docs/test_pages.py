@@ -1,6 +1,7 @@
 """Pages and their places on the site, and the code that the tutorials quote: what needs no Sphinx."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -38,6 +39,18 @@ def test_every_page_has_its_place_on_the_site(tmp_path):
     assert set(build.pages()) == listed
     named = {name for names in build.SECTIONS.values() for name in names if not name.startswith("reference/")}
     assert named <= listed
+
+
+def test_versions_agree():
+    """Of CMake, the Python package, CITATION.cff, BibTeX in README, what the pages tell to find, and the changelog."""
+    version = re.search(r"project\(spherecut VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text())[1]
+    minor = version.rsplit(".", 1)[0]
+    for file, pattern in {"pyproject.toml": r'^version = "([\d.]+)"', "CITATION.cff": r"^version: ([\d.]+)", "README.md": r"^  version = \{([\d.]+)\}",
+                          "CHANGELOG.md": r"^## ([\d.]+)"}.items():
+        assert re.search(pattern, (SOURCE / file).read_text(), re.M)[1] == version, file
+    for file in ("docs/library.md", "examples/libraries/CMakeLists.txt"):
+        assert re.search(r"find_package\(spherecut ([\d.]+) ", (SOURCE / file).read_text())[1] == minor, file
+    assert f"minor version, {minor}," in (SOURCE / "SECURITY.md").read_text()
 
 
 def test_public_headers():
