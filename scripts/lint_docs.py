@@ -3,8 +3,8 @@
 
 Pages: links to files and headings of the repository lead somewhere; lines of prose have at most 160 letters; a work that is cited
 with its year stands in the bibliography of docs/references.md; nothing tells what earlier versions did (docs/decisions.md and the
-changelog may). Pages and headers: spelling, by codespell. One line for each finding; exits 1 where there is one, 2 where a file is
-not there or codespell is not installed.
+changelog may). Headers: pages that they name are there. Pages and headers: spelling, by codespell. One line for each finding; exits
+1 where there is one, 2 where a file is not there or codespell is not installed.
 """
 
 import re
@@ -111,6 +111,11 @@ def misspelt(files: list[Path]) -> list[str]:
     return done.stdout.splitlines()
 
 
+def missing_pages(text: str) -> list[tuple[int, str]]:
+    """Line and name of every page that a header names and that is not there."""
+    return [(line_of(text, found.start()), found[0]) for found in re.finditer(r"\bdocs/[\w/]+\.md\b", text) if not (ROOT / found[0]).is_file()]
+
+
 def name_of(file: Path) -> str:
     return str(file.resolve().relative_to(ROOT)) if file.resolve().is_relative_to(ROOT) else str(file)
 
@@ -145,7 +150,9 @@ def main(arguments: list[str]) -> int:
     if shutil.which("codespell") is None:
         print("lint_docs.py: codespell is not installed (cmake/debian-packages-tests.txt)", file=sys.stderr)
         return 2
-    said = [line for page in files if page.suffix == ".md" for line in findings(page)] + misspelt(files)
+    said = [line for page in files if page.suffix == ".md" for line in findings(page)]
+    said += [f"{name_of(file)}:{line}: there is no {page}" for file in files if file.suffix != ".md" for line, page in missing_pages(file.read_text())]
+    said += misspelt(files)
     print("\n".join(said) if said else f"lint: {len(files)} pages and headers spelt, linked and cited")
     return 1 if said else 0
 

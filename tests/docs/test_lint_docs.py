@@ -76,3 +76,14 @@ def test_works_without_an_entry_are_found(text, missing):
 ])
 def test_history_is_found(text, found):
     assert [words for _, words in lint_docs.history(text)] == found
+
+
+def test_pages_that_are_not_there_are_found():
+    text = "// docs/tearing.md has the rules,\n// docs/tears.md has not, and docs/experiments/none.md neither."
+    assert lint_docs.missing_pages(text) == [(2, "docs/tears.md"), (2, "docs/experiments/none.md")]
+
+
+def test_headers_name_pages_that_are_there():
+    headers = [header for folder in ("topology", "solvers", "src", "experiments") for header in (SOURCE / folder).rglob("*.hpp")]
+    assert len(headers) > 200
+    assert [(header, found) for header in headers if (found := lint_docs.missing_pages(header.read_text()))] == []
