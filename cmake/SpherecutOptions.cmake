@@ -36,6 +36,8 @@ endif()
 
 # -O1 and line numbers alone: a CGAL unit with full debug information takes twice as long and 1.7 GB.
 set(CMAKE_CXX_FLAGS_SANITIZE "-O1 -g1 -fno-omit-frame-pointer")
+# As optimised as lines can still be told apart: most tests solve, and would take an hour without.
+set(CMAKE_CXX_FLAGS_COVERAGE "-O1 -g1")
 set(SPHERECUT_ASAN_FLAGS -fsanitize=address,undefined -fno-sanitize-recover=undefined)
 set(SPHERECUT_TSAN_FLAGS -fsanitize=thread)
 foreach(sanitizer ASAN TSAN)

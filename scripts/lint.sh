@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Formatting, clang-tidy, shell syntax and types of the page over all tracked sources.
+# Formatting, clang-tidy, shell syntax and types of the page over all tracked sources; the pages by scripts/lint_docs.py.
 # Usage: scripts/lint.sh BUILD_FOLDER [--deep]
 # --deep runs clang's path-sensitive analyzer on every unit, which doubles the time; without it, it looks only where a
 # .clang-tidy asks for it.
@@ -32,6 +32,8 @@ done
 jobs=${SPHERECUT_JOBS:-$(nproc)}
 printf '%s\0' "${sources[@]}" | xargs -0 -P "$jobs" -n 40 clang-format-14 --dry-run -Werror || status=1
 printf 'lint: %d sources formatted, %d shell scripts parsed\n' "${#sources[@]}" "${#shells[@]}"
+
+scripts/lint_docs.py || status=1
 
 page=src/viewer/page
 if [ -e $page/node_modules/typescript/bin/tsc ]; then

@@ -23,13 +23,13 @@ ROOT = SITE.parent.parent
 FLOORS = ["topology", "solvers", "src"]
 # Which pages of docs/ go where; those that are not named here are how-to pages.
 SECTIONS = {
-    "Start here": ["docs/start", "README"],
-    "Tutorials": ["docs/tutorials/README"],
+    "Start here": ["docs/start", "README", "docs/faq"],
+    "Tutorials": ["docs/tutorials/README", "examples/README"],
     "How-to": [],
-    "Reference": ["docs/scenario", "docs/output", "reference/cpp", "reference/python", "docs/viewer_protocol"],
-    "Theory": ["docs/theory", "docs/architecture", "docs/references"],
-    "Experiments": ["docs/experiments/README", "docs/performance", "docs/remeshing_ledger"],
-    "The project": ["CONTRIBUTING", "CHANGELOG"],
+    "Reference": ["docs/scenario", "docs/output", "reference/cpp", "reference/python", "docs/viewer_protocol", "docs/glossary"],
+    "Theory": ["docs/theory", "docs/architecture", "docs/haptics_design", "docs/references"],
+    "Experiments": ["docs/experiments/README", "docs/performance", "docs/remeshing_ledger", "docs/remeshing_ledger_runs"],
+    "The project": ["CONTRIBUTING", "docs/decisions", "SECURITY", "CHANGELOG"],
 }
 LINK = re.compile(r"(?<!!)(\[[^\]]*\])\(([^)\s]+)\)")
 HIGHLIGHT = {".py": "python", ".pyi": "python", ".cpp": "cpp", ".hpp": "cpp", ".toml": "toml", ".sh": "bash", ".json": "json",
@@ -42,7 +42,7 @@ def fail(message: str) -> None:
 
 def pages() -> list[str]:
     """Every Markdown page of the site, without extension, relative to the repository."""
-    found = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
+    found = [ROOT / name for name in ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "examples/README.md"]]
     for folder in ["docs", "docs/tutorials", "docs/experiments"]:
         found += sorted((ROOT / folder).glob("*.md"))
     return [str(page.relative_to(ROOT).with_suffix("")) for page in found]

@@ -32,7 +32,7 @@ class Written:
 
 
 def pages(source: Path) -> list[Path]:
-    found = [source / "README.md", source / "CONTRIBUTING.md"]
+    found = [source / "README.md", source / "CONTRIBUTING.md", source / "examples" / "README.md"]
     for folder in ["docs", "docs/tutorials", "docs/experiments"]:
         found += sorted((source / folder).glob("*.md"))
     return found

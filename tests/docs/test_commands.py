@@ -32,6 +32,7 @@ S = r"(?:build/release/)?spherecut"
 #   page_tests   tests/page/run.sh has that kind of test (ctest runs them)
 #   targets      CMake has that preset, that option, that target
 #   elsewhere    the test named behind it runs it
+#   clone        the folder that is cloned into is the one that is entered
 #   packages     the files have the names that packing gives them; scripts/deb_in_a_bare_root.sh is what tries it
 HOW = [
     (rf"{S} check scenarios/\w+\.toml", "run"),
@@ -50,6 +51,8 @@ HOW = [
     (r"PYTHONPATH=build/release/python python3 examples/python/press_a_liver\.py --out \.", "run_python"),
     (r"cmake --install build/release --prefix DIR", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--prefix"),
     (r"cmake --install build/release --component python", "elsewhere", "tests/python/test_package.py", "--component"),
+    (r"cmake -S examples/libraries -B mine -DCMAKE_PREFIX_PATH=DIR && cmake --build mine", "elsewhere", "tests/install_consumer/CMakeLists.txt",
+     "examples/libraries"),
     (r"cmake --install", "elsewhere", "tests/install_consumer/CMakeLists.txt", "--install"),
     (r"pip install --no-build-isolation \.", "elsewhere", "tests/python/test_package.py", "--no-build-isolation"),
     (r"python3 -m venv --system-site-packages env && \. env/bin/activate", "run_short",
@@ -67,6 +70,7 @@ HOW = [
     (r"PYTHONPATH=build/release/python python3 examples/studies/threads\.py", "run_short", {"examples/studies/threads.py": "examples/studies/threads.py 300"}),
     (r"python3 -m spherecut\.sweep", "elsewhere", "tests/python/test_sweep.py", "spherecut.sweep"),
     (r"python3 examples/studies/scaling\.py examples/studies/press_spacing\.toml", "run_short", {"examples/studies/press_spacing.toml": "--help"}),
+    (r"git clone ADDRESS \w+ && cd \w+", "clone"),
     (r"\./dev \w+.*", "dev"),
     (r"\.ci/run", "elsewhere", ".ci/run", "./dev test"),
     (r"ctest .*", "ctest"),
@@ -209,6 +213,11 @@ def packages(text: str) -> None:
             assert subprocess.run([SOURCE / word], capture_output=True).returncode == 2  # says how it is used
 
 
+def clone(text: str) -> None:
+    given = words(text)
+    assert given[3] == given[-1] and (SOURCE / "dev").is_file(), f"'{text}': it does not enter what it cloned"
+
+
 def scratch_copy(folder: Path) -> Path:
     """What commands of a reader find in their clone, and the program on the PATH."""
     for name in ["scenarios", "examples", "docs"]:
@@ -233,7 +242,7 @@ def can_draw() -> bool:
 
 
 WAYS = {"parse": parse, "dev": dev, "ctest": ctest, "page_tests": page_tests, "targets": targets, "elsewhere": elsewhere,
-        "packages": packages}
+        "packages": packages, "clone": clone}
 
 
 # --- the tests
@@ -302,6 +311,7 @@ def test_parse_refuses(text):
     ("ctest", 'ctest -R "no test has this name"'), ("page_tests", "tests/page/run.sh build/release nothing"),
     ("targets", "cmake --preset fast -DSPHERECUT_BUILD_REFERENCES=ON"), ("targets", "cmake --preset release -DSPHERECUT_NOTHING=ON"),
     ("targets", "ninja -C build/release spherecut_nothing"), ("packages", "sudo apt install ./spherecut_9.9.9_amd64.deb"),
+    ("clone", "git clone ADDRESS spherecut && cd elsewhere"),
 ])
 def test_others_refuse(way, text):
     with pytest.raises(AssertionError):

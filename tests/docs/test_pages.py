@@ -1,4 +1,4 @@
-"""Links among the Markdown pages, and the code that the tutorials quote: what needs no Sphinx."""
+"""Pages and their places on the site, and the code that the tutorials quote: what needs no Sphinx."""
 
 import os
 import re
@@ -12,40 +12,7 @@ SOURCE = Path(os.environ["SPHERECUT_SOURCE"])
 sys.path.insert(0, str(SOURCE / "docs" / "site"))
 import build  # noqa: E402
 
-ALL = pages(SOURCE) + [SOURCE / "CHANGELOG.md"]
-
-
-def anchors(page: Path) -> set[str]:
-    """As GitHub makes them of the headings."""
-    found: set[str] = set()
-    for heading in re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```", "", page.read_text(), flags=re.S | re.M), re.M):
-        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "").strip().lower()
-        found.add(re.sub(r"[^\w\- ]", "", plain).replace(" ", "-"))
-    return found
-
-
-def broken_links(page: Path, text: str) -> list[str]:
-    prose = re.sub(r"^```.*?^```|(?<!\[)`[^`\n]+`", "", text, flags=re.S | re.M)
-    broken = []
-    for target in re.findall(r"!?\[[^\]]*\]\(([^)\s]+)\)", prose):
-        if re.match(r"[a-z]+:", target):
-            continue
-        path, _, anchor = target.partition("#")
-        file = (page.parent / path).resolve() if path else page
-        if not file.exists() or (anchor and (file.suffix != ".md" or anchor not in anchors(file))):
-            broken.append(target)
-    return broken
-
-
-@pytest.mark.parametrize("page", ALL, ids=lambda page: str(page.relative_to(SOURCE)))
-def test_links(page):
-    assert broken_links(page, page.read_text()) == []
-
-
-def test_links_that_lead_nowhere_are_found():
-    page = SOURCE / "docs" / "start.md"
-    text = "[a](scenario.md) [b](none.md) [c](scenario.md#no-such) [d](#get-it) ![e](images/none.png) [f](https://example.org/x)"
-    assert broken_links(page, text) == ["none.md", "scenario.md#no-such", "images/none.png"]
+ALL = pages(SOURCE) + [SOURCE / "CHANGELOG.md", SOURCE / "SECURITY.md"]
 
 
 def test_every_example_has_a_tutorial():
@@ -72,6 +39,18 @@ def test_every_page_has_its_place_on_the_site(tmp_path):
     assert set(build.pages()) == listed
     named = {name for names in build.SECTIONS.values() for name in names if not name.startswith("reference/")}
     assert named <= listed
+
+
+def test_versions_agree():
+    """Of CMake, the Python package, CITATION.cff, BibTeX in README, what the pages tell to find, and the changelog."""
+    version = re.search(r"project\(spherecut VERSION ([\d.]+)", (SOURCE / "CMakeLists.txt").read_text())[1]
+    minor = version.rsplit(".", 1)[0]
+    for file, pattern in {"pyproject.toml": r'^version = "([\d.]+)"', "CITATION.cff": r"^version: ([\d.]+)", "README.md": r"^  version = \{([\d.]+)\}",
+                          "CHANGELOG.md": r"^## ([\d.]+)"}.items():
+        assert re.search(pattern, (SOURCE / file).read_text(), re.M)[1] == version, file
+    for file in ("docs/library.md", "examples/libraries/CMakeLists.txt"):
+        assert re.search(r"find_package\(spherecut ([\d.]+) ", (SOURCE / file).read_text())[1] == minor, file
+    assert f"minor version, {minor}," in (SOURCE / "SECURITY.md").read_text()
 
 
 def test_public_headers():

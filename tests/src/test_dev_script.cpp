@@ -34,6 +34,8 @@ TEST_CASE("./dev refuses arguments that it has no use for") {
       {"lint --dep", "dev: lint: unexpected argument '--dep'; allowed: --deep\n"},
       {"lint --deep topology", "dev: lint: unexpected argument 'topology'; allowed: --deep\n"},
       {"--help demo", "dev: --help: unexpected argument 'demo'; allowed: none\n"},
+      {"coverage src", "dev: coverage: unexpected argument 'src'; allowed: topology, solvers\n"},
+      {"coverage topology --all", "dev: coverage: unexpected argument '--all'; allowed: topology, solvers\n"},
   };
   for (const Case& c : cases) {
     const ProgramResult result = dev(c.arguments);
@@ -42,6 +44,36 @@ TEST_CASE("./dev refuses arguments that it has no use for") {
     CHECK(result.out.empty());
   }
   CHECK(dev("--help").status == 0);
+}
+
+TEST_CASE("./dev coverage builds, runs and reports the groups that are asked for") {
+  const TemporaryFolder folder;
+  std::filesystem::copy_file(script, folder.path() / "dev");
+  std::filesystem::create_directories(folder.path() / "bin");
+  std::filesystem::create_directories(folder.path() / "build/coverage");
+  write_file(folder.path() / "build/coverage/old.gcda", "of a run before");
+  const std::string told = "echo \"$(basename \"$0\") $*\" >>told\n";
+  for (const char* name : {"cmake", "ninja", "ctest"})
+    write_program(folder.path() / "bin" / name, told);
+  write_program(folder.path() / "bin/gcovr", told + "echo 'lines: 87.5% (7 out of 8)'\n");
+  const auto dev = [&](const std::string& arguments) {
+    std::filesystem::remove(folder.path() / "told");
+    return run_shell("cd '" + folder.path().string() + "' && PATH=\"$PWD/bin:$PATH\" SPHERECUT_SKIP_PACKAGES=1 ./dev " +
+                     arguments);
+  };
+  const ProgramResult both = dev("coverage");
+  INFO(both.err);
+  CHECK(both.status == 0);
+  CHECK_THAT(both.out, Contains("topology: lines: 87.5%") && Contains("solvers: lines: 87.5%"));
+  CHECK_FALSE(std::filesystem::exists(folder.path() / "build/coverage/old.gcda"));
+  std::string told_of = read_file(folder.path() / "told");
+  CHECK_THAT(told_of, Contains("cmake --preset coverage") && Contains("test_topology test_solvers test_elasticity"));
+  CHECK_THAT(told_of, Contains("--label-regex ^(topology|solvers)$"));
+  const ProgramResult one = dev("coverage topology");
+  CHECK(one.status == 0);
+  CHECK_THAT(one.out, Contains("topology: lines: 87.5%") && !Contains("solvers"));
+  told_of = read_file(folder.path() / "told");
+  CHECK_THAT(told_of, Contains("--label-regex ^(topology)$") && !Contains("test_solvers"));
 }
 
 TEST_CASE("./dev that is interrupted says so and ends with 130") {
