@@ -11,7 +11,8 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double near_banks = 0.25; // spacings: banks so near to each other are looked at
+constexpr double near_banks = 0.25;         // spacings: banks so near to each other are looked at
+constexpr double most_between_shares = 0.1; // of the fine spacing: what may lie in the tool between middles of shares
 
 } // namespace
 
@@ -83,8 +84,16 @@ void Session::step_finite(const StepSample& sample, StepResult& result) {
         std::max(result.rotation_degrees, rotation_degrees(Matrix3::Identity() + node_states_.back().gradient));
   }
   watch_banks(result);
-  if (touches())
-    judge_fineness(result);
+  if (!touches())
+    return;
+  judge_fineness(result);
+  if (result.largest_penetration > most_between_shares * zone_.spacing.fine)
+    warn("surface",
+         fmt::format("the surface lies {:.2g} m in the tool between its nodes at t = {:g} s: {:.0f} % of the "
+                     "fine spacing, allowed {:g} %; nodes.fine_spacing makes them finer. A sharp edge that "
+                     "is drawn along the surface does that, too: its force is then too small",
+                     result.largest_penetration, result.time, 100 * result.largest_penetration / zone_.spacing.fine,
+                     100 * most_between_shares));
 }
 
 // Its own surface does not hold such a body apart.

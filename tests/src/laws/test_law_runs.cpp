@@ -81,7 +81,7 @@ TEST_CASE("At small depth a neo-Hookean block resists a ball as the linear one d
   CHECK(b.force.z() == Approx(a.force.z()).epsilon(0.01));
   CHECK(a.active_nodes > 5);
   CHECK(b.active_nodes == a.active_nodes);
-  CHECK(b.residual < 1e-3);
+  CHECK(b.residual < 1e-4);
   CHECK(b.least_jacobian < 1);
   CHECK(finite.warnings().empty());
   // Displacement and stress under the tip.
