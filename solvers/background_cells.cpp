@@ -32,13 +32,16 @@ class BoxFiller {
  public:
   BoxFiller(const topology::Domain& domain, const BackgroundOptions& options, const topology::Incision* incision,
             BackgroundCells& cells)
-      : domain_(domain), options_(options), incision_(incision), cells_(cells) {}
+      : domain_(domain), options_(options), incision_(incision),
+        has_walls_(incision != nullptr && incision->cut_sheets() < std::ssize(incision->sheets())), cells_(cells) {}
 
   /// `spacing`: of the nodes about the box; `distance`: signed distance of its centre to the surface.
   void fill(const Vector3& centre, const Vector3& half, double spacing, double distance) {
     BackgroundBox box{centre, half, spacing, static_cast<int>(cells_.start.size()) - 1, 0};
     const bool inside = distance < -half.norm() || corners_inside(centre, half);
-    if (incision_ != nullptr && may_be_split(centre, half))
+    if (has_walls_ && is_walled(centre, half))
+      add_walled(centre, half);
+    else if (incision_ != nullptr && may_be_split(centre, half))
       add_split(centre, half, inside);
     else if (inside)
       add_rule(centre, half);
@@ -146,6 +149,10 @@ class BoxFiller {
     groups_.clear();
     for (int octant = 0; octant < octants; ++octant)
       add_split_octant(octant_centre(centre, half, octant), half / 2, inside);
+    add_groups();
+  }
+
+  void add_groups() {
     for (const Group& group : groups_)
       for (std::size_t k = 0; k < group.points.size(); ++k) {
         if (std::ssize(cells_.points) - cells_.start.back() == most_cell_points ||
@@ -153,6 +160,123 @@ class BoxFiller {
           cells_.start.push_back(static_cast<int>(cells_.points.size()));
         cells_.points.push_back(group.points[k]);
       }
+  }
+
+  /// Whether walls of a narrow gap, and no sheet of a cut, may pass through the box.
+  bool is_walled(const Vector3& centre, const Vector3& half) {
+    constexpr std::size_t most = 64;
+    (void)incision_->walls_between(centre, half, centre, most, found_);
+    return !found_.empty() && std::all_of(found_.begin(), found_.end(), [&](int wall) {
+      return incision_->triangle_of(wall).first >= incision_->cut_sheets();
+    });
+  }
+
+  /// The points of a box that a narrow gap may pass: on each side of the gap its own; near its end, where the basis is
+  /// enriched as at a front, those of smaller boxes.
+  void add_walled(const Vector3& centre, const Vector3& half) {
+    groups_.clear();
+    const Vector3 octant_half = half / 2, sample_half = half / 4;
+    for (int octant = 0; octant < octants; ++octant) {
+      const Vector3 middle = octant_centre(centre, half, octant);
+      const auto front = incision_->front_frame(middle, front_reach * octant_half.norm());
+      const bool at_front = front && front->distance < octant_half.norm();
+      material_.clear();
+      for (int k = 0; k < octants; ++k) {
+        add_material(octant_centre(middle, octant_half, k), sample_half, 0);
+        if (at_front || k + 1 == octants) {
+          add_seen_together(front, 1e-4 * 8 * (at_front ? sample_half : octant_half).prod());
+          material_.clear();
+        }
+      }
+    }
+    add_groups();
+  }
+
+  /// Material that is seen from one place.
+  struct SeenPart {
+    Vector3 eye; // that place
+    double volume;
+    Vector3 moment;
+    double nearness; // m2, sum of volumes over their distances from the front
+  };
+
+  /// Adds a volume at x to the first part that sees x, or as a part of its own. Distances from the front count as
+  /// `least` at least.
+  void add_where_seen(const Vector3& x, double volume, const std::optional<topology::FrontFrame>& front, double least,
+                      std::vector<SeenPart>& visible) const {
+    auto part =
+        std::find_if(visible.begin(), visible.end(), [&](const SeenPart& p) { return !incision_->blocks(p.eye, x); });
+    if (part == visible.end())
+      part = visible.insert(visible.end(), {x, 0, Vector3::Zero(), 0});
+    part->volume += volume;
+    part->moment += volume * x;
+    if (front)
+      part->nearness += volume / std::max(off_front(*front, x).norm(), least);
+  }
+
+  /// Pieces of material that see one another make one point; those below the volume do not count.
+  void add_seen_together(const std::optional<topology::FrontFrame>& front, double least) {
+    std::vector<SeenPart> visible;
+    for (const BoxPart& piece : material_)
+      add_where_seen(piece.centroid, piece.volume, front, nearest * std::cbrt(least), visible);
+    for (const SeenPart& part : visible) {
+      if (part.volume <= least)
+        continue;
+      const Vector3 middle = part.moment / part.volume;
+      const bool stays = !incision_->blocks(part.eye, middle) && domain_.signed_distance(middle) <= 0;
+      const Vector3& x = stays ? middle : part.eye;
+      add_to_group(front ? drawn_to(*front, x, part.nearness / part.volume) : x, part.volume);
+    }
+  }
+
+  /// Parts of a box inside the body, by the planes of the surface on up to two sides of a gap; divided where these do
+  /// not tell which corners are inside.
+  void add_material(const Vector3& x, const Vector3& half, int depth) {
+    constexpr int deepest = 2;
+    const double distance = domain_.signed_distance(x), reach = half.norm();
+    if (distance >= reach)
+      return;
+    if (distance <= -reach) {
+      material_.push_back({8 * half.prod(), x});
+      return;
+    }
+    const Plane first = tangent_at(x);
+    std::array<Vector3, octants> corners;
+    Vector3 farthest = x; // of the corners beyond the first plane
+    for (int k = 0; k < octants; ++k) {
+      corners[k] = x + half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1));
+      if (k == 0 || first.signed_distance(corners[k]) > first.signed_distance(farthest))
+        farthest = corners[k];
+    }
+    std::optional<Plane> second;
+    if (first.signed_distance(farthest) > 0)
+      if (const Plane other = tangent_at(farthest); other.normal.dot(first.normal) < -0.3)
+        second = other;
+    const double slack = 0.05 * half.minCoeff();
+    for (int k = 0; depth < deepest && k < octants; ++k) {
+      const double told = second ? std::min(first.signed_distance(corners[k]), second->signed_distance(corners[k]))
+                                 : first.signed_distance(corners[k]);
+      const double is = domain_.signed_distance(corners[k]);
+      if ((told < 0) == (is < 0) || std::min(std::abs(told), std::abs(is)) < slack)
+        continue;
+      for (int octant = 0; octant < octants; ++octant)
+        add_material(octant_centre(x, half, octant), half / 2, depth + 1);
+      return;
+    }
+    const auto add_side = [&](const Plane& plane) {
+      const BoxPart part = split_box(x, half, plane.offset * plane.normal, plane.normal)[1];
+      if (part.volume > 0 && domain_.signed_distance(part.centroid) < 0)
+        material_.push_back(part);
+      return part.volume;
+    };
+    if (add_side(first) < (1 - 1e-9) * 8 * half.prod() && second)
+      add_side(*second);
+  }
+
+  /// The plane of the surface where it is nearest to x.
+  [[nodiscard]] Plane tangent_at(const Vector3& x) const {
+    const Vector3 normal = domain_.normal(x);
+    return {normal, normal.dot(domain_.closest_surface_point(x))};
   }
 
   void add_split_octant(const Vector3& centre, const Vector3& half, bool inside, bool whole = true) {
@@ -177,25 +301,9 @@ class BoxFiller {
     }
     // Samples where the body ends, or where one plane does not tell what hides what: those that see one another count
     // together.
-    struct Part {
-      Vector3 eye;
-      double volume;
-      Vector3 moment;
-      double nearness; // m2, sum of volumes over their distances from the front
-    };
-    std::vector<Part> visible;
+    std::vector<SeenPart> visible;
     const int detail = inside ? 4 : 2;
     const Vector3 sample_half = half / detail;
-    const auto add_sample = [&](const Vector3& x, double volume) {
-      auto part =
-          std::find_if(visible.begin(), visible.end(), [&](const Part& p) { return !incision_->blocks(p.eye, x); });
-      if (part == visible.end())
-        part = visible.insert(visible.end(), {x, 0, Vector3::Zero(), 0});
-      part->volume += volume;
-      part->moment += volume * x;
-      if (front)
-        part->nearness += volume / std::max(off_front(*front, x).norm(), nearest * half.minCoeff());
-    };
     for (int a = 0; a < detail; ++a)
       for (int b = 0; b < detail; ++b)
         for (int c = 0; c < detail; ++c) {
@@ -211,10 +319,11 @@ class BoxFiller {
             if (part.volume == 0)
               continue;
             const Vector3 moved = part.centroid + shift;
-            add_sample(incision_->blocks(part.centroid, moved) ? part.centroid : moved, fraction * part.volume);
+            add_where_seen(incision_->blocks(part.centroid, moved) ? part.centroid : moved, fraction * part.volume,
+                           front, nearest * half.minCoeff(), visible);
           }
         }
-    for (const Part& part : visible) {
+    for (const SeenPart& part : visible) {
       if (part.volume <= 1e-4 * 8 * half.prod())
         continue;
       const Vector3 middle = part.moment / part.volume;
@@ -284,8 +393,11 @@ class BoxFiller {
   const topology::Domain& domain_;
   BackgroundOptions options_;
   const topology::Incision* incision_;
+  bool has_walls_; // of narrow gaps
   BackgroundCells& cells_;
   std::vector<Group> groups_;
+  std::vector<BoxPart> material_;
+  std::vector<int> found_;
 };
 
 class Octree {

@@ -171,7 +171,7 @@ void assemble_rows(const Problem& problem, const topology::CellComplex& cells, c
         add_outflow_of_node(cells.lips[l].centroid, cells.lips[l].area);
       for (int b : boundary[i]) {
         const topology::BoundaryFace& face = cells.boundary[b];
-        if (problem.incision && problem.incision->blocks(x[i], face.centroid)) {
+        if (problem.hiding() && problem.hiding()->blocks(x[i], face.centroid)) {
           add_outflow_of_node(face.centroid, face.area);
           continue;
         }

@@ -1,6 +1,7 @@
 #include "solvers/cell_loads.hpp"
 
 #include "solvers/background_cells.hpp"
+#include "solvers/surface_patches.hpp"
 #include "topology/point_tree.hpp"
 
 #include <Eigen/Geometry>
@@ -74,7 +75,8 @@ void add_curved_traction(const topology::CellComplex& cells, const Problem& prob
     if (std::none_of(planes.begin(), planes.end(), [&](const Plane& plane) {
           return std::abs(plane.signed_distance(points[k].position)) < near && plane.normal.dot(points[k].normal) > 0.9;
         }))
-      points_of_node[tree.nearest(points[k].position).index].push_back(k);
+      points_of_node[nearest_in_sight(tree, problem.nodes.positions, problem.opaque.get(), points[k].position)]
+          .push_back(k);
   }
   for (const topology::BoundaryFace& face : cells.boundary) {
     if (face.plane >= 0)

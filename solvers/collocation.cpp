@@ -3,6 +3,7 @@
 #include "solvers/cell_loads.hpp"
 #include "solvers/elimination_order.hpp"
 #include "solvers/factorisation.hpp"
+#include "solvers/surface_patches.hpp"
 #include "topology/errors.hpp"
 #include "topology/point_tree.hpp"
 #include "topology/voronoi_cells.hpp"
@@ -29,7 +30,7 @@ Collocation::Collocation(Problem problem, const DiscretisationOptions& options, 
       mixed_(problem_.material.poisson_ratio > mixed_above), stride_(mixed_ ? 4 : 3) {
   const Stopwatch assembly;
   const NodeCloud& nodes = problem_.nodes;
-  cells_ = topology::voronoi_cells(nodes.positions, nodes.spacings, *problem_.domain, problem_.incision.get());
+  cells_ = topology::voronoi_cells(nodes.positions, nodes.spacings, *problem_.domain, problem_.hiding().get());
   find_constrained();
   loads_ = cell_loads(cells_, problem_, stress_of(problem_.loads.initial_strain));
   assemble_rows(problem_, cells_, spheres_, supports_, mixed_, std::vector<char>(nodes.positions.size(), 1), rows_);
@@ -248,9 +249,9 @@ std::vector<std::vector<Collocation::CellShare>> Collocation::loaded_cells(const
     if (!(area > 0) || (problem_.touched_from && face.area.dot(*problem_.touched_from) < facing * area))
       continue;
     const bool is_own = cloud.kinds[face.node] != NodeKind::interior;
-    const int owner = is_own ? face.node : ids[tree.nearest(face.centroid).index];
+    const int owner = is_own ? face.node : ids[nearest_in_sight(tree, skin, problem_.opaque.get(), face.centroid)];
     if (place[owner] < 0 ||
-        (!is_own && problem_.incision && problem_.incision->blocks(cloud.positions[face.node], cloud.positions[owner])))
+        (!is_own && problem_.hiding() && problem_.hiding()->blocks(cloud.positions[face.node], cloud.positions[owner])))
       continue;
     std::vector<CellShare>& shares = cells[place[owner]];
     if (is_own)

@@ -1,10 +1,8 @@
 #include "solvers/dense_cholesky.hpp"
 
-#include <cmath>
+#include "solvers/blas.inl"
 
-extern "C" {
-void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
-}
+#include <cmath>
 
 namespace spherecut::solvers {
 

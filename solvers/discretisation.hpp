@@ -47,6 +47,9 @@ struct Loads {
 struct Problem {
   std::shared_ptr<const topology::Domain> domain;
   std::shared_ptr<const topology::Incision> incision; // null: uncut
+  /// The incision with the walls of narrow gaps of the body's own surface (with_walls in gap_walls.hpp): what sight
+  /// lines cannot cross. Null: the incision alone.
+  std::shared_ptr<const topology::Incision> opaque;
   NodeCloud nodes;
   Material material;
   std::vector<Prescribed> prescribed;
@@ -60,6 +63,8 @@ struct Problem {
   /// Unit vector out of the body towards the tool that is going to touch it. Forces on a node at a sharp edge act on
   /// the side of its share that faces the tool; where none does alone, on the edge. Empty: on the whole share.
   std::optional<Vector3> touched_from;
+
+  [[nodiscard]] const std::shared_ptr<const topology::Incision>& hiding() const { return opaque ? opaque : incision; }
 };
 
 /// What becomes of a piece that is cut off and that no prescribed displacement holds.

@@ -127,7 +127,7 @@ Matrix3 initial_stress(const Problem& problem) {
 }
 
 Sight sight_about_cut(const Problem& problem, Method method, SightRule rule) {
-  Sight sight{.incision = problem.incision, .rule = rule};
+  Sight sight{.incision = problem.hiding(), .rule = rule};
   if (method == Method::collocation && rule == SightRule::enriched) {
     sight.reach = 1.75;
     sight.enriched_growth = 2;

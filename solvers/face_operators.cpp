@@ -26,7 +26,7 @@ class FaceMeans {
  public:
   FaceMeans(const topology::CellComplex& cells, const Problem& problem, const Spheres& spheres,
             const NodalSupports& supports)
-      : cells_(cells), problem_(problem), incision_(problem.incision.get()), spheres_(spheres), supports_(supports),
+      : cells_(cells), problem_(problem), incision_(problem.hiding().get()), spheres_(spheres), supports_(supports),
         enriched_(spheres.cut() != nullptr && spheres.cut()->sight().rule == SightRule::enriched),
         place_(problem.nodes.size(), -1) {
     const std::size_t faces = cells.faces.size();

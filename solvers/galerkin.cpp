@@ -36,7 +36,7 @@ class Galerkin final : public ElasticBody {
       : ElasticBody(std::move(problem), Method::galerkin, galerkin_support_radius(problem, options), options.sight,
                     galerkin_lengths(problem.material)) {
     const Stopwatch assembly;
-    cells_ = background_cells(*problem_.domain, problem_.nodes, background_of(options), problem_.incision.get());
+    cells_ = background_cells(*problem_.domain, problem_.nodes, background_of(options), problem_.hiding().get());
     hold_surface();
     assemble(options.unheld, !is_factored || !initial_stress(problem_).isZero(0));
     assemble_loads();
@@ -265,7 +265,8 @@ class Galerkin final : public ElasticBody {
 };
 
 void Galerkin::hold_surface() {
-  patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
+  patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision, std::nullopt,
+                                              SurfacePatches::Of::skin_and_faces, problem_.opaque);
   if (problem_.prescribed_region) {
     held_ = patches_->means(problem_.prescribed, spheres_, problem_.prescribed_region);
     return;
@@ -462,7 +463,7 @@ double galerkin_support_radius(const Problem& problem, const DiscretisationOptio
     return options.support_radius;
   if (is_nearly_incompressible(problem.material))
     return 2.2;
-  return problem.incision != nullptr || options.cut_ahead ? 1.75 : 2.0;
+  return problem.hiding() != nullptr || options.cut_ahead ? 1.75 : 2.0;
 }
 
 BackgroundOptions background_of(const DiscretisationOptions& options) {
@@ -485,6 +486,9 @@ std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const Discret
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
   require_domain(problem);
   if (options.sight == SightRule::appended && (problem.incision != nullptr || options.cut_ahead)) {
+    if (problem.opaque != nullptr && problem.opaque != problem.incision)
+      throw InputError("the rule 'appended' on a body with narrow gaps of its own surface: its spheres see through "
+                       "them; take 'enriched'");
     std::shared_ptr<const UncutBody> uncut;
     return make_appended(std::move(problem), options, uncut);
   }

@@ -1,5 +1,6 @@
 #include "solvers/lu_window.hpp"
 
+#include "solvers/blas.inl"
 #include "solvers/dense_products.hpp"
 #include "topology/errors.hpp"
 
@@ -7,12 +8,6 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
-
-extern "C" {
-void dgetrf_(const int* m, const int* n, double* a, const int* lda, int* pivots, int* info);
-void dgetrs_(const char* trans, const int* n, const int* columns, const double* a, const int* lda, const int* pivots,
-             double* b, const int* ldb, int* info);
-}
 
 namespace spherecut::solvers {
 

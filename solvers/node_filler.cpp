@@ -116,6 +116,8 @@ Filler::Filler(const topology::Domain& domain, const SprinkleOptions& options, c
       volume_samples_(sample_volume(domain, spacing_, sweep_fraction, options.maximum_nodes, region)),
       random_(options.random_seed), directions_(spiral_directions(interior_candidates)),
       features_(find_sharp_features(surface_, options.sharp_edge_degrees)) {
+  grid_.set_walls(options.walls.get());
+  removed_.set_walls(options.walls.get());
   if (incision_ != nullptr)
     layout_ = lay_out_sheets(domain, features_, spacing_, *incision_, surface_, region);
 }
@@ -396,6 +398,7 @@ Sprinkling Filler::finish() {
   if (!kept_from_.empty())
     kept_from_.resize(nodes_.size(), -1);
   result.nodes = std::move(nodes_);
+  result.walls = options_.walls;
   result.kept_from = std::move(kept_from_);
   return result;
 }

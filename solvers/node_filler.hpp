@@ -10,9 +10,10 @@
 namespace spherecut::solvers {
 
 // Distances in units of the mean spacing of two nodes; see node_filler.cpp for what was measured.
-constexpr double kept_crowding = 0.7;   // between corners and edge nodes, and between previous nodes
-constexpr double sweep_crowding = 0.88; // above: a place that the front has missed
-constexpr double sweep_fraction = 0.5;  // size of the samples that find such places, in units of h
+constexpr double kept_crowding = 0.7;     // between corners and edge nodes, and between previous nodes
+constexpr double sweep_crowding = 0.88;   // above: a place that the front has missed
+constexpr double gap_end_clearance = 0.4; // of nodes from the end of a narrow gap, in h
+constexpr double sweep_fraction = 0.5;    // size of the samples that find such places, in units of h
 
 /// Throws InputError naming the option that is out of range.
 void check_options(const SprinkleOptions& options);
@@ -58,7 +59,15 @@ class Filler {
   }
   /// Whether a node may be put at x: in the region, and no other nearer than `crowding` of their mean spacing.
   [[nodiscard]] bool has_room(const Vector3& x, double h, double crowding) const {
-    return (region_ == nullptr || region_->contains(x)) && !grid_.crowded(x, h, crowding);
+    return (region_ == nullptr || region_->contains(x)) && !grid_.crowded(x, h, crowding) && !is_at_gap_end(x, h);
+  }
+  /// The end of a gap is a front: nodes keep as clear of it as of that of a cut. A place in the middle of a gap's end
+  /// would see neither side of it.
+  [[nodiscard]] bool is_at_gap_end(const Vector3& x, double h) const {
+    if (!options_.walls)
+      return false;
+    return options_.walls->front_frame(x, gap_end_clearance * h).has_value() ||
+           (options_.walls->near(x, lip_offset * h) && options_.walls->closest(x, lip_offset * h));
   }
   [[nodiscard]] bool fits_inside(const Vector3& x, double h, double crowding) const {
     return has_room(x, h, crowding) && domain_.signed_distance(x) <= -options_.wall_clearance * h &&

@@ -1,11 +1,11 @@
 // Which nodes of a cut body belong to one piece, and whether each piece has enough of them.
 #include "solvers/node_samples.hpp"
+#include "topology/disjoint_sets.hpp"
 #include "topology/point_tree.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -18,13 +18,7 @@ constexpr double flatness = 0.05; // in units of the mean spacing of a piece
 
 std::vector<int> node_pieces(const NodeCloud& nodes, const topology::Incision& incision) {
   const int count = nodes.size();
-  std::vector<int> parent(count);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int i) {
-    while (parent[i] != i)
-      i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  topology::DisjointSets joined(count);
   const topology::PointTree tree(nodes.positions);
   std::vector<topology::PointTree::Found> found;
   int pieces_left = count;
@@ -36,17 +30,15 @@ std::vector<int> node_pieces(const NodeCloud& nodes, const topology::Incision& i
     tree.within(x, reach, found); // of two nodes the coarser one finds the other
     for (const auto& [squared, j] : found) {
       const double limit = 0.5 * sight * (nodes.spacings[i] + nodes.spacings[j]);
-      const int a = root(i), b = root(j);
-      if (a != b && squared < limit * limit && (!sheets_near || !incision.blocks(x, nodes.positions[j]))) {
-        parent[std::max(a, b)] = std::min(a, b);
+      if (joined.find(i) != joined.find(j) && squared < limit * limit &&
+          (!sheets_near || !incision.blocks(x, nodes.positions[j])) && joined.join(i, j))
         --pieces_left;
-      }
     }
   }
   std::vector<int> size(count, 0), roots;
   for (int i = 0; i < count; ++i) {
-    ++size[root(i)];
-    if (root(i) == i)
+    ++size[joined.find(i)];
+    if (joined.find(i) == i)
       roots.push_back(i);
   }
   std::stable_sort(roots.begin(), roots.end(), [&](int a, int b) { return size[a] > size[b]; });
@@ -54,7 +46,7 @@ std::vector<int> node_pieces(const NodeCloud& nodes, const topology::Incision& i
   for (int p = 0; p < std::ssize(roots); ++p)
     number[roots[p]] = p;
   for (int i = 0; i < count; ++i)
-    pieces[i] = number[root(i)];
+    pieces[i] = number[joined.find(i)];
   return pieces;
 }
 

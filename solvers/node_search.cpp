@@ -1,5 +1,7 @@
 #include "solvers/node_search.hpp"
 
+#include "topology/incision.hpp"
+
 #include <algorithm>
 #include <limits>
 
@@ -65,7 +67,8 @@ bool NodeGrid::crowded(const Vector3& x, double h, double factor) const {
       continue;
     if (visit_level(level, x, reach, [&](int j) {
           const double limit = 0.5 * factor * (h + entries_[j].spacing);
-          return (entries_[j].position - x).squaredNorm() < limit * limit;
+          return (entries_[j].position - x).squaredNorm() < limit * limit &&
+                 (walls_ == nullptr || !walls_->blocks(x, entries_[j].position));
         }))
       return true;
   }

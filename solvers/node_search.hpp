@@ -5,6 +5,10 @@
 
 #include <cmath>
 
+namespace spherecut::topology {
+class Incision;
+}
+
 namespace spherecut::solvers {
 
 /// Hash grids, one per octave of the node spacing h, so that a query visits a few cells whatever the grading. Nodes can
@@ -20,6 +24,9 @@ class NodeGrid {
 
   /// Whether some node j has |x - x_j| < factor (h + h_j) / 2.
   [[nodiscard]] bool crowded(const Vector3& x, double h, double factor) const;
+
+  /// With walls (they have to outlive the grid) nodes that they hide from x crowd it no longer.
+  void set_walls(const topology::Incision* walls) { walls_ = walls; }
 
   /// Distance from x to the nearest node other than `except` that is farther than `beyond` m; infinity when there is
   /// none. h is the spacing at x.
@@ -57,6 +64,7 @@ class NodeGrid {
   bool visit_level(int level, const Vector3& x, double radius, Visitor&& visit) const;
 
   double smallest_, slope_;
+  const topology::Incision* walls_ = nullptr;
   std::vector<Entry> entries_;
   std::vector<Level> levels_;
   std::vector<int> heads_; // of the bucket chains, power of two in number

@@ -77,6 +77,9 @@ struct SprinkleOptions {
   double minimum_density = 0.8;   // a zone below is under-filled, NumericalError
   /// The cut of the body: lip nodes in pairs on both faces, a ring of pairs behind the front. Null: uncut.
   std::shared_ptr<const topology::Incision> incision;
+  /// Walls of narrow gaps of the body's own surface (gap_walls.hpp): nodes on both sides of one do not crowd each
+  /// other.
+  std::shared_ptr<const topology::Incision> walls;
   /// A ring of single nodes ahead of the front, too, where a method wants it (wants_ring_ahead). It moves with the
   /// front: an increment exchanges ten nodes where it exchanges one or two without.
   bool ring_ahead = false;
@@ -112,6 +115,7 @@ struct Sprinkling {
   NodeCloud nodes;
   SprinkleReport report;
   std::vector<int> kept_from; // resprinkle alone: index of each node in the previous cloud, -1 for a new one
+  std::shared_ptr<const topology::Incision> walls; // SprinkleOptions::walls that they were made with
 };
 
 /// Fills the domain: seeds, then sharp edges, surface, interior, by an advancing front with candidates at distance 0.93

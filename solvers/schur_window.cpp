@@ -1,19 +1,11 @@
 #include "solvers/schur_window.hpp"
 
+#include "solvers/blas.inl"
 #include "solvers/dense_products.hpp"
 #include "topology/errors.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
-
-extern "C" {
-void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
-void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a,
-            const int* lda, const double* beta, double* c, const int* ldc);
-void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha,
-            const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c,
-            const int* ldc);
-}
 
 namespace spherecut::solvers {
 

@@ -5,6 +5,7 @@
 // - the supernodes above them come one after another, and threads share the tiles of their panels.
 #include "solvers/supernodal_cholesky.hpp"
 
+#include "solvers/blas.inl"
 #include "solvers/parallel.hpp"
 #include "topology/interruption.hpp"
 
@@ -14,17 +15,6 @@
 #include <numeric>
 #include <span>
 #include <vector>
-
-extern "C" {
-void dgemm_(const char* transa, const char* transb, const int* m, const int* n, const int* k, const double* alpha,
-            const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c,
-            const int* ldc);
-void dsyrk_(const char* uplo, const char* trans, const int* n, const int* k, const double* alpha, const double* a,
-            const int* lda, const double* beta, double* c, const int* ldc);
-void dtrsm_(const char* side, const char* uplo, const char* trans, const char* diag, const int* m, const int* n,
-            const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
-void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* info);
-}
 
 namespace spherecut::solvers {
 
@@ -194,6 +184,8 @@ class NumericCholesky {
       for (SparseMatrix::InnerIterator entry(lower_, first + column); entry; ++entry) {
         if (entry.row() < first + column)
           continue;
+        if (entry.row() < row[place]) // rows of a column come in any order
+          place = column;
         while (row[place] < entry.row())
           ++place;
         entries[static_cast<long>(column) * count + place] = entry.value();

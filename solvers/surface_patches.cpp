@@ -134,15 +134,16 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
 }
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
-                               std::shared_ptr<const topology::Incision> incision, const std::optional<Part>& part,
-                               Of of)
-    : nodes_(nodes), incision_(std::move(incision)), points_of_node_(nodes.size()) {
+                               const std::shared_ptr<const topology::Incision>& incision,
+                               const std::optional<Part>& part, Of of,
+                               const std::shared_ptr<const topology::Incision>& opaque)
+    : nodes_(nodes), incision_(opaque ? opaque : incision), points_of_node_(nodes.size()) {
   if (of == Of::skin_and_faces)
-    points_ = surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision_.get(),
+    points_ = surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision.get(),
                                  part ? &part->points : nullptr);
   faces_begin_ = static_cast<int>(points_.size());
-  if (incision_ != nullptr) {
-    const std::vector<SurfacePoint> faces = lip_quadrature(*incision_, nodes, share_edge, share_centroid_below,
+  if (incision != nullptr) {
+    const std::vector<SurfacePoint> faces = lip_quadrature(*incision, nodes, share_edge, share_centroid_below,
                                                            part ? &part->points : nullptr, share_finest);
     points_.insert(points_.end(), faces.begin(), faces.end());
   }

@@ -45,10 +45,12 @@ class SurfacePatches {
     BoundingBox points, nodes; // m
   };
 
-  /// Of a `part` the shares of those nodes alone are meant to be asked for; of `faces` only those of lip nodes.
+  /// `opaque`: Problem::opaque. Of a `part` the shares of those nodes alone are meant to be asked for; of `faces` only
+  /// those of lip nodes.
   SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
-                 std::shared_ptr<const topology::Incision> incision = nullptr,
-                 const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces);
+                 const std::shared_ptr<const topology::Incision>& incision = nullptr,
+                 const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces,
+                 const std::shared_ptr<const topology::Incision>& opaque = nullptr);
 
   /// All points that the shares are made of.
   [[nodiscard]] std::span<const SurfacePoint> points() const { return points_; }
@@ -83,8 +85,8 @@ class SurfacePatches {
                                       const std::optional<Vector3>& facing) const;
 
   const NodeCloud& nodes_;
-  std::shared_ptr<const topology::Incision> incision_;
-  std::vector<SurfacePoint> points_; // of the surface, then from faces_begin_ on of the faces
+  std::shared_ptr<const topology::Incision> incision_; // what hides nodes from points
+  std::vector<SurfacePoint> points_;                   // of the surface, then from faces_begin_ on of the faces
   int faces_begin_ = 0;
   std::vector<std::vector<int>> points_of_node_;
   std::vector<int> owners_; // node of every point of the surface; -1: the cloud has no surface nodes

@@ -4,6 +4,7 @@
 #include "solvers/bank_pairs.hpp"
 #include "src/law_reader.hpp"
 #include "topology/errors.hpp"
+#include "topology/gap_walls.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -76,6 +77,8 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
   solvers::Problem problem;
   problem.domain = domain;
   problem.incision = model.incision;
+  if (model.sprinkling.walls != nullptr)
+    problem.opaque = topology::with_walls(model.incision, model.sprinkling.walls);
   problem.nodes = model.sprinkling.nodes;
   problem.material = scenario.material;
   problem.prescribed = fixed_nodes(scenario, *domain, problem.nodes);
@@ -125,7 +128,8 @@ int BodyModel::nearest_seen(const Vector3& x) const {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < nodes.size(); ++i)
     if (const double distance = (nodes[i] - x).squaredNorm();
-        distance < least && (incision == nullptr || !incision->blocks(x, nodes[i]))) {
+        distance < least && (incision == nullptr || !incision->blocks(x, nodes[i])) &&
+        (sprinkling.walls == nullptr || !sprinkling.walls->blocks(x, nodes[i]))) {
       least = distance;
       nearest = i;
     }
@@ -304,7 +308,9 @@ std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyMod
       model.patch.nodes, in_one, std::move(after));
 }
 
-std::string hindrance_to_growth(const Scenario& scenario, bool severed) {
+std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model, bool severed) {
+  if (model.sprinkling.walls != nullptr)
+    return "the organ has narrow gaps of its own";
   if (scenario.method.method == solvers::Method::published)
     return fmt::format("method {} is not updated", solvers::to_string(scenario.method.method));
   if (severed && scenario.cut.unheld == solvers::UnheldPieces::drop && !cut_appends(scenario))
@@ -317,6 +323,7 @@ solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const 
   const solvers::NodeCloud& nodes = before.sprinkling.nodes;
   solvers::SprinkleIncrement change = solvers::extend_sprinkling(domain, options, nodes, before.incision.get());
   after = {};
+  after.walls = before.sprinkling.walls;
   after.report = before.sprinkling.report;
   auto removed = change.removed.begin();
   for (int i = 0; i < nodes.size(); ++i) {

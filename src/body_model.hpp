@@ -114,8 +114,8 @@ std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyMod
                                          const topology::SurfaceMesh& way_ahead, int in_one,
                                          std::unique_ptr<Recondensing> after);
 
-/// Why no body of this scenario can follow its cut; empty: one can.
-std::string hindrance_to_growth(const Scenario& scenario, bool severed);
+/// Why no body of this scenario on the nodes of `model` can follow its cut; empty: one can.
+std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model, bool severed);
 
 /// What a cut changes in the nodes of `before`: those beside the new part of the cut are exchanged, the others keep
 /// their order. Throws as solvers::extend_sprinkling does.

@@ -37,9 +37,16 @@ std::string_view to_string(SystemUpdate update) {
 }
 
 void report_body(const BodyModel& body, double sight, BodyUpdate& report) {
-  report.seconds.visibility = sight;
-  report.seconds.solve = body.body->report().factor_seconds;
-  report.seconds.assembly -= report.seconds.visibility + report.seconds.solve;
+  // What is told to have taken longer than all of the stage was spent beside it, on another thread or before.
+  double left = std::max(0.0, report.seconds.assembly);
+  const auto take = [&left](double seconds) {
+    const double part = std::clamp(seconds, 0.0, left);
+    left -= part;
+    return part;
+  };
+  report.seconds.visibility = take(sight);
+  report.seconds.solve = take(body.body->report().factor_seconds);
+  report.seconds.assembly = left;
   report.nodes = body.sprinkling.nodes.size();
   const std::vector<int>& from = body.sprinkling.kept_from;
   report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));

@@ -91,16 +91,17 @@ void follow_walls(const OrganWalls& walls, const topology::Domain& domain, int b
   spacing.fine = std::min(spacing.fine, upper);
 }
 
-std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::SpacingField& spacing) {
+std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::SpacingField& spacing,
+                                        double most_through) {
   const std::vector<topology::WidthSample>& samples = walls.widths.walls;
   constexpr double rounding = 1.02; // a spacing that was derived from the wall does
   const double largest = largest_spacing(samples, spacing);
   std::optional<CoarseWall> worst;
-  // First walls of less than one spacing, as wide as that has to be to tell a wall from a margin; then those of two.
-  for (const double through : {1.0, spacings_through}) {
+  // First walls of less than one spacing, as wide as that has to be to tell a wall from a margin; then the others.
+  for (const double through : {1.0, most_through}) {
     for (const int s : topology::thin_samples(samples, through * largest)) {
       const double h = spacing(samples[s].point);
-      const CoarseWall wall{samples[s].width, h, samples[s].point, samples[s].width / spacings_through};
+      const CoarseWall wall{samples[s].width, h, samples[s].point, samples[s].width / most_through};
       const bool counts = wall.thickness * rounding < through * h && (through == 1 || wall.thickness >= h);
       if (counts && (!worst || wall.nodes_through() < worst->nodes_through()))
         worst = wall;
@@ -115,11 +116,11 @@ std::string bending_error(double nodes_through, solvers::Method method) {
   if (nodes_through < 1)
     return "with less than one spacing through it, it has no stiffness in bending and moves by many times too much";
   // Percent by which a rod of square section, nu = 0.3, bends too little under its own weight, against the beam's
-  // theory with shear, at 1, 1.5 and 2 spacings through it (2.5: 2.6 and 10, 3: 1.8 and 9.8).
-  constexpr std::array<double, 3> galerkin{13.6, 6.7, 3.2}, collocation{61, 25, 22};
-  const std::array<double, 3>& measured = method == solvers::Method::galerkin ? galerkin : collocation;
-  const double place = std::clamp(2 * (nodes_through - 1), 0.0, 2.0);
-  const int below = std::min(1, static_cast<int>(place));
+  // theory with shear, at 1, 1.5, 2, 2.5 and 3 spacings through it.
+  constexpr std::array<double, 5> galerkin{13.6, 6.7, 3.2, 2.6, 1.8}, collocation{61, 25, 22, 10, 9.8};
+  const std::array<double, 5>& measured = method == solvers::Method::galerkin ? galerkin : collocation;
+  const double place = std::clamp(2 * (nodes_through - 1), 0.0, 4.0);
+  const int below = std::min(3, static_cast<int>(place));
   const double percent = measured[below] + (place - below) * (measured[below + 1] - measured[below]);
   return fmt::format("with {:.2g} spacings through it, it bends by about {:.0f} % too little (method {})",
                      nodes_through, percent, solvers::to_string(method));

@@ -37,13 +37,15 @@ std::string walls_text(const OrganWalls& walls);
 /// it; where that asks for more than `budget` nodes the one that asks for so many.
 void follow_walls(const OrganWalls& walls, const topology::Domain& domain, int budget, solvers::SpacingField& spacing);
 
-/// The wall that is worst off with a spacing; nothing where all have three nodes through them.
+/// The wall that is worst off with a spacing; nothing where all have `through` spacings, by default three nodes,
+/// through them.
 struct CoarseWall {
   double thickness = 0, spacing = 0;                                         // m
   Vector3 place = Vector3::Zero();                                           // m
   double wanted = 0;                                                         // m, spacing of three nodes through it
   [[nodiscard]] double nodes_through() const { return thickness / spacing; } // spacings, of which three nodes need two
 };
-std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::SpacingField& spacing);
+std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::SpacingField& spacing,
+                                        double through = 2);
 
 } // namespace spherecut::app

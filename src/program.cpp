@@ -14,6 +14,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <exception>
+#include <fcntl.h>
 #include <filesystem>
 #include <fmt/core.h>
 #include <poll.h>
@@ -50,6 +51,14 @@ std::string what_failed() {
   std::array<volatile char, std::size_t{1} << 20U> pages; // of the 8 MB that there may be
   for (std::size_t at = 0; at < pages.size(); at += 4096)
     pages[at] = 0;
+}
+
+/// Where somebody has closed input, output or error the next file that is opened would get its number, and what is said
+/// would stand among the results.
+void hold_standard_numbers() {
+  for (int number = STDIN_FILENO; number <= STDERR_FILENO; ++number)
+    if (::fcntl(number, F_GETFD) == -1 && errno == EBADF && ::open("/dev/null", O_RDWR) != number)
+      ::_exit(status_bad_input);
 }
 
 int end_in_words(int argc, char** argv, int (*run)(int, char**)) {
@@ -174,6 +183,7 @@ void require_resources(bool is_real_time) {
 }
 
 int start(int argc, char** argv, int (*run)(int, char**)) {
+  hold_standard_numbers();
   std::signal(SIGPIPE, SIG_IGN); // a run goes on when nobody reads its progress
   std::signal(SIGXFSZ, SIG_IGN); // a file over the limit is a disk that takes no more
   app::use_one_blas_thread();

@@ -199,6 +199,7 @@ class Session {
   void approach_hanging();
   void follow_walls();
   void judge_walls();
+  void find_gaps();
   void watch_blade_way();
   [[nodiscard]] std::vector<std::array<Vector3, 2>> fine_segments(const topology::Incision& incision) const;
   void make_precuts();
@@ -378,9 +379,10 @@ class Session {
   std::optional<FirstTouch> touch_;
   FineZone zone_;
   OrganWalls walls_;
-  double coarseness_ = 1;                            // of the spacings in zone_
-  std::vector<std::array<Vector3, 2>> tracks_;       // of the blade, where fine nodes belong
-  std::vector<std::array<Vector3, 2>> led_segments_; // of zone_ when it was last led ahead of a tear's front
+  std::shared_ptr<const topology::Incision> gap_walls_; // null: no narrow gaps
+  double coarseness_ = 1;                               // of the spacings in zone_
+  std::vector<std::array<Vector3, 2>> tracks_;          // of the blade, where fine nodes belong
+  std::vector<std::array<Vector3, 2>> led_segments_;    // of zone_ when it was last led ahead of a tear's front
   std::vector<StepSample> steps_;
   std::optional<topology::SurfaceContact> zone_contact_; // centre of the fine zone; empty: no tool touches
   std::optional<topology::SurfaceContact> first_zone_;   // the first of these

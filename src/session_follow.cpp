@@ -97,7 +97,7 @@ std::future<Session::MadeAside> Session::make_beside(std::shared_ptr<const topol
   const std::string renewed =
       model_.coarseness != coarseness_
           ? "the spacing has changed"
-          : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+          : hindrance_to_growth(scenario_, model_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
   auto make = [&scenario = scenario_, domain = organ_.domain, how = sprinkle_options(next),
                incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, reason,
                coarseness = coarseness_, centre = touches ? zone_contact_ : std::nullopt,

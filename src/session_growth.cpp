@@ -44,7 +44,7 @@ void Session::lead_zone(const topology::Incision& incision, CutGrowth& growth) {
   }
   const auto why_not = [&, way = growth.way_ahead()]() -> std::string {
     if (std::string hindrance =
-            hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+            hindrance_to_growth(scenario_, model_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
         !hindrance.empty())
       return hindrance;
     if (cut_appends(scenario_))
@@ -113,8 +113,9 @@ topology::SurfaceMesh Session::way_of_front(const topology::Incision* before, co
 // Nodes and system of the body with the new cut: of what was there, what the cut did not touch stays.
 void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report) {
   const std::string unfollowed =
-      growth.beside ? "the blade is resisted"
-                    : hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
+      growth.beside
+          ? "the blade is resisted"
+          : hindrance_to_growth(scenario_, model_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty());
   const bool follows = updating_ && unfollowed.empty() && growth.window_pays;
   followed_.reset();
   report.update = SystemUpdate::rebuilt;

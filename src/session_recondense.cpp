@@ -85,7 +85,7 @@ void Session::watch_window(const StepSample& sample, const std::optional<topolog
 void Session::meet_blade(const StepSample& sample, const std::optional<topology::BladePose>& last) {
   const double entry = way_into_body(sample);
   if (std::string_view(model_.not_following) != too_much_of_body && entry <= way_spacings * zone_.spacing.fine &&
-      hindrance_to_growth(scenario_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty())
+      hindrance_to_growth(scenario_, model_, !unheld_pieces(incisions_->wound(), scenario_.fixed).empty()).empty())
     begin_recondensing(sample, last, entry);
 }
 

@@ -91,8 +91,9 @@ SurfaceWatch::SurfaceWatch(const BodyModel& model, const topology::Domain& domai
                  surface.vertices[static_cast<std::size_t>(triangle[1])],
                  surface.vertices[static_cast<std::size_t>(triangle[2])]});
   solvers::ShapeFunctions shape;
+  const topology::Incision* const opaque = model.body->problem().hiding().get();
   for (const Vector3& x : watched.points) {
-    const int owner = ids[static_cast<std::size_t>(solvers::nearest_in_sight(tree, skin, model.incision.get(), x))];
+    const int owner = ids[static_cast<std::size_t>(solvers::nearest_in_sight(tree, skin, opaque, x))];
     const double spacing = nodes.spacings[static_cast<std::size_t>(owner)];
     if (!gone.empty() && gone[static_cast<std::size_t>(owner)] != 0)
       continue;

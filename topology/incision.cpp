@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <iterator>
 #include <mutex>
 #include <utility>
 
@@ -90,8 +91,10 @@ Eigen::Vector3f single(const Vector3& x) {
 } // namespace
 
 struct Incision::Data {
-  Data(std::vector<SurfaceMesh> sheets_in, std::shared_ptr<const Domain> domain_in, int revision_in)
-      : sheets(std::move(sheets_in)), domain(std::move(domain_in)), revision(revision_in) {
+  Data(std::vector<SurfaceMesh> sheets_in, std::shared_ptr<const Domain> domain_in, int revision_in,
+       std::vector<SurfaceMesh> walls_in)
+      : sheets(std::move(sheets_in)), cut_sheets(static_cast<int>(sheets.size())), domain(std::move(domain_in)),
+        revision(revision_in) {
     if (!domain)
       throw InputError("an incision needs a body, none is given");
     for (int s = 0; s < std::ssize(sheets); ++s) {
@@ -101,6 +104,7 @@ struct Incision::Data {
         throw InputError(fmt::format("{} lies outside the body: no point of its {} triangles is inside", name,
                                      sheets[s].triangles.size()));
     }
+    std::move(walls_in.begin(), walls_in.end(), std::back_inserter(sheets));
     build_triangles();
     build_front();
   }
@@ -199,6 +203,7 @@ struct Incision::Data {
   using BorderFlags = std::array<bool, 6>;
 
   std::vector<SurfaceMesh> sheets;
+  int cut_sheets;
   std::shared_ptr<const Domain> domain;
   int revision;
   double flat = 0; // m, height within which a point lies on a triangle
@@ -220,12 +225,16 @@ struct Incision::Data {
   mutable double area = 0; // m2
 };
 
-Incision::Incision(std::vector<SurfaceMesh> sheets, std::shared_ptr<const Domain> domain, int revision)
-    : data_(std::make_unique<const Data>(std::move(sheets), std::move(domain), revision)) {}
+Incision::Incision(std::vector<SurfaceMesh> sheets, std::shared_ptr<const Domain> domain, int revision,
+                   std::vector<SurfaceMesh> walls)
+    : data_(std::make_unique<const Data>(std::move(sheets), std::move(domain), revision, std::move(walls))) {}
 Incision::~Incision() = default;
 
 const std::vector<SurfaceMesh>& Incision::sheets() const {
   return data_->sheets;
+}
+int Incision::cut_sheets() const {
+  return data_->cut_sheets;
 }
 const std::shared_ptr<const Domain>& Incision::domain() const {
   return data_->domain;
@@ -242,8 +251,8 @@ double Incision::front_length() const {
 
 double Incision::area() const {
   std::call_once(data_->area_known, [this] {
-    for (const SurfaceMesh& sheet : data_->sheets)
-      data_->area += area_inside(sheet, *data_->domain);
+    for (int s = 0; s < data_->cut_sheets; ++s)
+      data_->area += area_inside(data_->sheets[s], *data_->domain);
   });
   return data_->area;
 }

@@ -57,17 +57,22 @@ class Incision {
   /// Sheets are open or closed, consistently oriented, 2-manifold with border; they may reach out of the body and cross
   /// one another. `revision` counts the increments that led here. Throws InputError naming the sheet and the element
   /// when one is not finite, not manifold, not orientable, degenerate, or lies outside the body.
-  Incision(std::vector<SurfaceMesh> sheets, std::shared_ptr<const Domain> domain, int revision = 0);
+  /// `walls` are further sheets, in the gaps of the body's own surface (gap_walls.hpp): not checked, without area, and
+  /// after the sheets in number. Their border inside the body is a front as that of any sheet.
+  Incision(std::vector<SurfaceMesh> sheets, std::shared_ptr<const Domain> domain, int revision = 0,
+           std::vector<SurfaceMesh> walls = {});
   ~Incision();
   Incision(const Incision&) = delete;
   Incision& operator=(const Incision&) = delete;
 
+  /// The walls are among them, from cut_sheets() on.
   [[nodiscard]] const std::vector<SurfaceMesh>& sheets() const;
+  [[nodiscard]] int cut_sheets() const;
   [[nodiscard]] const std::shared_ptr<const Domain>& domain() const;
   [[nodiscard]] int revision() const;
   /// Border of all sheets inside the body, clipped at its surface.
   [[nodiscard]] const std::vector<FrontSegment>& front() const;
-  /// Area of the sheets inside the body, m2, and length of the front, m.
+  /// Area of the sheets inside the body without the walls, m2, and length of the front, m.
   [[nodiscard]] double area() const;
   [[nodiscard]] double front_length() const;
 

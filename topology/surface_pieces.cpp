@@ -1,10 +1,11 @@
 #include "topology/surface_pieces.hpp"
 
+#include "topology/disjoint_sets.hpp"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 namespace spherecut::topology {
 
@@ -25,22 +26,14 @@ struct ComponentTriangles {
 };
 
 std::vector<ComponentTriangles> gather(const SurfaceMesh& mesh) {
-  std::vector<int> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int v) {
-    while (parent[v] != v)
-      v = parent[v] = parent[parent[v]];
-    return v;
-  };
+  DisjointSets joined(static_cast<int>(mesh.vertices.size()));
   for (const Triangle& t : mesh.triangles)
-    for (int e = 0; e < 2; ++e) {
-      const int a = root(t[e]), b = root(t[e + 1]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
+    for (int e = 0; e < 2; ++e)
+      joined.join(t[e], t[e + 1]);
   std::vector<int> number(mesh.vertices.size(), -1);
   std::vector<ComponentTriangles> found;
   for (int t = 0; t < std::ssize(mesh.triangles); ++t) {
-    int& component = number[root(mesh.triangles[t][0])];
+    int& component = number[joined.find(mesh.triangles[t][0])];
     if (component < 0) {
       component = static_cast<int>(found.size());
       const Vector3& x = mesh.vertices[mesh.triangles[t][0]];

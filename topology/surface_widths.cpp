@@ -73,6 +73,19 @@ class RayCaster {
   double size_ = 0;
 };
 
+/// visit(u, v) for a place in each of the parts, `parts` along an edge, that a triangle with sides u and v is divided
+/// into; off the middles of the parts, where rays would meet edges of a regular mesh.
+template <class Visit>
+void for_each_part(int parts, const Visit& visit) {
+  constexpr double third = 1.0 / 3, aside = 0.01;
+  for (int i = 0; i < parts; ++i)
+    for (int k = 0; i + k < parts; ++k) {
+      visit((i + third + aside) / parts, (k + third) / parts);
+      if (i + k + 1 < parts)
+        visit((i + 2.0 / 3 - aside) / parts, (k + 2.0 / 3) / parts);
+    }
+}
+
 } // namespace
 
 SurfaceWidths surface_widths(const SurfaceMesh& mesh, double apart, double reach) {
@@ -94,20 +107,41 @@ SurfaceWidths surface_widths(const SurfaceMesh& mesh, double apart, double reach
     owed -= wanted * each;
     const int parts = static_cast<int>(std::ceil(std::sqrt(wanted)));
     const double share = wanted * each / (parts * parts);
-    const auto shoot = [&](double u, double v) {
-      const Vector3 x = a + u / parts * ab + v / parts * ac;
+    for_each_part(parts, [&](double u, double v) {
+      const Vector3 x = a + u * ab + v * ac;
       rays.cast(x, normal, -normal, 2 * rays.size(), share, widths.walls);
       rays.cast(x, normal, normal, reach, share, widths.gaps);
-    };
-    constexpr double inner = 1.0 / 3 + 0.01; // off the middle, where rays would meet edges of a regular mesh
-    for (int i = 0; i < parts; ++i)
-      for (int k = 0; i + k < parts; ++k) {
-        shoot(i + inner, k + 1.0 / 3);
-        if (i + k + 1 < parts)
-          shoot(i + 2.0 / 3 - 0.01, k + 2.0 / 3);
-      }
+    });
   }
   return widths;
+}
+
+class SurfaceRays::Caster : public RayCaster {
+ public:
+  using RayCaster::RayCaster;
+};
+
+SurfaceRays::SurfaceRays(const SurfaceMesh& mesh) : caster_(std::make_unique<const Caster>(mesh)) {}
+SurfaceRays::~SurfaceRays() = default;
+
+std::optional<WidthSample> SurfaceRays::meet(const Vector3& place, const Vector3& normal, const Vector3& direction,
+                                             double reach) const {
+  std::vector<WidthSample> met;
+  caster_->cast(place, normal, direction, reach, 0, met);
+  return met.empty() ? std::nullopt : std::optional(met.front());
+}
+
+std::vector<Vector3> places_of_triangle(const SurfaceMesh& mesh, int triangle,
+                                        const std::function<double(const Vector3&)>& apart) {
+  constexpr int most_parts = 200;
+  const Triangle& corners = mesh.triangles[static_cast<std::size_t>(triangle)];
+  const Vector3 &a = mesh.vertices[corners[0]], &b = mesh.vertices[corners[1]], &c = mesh.vertices[corners[2]];
+  const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+  const double step = std::min({apart(a), apart(b), apart(c), apart((a + b + c) / 3)});
+  const int parts = std::clamp(static_cast<int>(std::ceil(longest / step)), 1, most_parts);
+  std::vector<Vector3> places;
+  for_each_part(parts, [&](double u, double v) { places.emplace_back(a + u * (b - a) + v * (c - a)); });
+  return places;
 }
 
 std::vector<int> thin_samples(const std::vector<WidthSample>& samples, double width) {

@@ -78,10 +78,29 @@ struct CellBuilder {
   /// By the planes that are `from` to `to` spacings away (from 0: outside too). False when nothing is left.
   bool cut_by_planes(const Vector3& x, double h, double from, double to);
   [[nodiscard]] bool hidden(int i, int j) const {
+    int wall = -1;
+    return hidden(i, j, wall);
+  }
+  /// Sets the triangle that hides.
+  [[nodiscard]] bool hidden(int i, int j, int& wall) const {
     if (incision == nullptr)
       return false;
     const Vector3 &a = lookouts[i], &b = lookouts[j];
-    return incision->near(0.5 * (a + b), 0.5001 * (b - a).norm()) && incision->blocks(a, b);
+    return incision->near(0.5 * (a + b), 0.5001 * (b - a).norm()) && incision->blocks(a, b, wall);
+  }
+  /// Where a narrow gap of the body's own surface lies between two nodes: the plane of its middle, in which the cells
+  /// of both end; normal from i to j.
+  [[nodiscard]] std::optional<Plane> middle_of_gap(int i, int j) const {
+    int wall = -1;
+    if (incision == nullptr || incision->cut_sheets() == std::ssize(incision->sheets()) || wanted[j] == 0 ||
+        !hidden(i, j, wall) || incision->triangle_of(wall).first < incision->cut_sheets())
+      return std::nullopt;
+    const auto [sheet, triangle] = incision->triangle_of(wall);
+    const SurfaceMesh& mesh = incision->sheets()[sheet];
+    Vector3 normal = triangle_normal(mesh, triangle);
+    if (normal.dot(lookouts[j] - lookouts[i]) < 0)
+      normal = -normal;
+    return Plane{normal, normal.dot(mesh.vertices[mesh.triangles[triangle][0]])};
   }
 };
 
@@ -144,6 +163,13 @@ bool CellBuilder::cut_by_neighbours(int i) {
       if (squared > needed)
         return true;
       const Vector3 d = (nodes[other.index] - x) / h;
+      if (const std::optional<Plane> middle = middle_of_gap(i, other.index)) {
+        const double distance = -middle->signed_distance(x) / h;
+        if (reaches(middle->normal, 2 * distance) &&
+            !cell.nplane(middle->normal.x(), middle->normal.y(), middle->normal.z(), 2 * distance, other.index))
+          return false;
+        continue;
+      }
       if (!reaches(d, squared))
         continue;
       if (!cell.nplane(d.x(), d.y(), d.z(), squared, other.index))
@@ -334,6 +360,14 @@ void CellBuilder::add_face(int i, int neighbour, const std::vector<Vector3>& pol
     closure[i] += area;
   } else if (neighbour < i || wanted[neighbour] == 0) {
     return; // had from there
+  } else if (middle_of_gap(i, neighbour)) {
+    // In the gap there is nothing; beside its end the two meet in the material.
+    if (incision->blocks(x, centroid) || incision->blocks(nodes[neighbour], centroid))
+      return;
+    cells.faces.push_back({i, neighbour, area, centroid});
+    append_corners(polygon, x, h, cells.face_corners, cells.face_start);
+    closure[i] += area;
+    closure[neighbour] -= area;
   } else if (hidden(i, neighbour)) {
     add_lip(i, neighbour, polygon, outward, cells, closure);
   } else {
@@ -401,7 +435,7 @@ std::vector<Vector3> mirrored_lips(const std::vector<Vector3>& nodes, const std:
         break;
       const Vector3 middle = 0.5 * (nodes[i] + nodes[j]);
       const auto sheet = incision.closest(middle, lip_reach * spacings[i]);
-      if (sheet) {
+      if (sheet && sheet->sheet < incision.cut_sheets()) {
         const double height = 0.5 * (nodes[i] - nodes[j]).dot(sheet->normal);
         sites[i] = sheet->point + height * sheet->normal;
         sites[j] = sheet->point - height * sheet->normal;

@@ -1,10 +1,10 @@
 #include "topology/voxel_pieces.hpp"
 
+#include "topology/disjoint_sets.hpp"
 #include "topology/proximity.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetUtil.h>
 #include <openvdb/tools/Prune.h>
@@ -12,28 +12,6 @@
 namespace spherecut::topology {
 
 namespace {
-
-/// Disjoint sets of piece numbers.
-class Unions {
- public:
-  int add() {
-    parents_.push_back(static_cast<int>(parents_.size()));
-    return parents_.back();
-  }
-  int find(int i) {
-    while (parents_[i] != i)
-      i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void join(int i, int j) {
-    const int a = find(i), b = find(j);
-    parents_[std::max(a, b)] = std::min(a, b);
-  }
-  [[nodiscard]] int size() const { return static_cast<int>(parents_.size()); }
-
- private:
-  std::vector<int> parents_;
-};
 
 Vector3 centre(const openvdb::Coord& voxel, double size) {
   return {voxel.x() * size, voxel.y() * size, voxel.z() * size};
@@ -87,7 +65,7 @@ VoxelPieces count_pieces(const LevelSet& organ, const Incision& incision, int fe
   openvdb::tools::segmentActiveVoxels(clear, floods);
 
   // Piece of every voxel near a sheet and of the neighbours of these: 0 is none.
-  Unions pieces;
+  DisjointSets pieces; // by their numbers
   pieces.add();
   std::vector<double> counts{0};
   for (const auto& flood : floods) {

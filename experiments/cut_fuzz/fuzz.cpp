@@ -11,9 +11,11 @@
 #include <cstdint>
 #include <cstdlib>
 #include <fmt/format.h>
+#include <functional>
 #include <iterator>
 #include <numeric>
 #include <set>
+#include <tuple>
 
 namespace spherecut::experiments {
 
@@ -24,6 +26,111 @@ using topology::WoundPart;
 namespace {
 
 constexpr double volume_tolerance = 1e-9; // of the organ's
+
+// Boxes of a common grid, as one surface without the walls between them. `lines`: m, where the grid's planes lie along
+// each axis; `is_solid` tells of a cell by its three numbers. No two solid cells may meet in an edge or a corner alone.
+SurfaceMesh solid_of_cells(const std::array<std::vector<double>, 3>& lines,
+                           const std::function<bool(int, int, int)>& is_solid) {
+  const std::array<int, 3> cells{static_cast<int>(lines[0].size()) - 1, static_cast<int>(lines[1].size()) - 1,
+                                 static_cast<int>(lines[2].size()) - 1};
+  SurfaceMesh mesh;
+  std::map<std::array<int, 3>, int> numbers;
+  const auto vertex = [&](const std::array<int, 3>& at) {
+    const auto [found, is_new] = numbers.try_emplace(at, static_cast<int>(mesh.vertices.size()));
+    if (is_new)
+      mesh.vertices.emplace_back(lines[0][at[0]], lines[1][at[1]], lines[2][at[2]]);
+    return found->second;
+  };
+  const auto solid = [&](const std::array<int, 3>& at) {
+    for (int axis = 0; axis < 3; ++axis)
+      if (at[axis] < 0 || at[axis] >= cells[axis])
+        return false;
+    return is_solid(at[0], at[1], at[2]);
+  };
+  std::array<int, 3> at{};
+  for (at[0] = 0; at[0] < cells[0]; ++at[0])
+    for (at[1] = 0; at[1] < cells[1]; ++at[1])
+      for (at[2] = 0; at[2] < cells[2]; ++at[2]) {
+        if (!solid(at))
+          continue;
+        for (int axis = 0; axis < 3; ++axis)
+          for (const int side : {0, 1}) {
+            std::array<int, 3> beside = at;
+            beside[axis] += side == 1 ? 1 : -1;
+            if (solid(beside))
+              continue;
+            const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+            std::array<std::array<int, 3>, 4> corners{at, at, at, at};
+            for (auto& corner : corners)
+              corner[axis] += side;
+            ++corners[1][u];
+            ++corners[2][u];
+            ++corners[2][v];
+            ++corners[3][v];
+            if (side == 0)
+              std::swap(corners[1], corners[3]); // outward
+            const int a = vertex(corners[0]), b = vertex(corners[1]), c = vertex(corners[2]), d = vertex(corners[3]);
+            mesh.triangles.push_back({a, b, c});
+            mesh.triangles.push_back({a, c, d});
+          }
+      }
+  return mesh;
+}
+
+// Planes a step apart from `from` to `to`, and those `more`, m.
+std::vector<double> planes(double from, double to, int steps, std::initializer_list<double> more = {}) {
+  std::vector<double> at(more);
+  for (int k = 0; k <= steps; ++k)
+    at.push_back(std::lerp(from, to, static_cast<double>(k) / steps));
+  std::sort(at.begin(), at.end());
+  return at;
+}
+
+// A block of 100 x 60 x 40 mm with two fissures down from its top, 0.1 and 1 mm wide, which cross.
+SurfaceMesh fissured_block() {
+  const std::array lines{planes(-0.05, 0.05, 10, {0.0049, 0.0050, 0.0051}), planes(-0.03, 0.03, 6, {0.0035, 0.0045}),
+                         planes(0, 0.04, 4, {0.012})};
+  std::array<std::vector<double>, 3> distinct = lines;
+  for (std::vector<double>& axis : distinct)
+    axis.erase(std::unique(axis.begin(), axis.end()), axis.end());
+  return solid_of_cells(distinct, [distinct](int i, int j, int k) {
+    const double x = 0.5 * (distinct[0][i] + distinct[0][i + 1]), y = 0.5 * (distinct[1][j] + distinct[1][j + 1]),
+                 z = 0.5 * (distinct[2][k] + distinct[2][k + 1]);
+    const bool narrow = x > 0.0049 && x < 0.0050 && z > 0.012, wide = y > 0.0035 && y < 0.0045 && z > 0.02;
+    return !narrow && !wide;
+  });
+}
+
+// A box without lid, 100 x 60 x 40 mm, whose walls are 0.5 mm thin.
+SurfaceMesh thin_walls() {
+  const std::array lines{planes(-0.05, 0.05, 10, {-0.0495, 0.0495}), planes(-0.03, 0.03, 6, {-0.0295, 0.0295}),
+                         planes(0, 0.04, 4, {0.0005})};
+  return solid_of_cells(lines, [lines](int i, int j, int k) {
+    return k == 0 || i == 0 || j == 0 || i + 2 == std::ssize(lines[0]) || j + 2 == std::ssize(lines[1]);
+  });
+}
+
+// A block of 100 x 60 x 40 mm with a closed cavity of 40 x 20 x 20 mm.
+SurfaceMesh block_with_cavity() {
+  const std::array lines{planes(-0.05, 0.05, 10), planes(-0.03, 0.03, 6), planes(0, 0.04, 4)};
+  return solid_of_cells(lines, [](int i, int j, int k) { return i < 3 || i > 6 || j < 2 || j > 3 || k < 1 || k > 2; });
+}
+
+// A block of 60 x 60 x 40 mm, 5 mm beside it one of 30 x 60 x 40 mm, and a crumb of 2 mm.
+SurfaceMesh islands() {
+  SurfaceMesh all;
+  for (const auto& [lower, upper, edge] :
+       {std::tuple(Vector3(-0.05, -0.03, 0), Vector3(0.01, 0.03, 0.04), 0.01),
+        std::tuple(Vector3(0.015, -0.03, 0), Vector3(0.045, 0.03, 0.04), 0.01),
+        std::tuple(Vector3(0.0485, -0.001, 0.019), Vector3(0.0505, 0.001, 0.021), 0.002)}) {
+    const SurfaceMesh block = topology::make_block(lower, upper, edge);
+    const int first = static_cast<int>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), block.vertices.begin(), block.vertices.end());
+    for (const Triangle& triangle : block.triangles)
+      all.triangles.push_back({triangle[0] + first, triangle[1] + first, triangle[2] + first});
+  }
+  return all;
+}
 
 } // namespace
 
@@ -50,11 +157,15 @@ std::optional<std::string> wound_defect(const Wound& wound, double organ_volume)
       return fmt::format("piece of {:.6g} m3 in {} components, recounted {:.6g} m3", wound.pieces[p].volume,
                          wound.pieces[p].components, piece_volumes[p]);
 
-  // Material is held by an outer component: one that encloses something.
+  // Material is held by an outer component: one that encloses something, or a splinter between two sheets, so thin that
+  // its volume is none, which has a face of the organ.
   std::vector<bool> encloses(wound.pieces.size(), false);
   for (const topology::WoundComponent& component : wound.components)
     if (component.volume != 0)
       encloses[component.piece] = true;
+  for (std::size_t t = 0; t < wound.part.size(); ++t)
+    if (wound.part[t] == WoundPart::organ)
+      encloses[wound.piece_of(static_cast<int>(t))] = true;
   if (std::find(encloses.begin(), encloses.end(), false) != encloses.end())
     return "a cavity is counted as a piece of material";
 
@@ -169,6 +280,10 @@ std::vector<FuzzOrgan> fuzz_organs() {
     add_organ("scanned liver", topology::read_surface(file, 0.0337).mesh);
   else
     add_organ("cylinder", topology::make_cylinder(0.04, 0.05, 0.01));
+  add_organ("fissured block", fissured_block());
+  add_organ("thin walls", thin_walls());
+  add_organ("cavity", block_with_cavity());
+  add_organ("islands", islands());
   return organs;
 }
 

@@ -33,7 +33,8 @@ FuzzOutcome cut_fuzz(const FuzzOrgan& organ, int first, int count);
 /// Adds one outcome to another.
 void add(FuzzOutcome& total, const FuzzOutcome& more);
 
-/// make_block, make_liver, and the surface file that SPHERECUT_LIVER_OBJ names (scale 0.0337), a cylinder without.
+/// make_block, make_liver, and the surface file that SPHERECUT_LIVER_OBJ names (scale 0.0337), a cylinder without; a
+/// block with fissures of 0.1 and 1 mm, a box with walls of 0.5 mm, a block with a closed cavity, and three islands.
 std::vector<FuzzOrgan> fuzz_organs();
 
 } // namespace spherecut::experiments

@@ -80,9 +80,13 @@ std::unique_ptr<Discretisation> make_appended(Problem problem, const Discretisat
   require_domain(problem);
   check_problem(problem);
   const int base = base_nodes(problem.nodes);
-  if (uncut == nullptr || !uncut->fits(problem, base))
+  const bool makes = uncut == nullptr || !uncut->fits(problem, base);
+  if (makes)
     uncut = std::make_shared<const UncutBody>(problem, base, uncut_options(problem, options));
-  return std::make_unique<AppendedBody>(std::move(problem), options, uncut);
+  auto body = std::make_unique<AppendedBody>(std::move(problem), options, uncut);
+  if (!makes) // it was there: its factorisation took none of this body's time
+    body->forget_factor_seconds();
+  return body;
 }
 
 AppendedBody::AppendedBody(const Problem& problem, const DiscretisationOptions& options)
@@ -146,6 +150,7 @@ BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown,
     follow(everywhere(problem_));
     throw;
   }
+  forget_factor_seconds();
   BodyGrowth growth;
   growth.update.total_seconds = watch.seconds();
   growth.update.cells_seconds = growth.update.total_seconds;

@@ -26,6 +26,8 @@ class AppendedBody final : public Discretisation, public Growable {
   [[nodiscard]] Method method() const override { return Method::galerkin; }
   [[nodiscard]] const Problem& problem() const override { return problem_; }
   [[nodiscard]] const AssemblyReport& report() const override { return report_; }
+  /// The uncut body was factored before: none of that is time of what is reported next.
+  void forget_factor_seconds() { report_.factor_seconds = 0; }
   [[nodiscard]] const std::shared_ptr<const UncutBody>& uncut() const { return uncut_; }
   [[nodiscard]] const CutSpace& space() const { return *space_; }
   [[nodiscard]] int sphere_count() const override { return uncut_->size(); }

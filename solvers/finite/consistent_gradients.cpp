@@ -2,10 +2,11 @@
 
 #include "solvers/finite/point_kernels.hpp"
 #include "solvers/parallel.hpp"
+#include "topology/disjoint_sets.hpp"
 #include "topology/errors.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -142,18 +143,41 @@ class LeastChange {
   std::vector<int> incident_start_, incident_;
 };
 
-/// The part of each column that no linear function of the nodes' places has.
-void take_linear_away(const std::vector<Vector3>& nodes, NodeVectors& y) {
-  Eigen::Matrix<double, Eigen::Dynamic, 4> linear(y.rows(), 4);
+/// Nodes that groups of points join, piece by piece: a body that is cut apart has several.
+std::vector<std::vector<int>> joined_pieces(const PointTable& table, std::size_t count) {
+  topology::DisjointSets joined(static_cast<int>(count));
+  for (int group = 0; group < table.groups(); ++group) {
+    const std::span<const int> nodes = table.nodes_of(group);
+    for (const int node : nodes)
+      joined.join(node, nodes.front());
+  }
+  std::vector<std::vector<int>> of_root(count), pieces;
+  for (int i = 0; i < static_cast<int>(count); ++i)
+    of_root[joined.find(i)].push_back(i);
+  for (std::vector<int>& piece : of_root)
+    if (!piece.empty())
+      pieces.push_back(std::move(piece));
+  return pieces;
+}
+
+/// The part of each column that no linear function of the places of a piece's nodes has.
+void take_linear_away(const std::vector<Vector3>& nodes, const std::vector<int>& piece, NodeVectors& y) {
+  const auto count = static_cast<Eigen::Index>(piece.size());
+  Eigen::Matrix<double, Eigen::Dynamic, 4> linear(count, 4);
+  NodeVectors here(count, 3);
   Vector3 mean = Vector3::Zero();
-  for (const Vector3& x : nodes)
-    mean += x / static_cast<double>(nodes.size());
-  for (Eigen::Index i = 0; i < y.rows(); ++i)
-    linear.row(i) << 1, (nodes[i] - mean).transpose();
-  for (int c = 0; c < 4; ++c)
-    linear.col(c) /= linear.col(c).norm();
-  const Eigen::Matrix4d gram = linear.transpose() * linear;
-  y -= linear * gram.ldlt().solve(linear.transpose() * y);
+  for (const int node : piece)
+    mean += nodes[node] / static_cast<double>(count);
+  double size = 0;
+  for (const int node : piece)
+    size = std::max(size, (nodes[node] - mean).norm());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    linear.row(i) << 1, (nodes[piece[i]] - mean).transpose() / std::max(size, 1e-300);
+    here.row(i) = y.row(piece[i]);
+  }
+  here -= linear * linear.completeOrthogonalDecomposition().solve(here);
+  for (Eigen::Index i = 0; i < count; ++i)
+    y.row(piece[i]) = here.row(i);
 }
 
 } // namespace
@@ -171,38 +195,55 @@ std::vector<Vector3> surface_integrals(const Spheres& spheres, std::span<const S
   return result;
 }
 
-ConsistencyReport make_consistent(const std::vector<Vector3>& nodes, std::vector<Vector3> boundary, PointTable& table,
-                                  double tolerance, int most_iterations) {
+ConsistencyReport make_consistent(const std::vector<Vector3>& nodes, const std::vector<Vector3>& boundary,
+                                  PointTable& table, double tolerance, int most_iterations) {
   ConsistencyReport report;
   LeastChange change(nodes, table);
   const auto count = static_cast<Eigen::Index>(nodes.size());
   NodeVectors integral(count, 3), target(count, 3);
   change.integrals(integral);
-  // sum_J x_J b_J^T is the volume by the surface; where a curved body's points have another one, theirs counts.
-  double volume = 0;
-  for (int group = 0; group < table.groups(); ++group)
-    for (int lane = 0; lane < table.count[group]; ++lane)
-      volume += table.weights[group].value[lane];
-  Matrix3 first_moment = Matrix3::Zero();
-  for (Eigen::Index i = 0; i < count; ++i) {
+  const std::vector<std::vector<int>> pieces = joined_pieces(table, nodes.size());
+  for (Eigen::Index i = 0; i < count; ++i)
     target.row(i) = boundary[i];
-    first_moment += nodes[i] * boundary[i].transpose();
+  // sum_J x_J b_J^T over a piece is its volume by the surface; where its points have another one, theirs counts.
+  for (const std::vector<int>& piece : pieces) {
+    Matrix3 by_surface = Matrix3::Zero(), by_points = Matrix3::Zero();
+    for (const int node : piece) {
+      by_surface += nodes[node] * boundary[node].transpose();
+      by_points += nodes[node] * integral.row(node);
+    }
+    const double volume = by_points.trace() / 3;
+    if (!(volume > 0))
+      continue;
+    const Matrix3 missing = Matrix3::Identity() - by_surface / volume;
+    for (const int node : piece)
+      target.row(node) += (integral.row(node) * missing).eval();
   }
-  const Matrix3 missing = Matrix3::Identity() - first_moment / volume;
-  target += integral * missing;
   const double size = target.norm();
   NodeVectors residual = target - integral;
-  take_linear_away(nodes, residual);
+  for (const std::vector<int>& piece : pieces)
+    take_linear_away(nodes, piece, residual);
   report.before = residual.norm() / size;
   NodeVectors v = NodeVectors::Zero(count, 3), direction = residual, product(count, 3);
   Eigen::Array3d square = residual.colwise().squaredNorm().transpose();
+  NodeVectors best = v;
+  // Directions that are all but linear on every point's nodes: steps along them would be as large as they are useless.
+  double typical = 0;
+  for (int group = 0; group < table.groups(); ++group)
+    for (int lane = 0; lane < table.count[group]; ++lane)
+      typical += table.weights[group].value[lane] * static_cast<double>(table.nodes_of(group).size());
+  const double least_curvature = 1e-7 * typical / static_cast<double>(count);
+  double least = residual.norm();
   const Eigen::Array3d enough = Eigen::Array3d::Constant(std::pow(tolerance * size, 2));
   while (report.iterations < most_iterations && (square > enough).any()) {
     change.apply(direction, product);
     const Eigen::Array3d curvature = direction.cwiseProduct(product).colwise().sum().transpose();
     Eigen::Array3d step;
     for (int axis = 0; axis < 3; ++axis)
-      step[axis] = curvature[axis] > 0 ? square[axis] / curvature[axis] : 0;
+      step[axis] =
+          curvature[axis] > least_curvature * direction.col(axis).squaredNorm() ? square[axis] / curvature[axis] : 0;
+    if ((step == 0).all()) // what is left no change of the gradients can reach
+      break;
     v += direction * step.matrix().asDiagonal();
     residual -= product * step.matrix().asDiagonal();
     const Eigen::Array3d next = residual.colwise().squaredNorm().transpose();
@@ -212,6 +253,10 @@ ConsistencyReport make_consistent(const std::vector<Vector3>& nodes, std::vector
     direction = residual + direction * ratio.matrix().asDiagonal();
     square = next;
     ++report.iterations;
+    if (std::sqrt(next.sum()) < least) {
+      least = std::sqrt(next.sum());
+      best = v;
+    }
   }
   double all = 0;
   for (int group = 0; group < table.groups(); ++group)
@@ -219,10 +264,14 @@ ConsistencyReport make_consistent(const std::vector<Vector3>& nodes, std::vector
          k < 3 * static_cast<std::size_t>(table.start[group + 1]); ++k)
       for (int lane = 0; lane < table.count[group]; ++lane)
         all += table.weights[group].value[lane] * std::pow(table.gradients[k].value[lane], 2);
-  report.change = std::sqrt(change.add_to(table, v) / all);
+  report.change = std::sqrt(change.add_to(table, best) / all);
   change.integrals(integral);
-  residual = target - integral;
-  report.after = residual.norm() / size;
+  report.after = (target - integral).norm() / size;
+  if (!(report.after < report.before)) { // no help: as they were
+    change.add_to(table, -best);
+    report.after = report.before;
+    report.change = 0;
+  }
   return report;
 }
 

@@ -28,7 +28,7 @@ std::vector<Vector3> surface_integrals(const Spheres& spheres, std::span<const S
 
 /// Makes the gradients of the table consistent with `boundary`, m2, to `tolerance` of its norm or as far as
 /// `most_iterations` go.
-ConsistencyReport make_consistent(const std::vector<Vector3>& nodes, std::vector<Vector3> boundary, PointTable& table,
-                                  double tolerance = 1e-7, int most_iterations = 200);
+ConsistencyReport make_consistent(const std::vector<Vector3>& nodes, const std::vector<Vector3>& boundary,
+                                  PointTable& table, double tolerance = 1e-7, int most_iterations = 200);
 
 } // namespace spherecut::solvers

@@ -14,6 +14,7 @@ constexpr double least_predicted_jacobian = 0.05; // predictions are shortened w
 constexpr int most_trials = 12;                   // of one line search
 constexpr double wanted_decrease = 1e-4;          // of what the slope promises
 constexpr double rounding = 1e-13;                // of an energy
+constexpr double most_extrapolated = 4;           // last steps that are gone once more
 constexpr int most_contact_rounds = 20;           // updates of the forces of contact in a step
 constexpr double floor_of_forces = 1e-8;          // mu h^2 of it: forces below are none
 
@@ -156,7 +157,8 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
 bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
   maps_ = body_.piola_maps(state_.coefficients);
   const double ahead = extrapolation(target);
-  const VectorX prediction = ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
+  const VectorX prediction =
+      ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
   if (contact_) {
     std::vector<double> known = state_.contact_forces;
     if (ahead != 0 && before_.contact_forces.size() == known.size())
@@ -248,7 +250,10 @@ double Equilibrium::extrapolation(const State& target) const {
     return 0;
   const VectorX way = motion(state_, target), last = motion(before_, state_);
   const double along = last.dot(way);
-  return along * along > 0.5 * last.squaredNorm() * way.squaredNorm() ? along / last.squaredNorm() : 0;
+  if (!(along * along > 0.5 * last.squaredNorm() * way.squaredNorm()))
+    return 0;
+  const double times = along / last.squaredNorm();
+  return std::abs(times) < most_extrapolated ? times : 0;
 }
 
 VectorX Equilibrium::predict(const State& target) {

@@ -94,7 +94,7 @@ take_linear(const int* nodes, int count, const LaneValues* gradients, const Vect
   Lanes moments[3][4]{};
   for (int k = 0; k < count; ++k) {
     const Vector3& at = places[nodes[k]];
-    const Lanes in = (g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none) ? one : none;
+    const Lanes in = ((g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none)) ? one : none;
     const Lanes px = in * scale * (at.x() - x), py = in * scale * (at.y() - y), pz = in * scale * (at.z() - z);
     const double* v = vectors + 3 * static_cast<long>(nodes[k]);
     for (int axis = 0; axis < 3; ++axis) {
@@ -116,7 +116,7 @@ take_linear(const int* nodes, int count, const LaneValues* gradients, const Vect
   auto* out = reinterpret_cast<Lanes*>(change);
   for (int k = 0; k < count; ++k) {
     const Vector3& at = places[nodes[k]];
-    const Lanes in = (g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none) ? one : none;
+    const Lanes in = ((g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none)) ? one : none;
     const Lanes px = scale * (at.x() - x), py = scale * (at.y() - y), pz = scale * (at.z() - z);
     const double* v = vectors + 3 * static_cast<long>(nodes[k]);
     for (int axis = 0; axis < 3; ++axis) {

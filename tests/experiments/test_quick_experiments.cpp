@@ -88,7 +88,7 @@ TEST_CASE("Quick liver palpation: the force settles and both methods agree on it
   require_quick_run_passes("liver_palpation");
 }
 
-TEST_CASE("Quick cut fuzz: every kind of blade on three organs") {
+TEST_CASE("Quick cut fuzz: every kind of blade on every organ") {
   require_quick_run_passes("cut_fuzz");
 }
 

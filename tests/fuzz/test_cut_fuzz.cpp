@@ -1,5 +1,5 @@
-// Random and degenerate blades on three organs; SPHERECUT_FUZZ_COUNT blades in all (210), SPHERECUT_FUZZ_FIRST the
-// first.
+// Random and degenerate blades on all organs of cut_fuzz; SPHERECUT_FUZZ_COUNT blades in all (210),
+// SPHERECUT_FUZZ_FIRST the first.
 #include "experiments/cut_fuzz/fuzz.hpp"
 
 #include <catch2/catch.hpp>
@@ -22,8 +22,10 @@ int from_environment(const char* name, int otherwise) {
 TEST_CASE("Random and degenerate blades leave every wound closed, manifold, of the same volume, however it grew") {
   const int count = from_environment("SPHERECUT_FUZZ_COUNT", 210), first = from_environment("SPHERECUT_FUZZ_FIRST", 0);
   FuzzOutcome total;
-  for (const FuzzOrgan& organ : fuzz_organs())
-    add(total, cut_fuzz(organ, first, (count + 2) / 3));
+  const std::vector<FuzzOrgan> organs = fuzz_organs();
+  const int each = (count + static_cast<int>(organs.size()) - 1) / static_cast<int>(organs.size());
+  for (const FuzzOrgan& organ : organs)
+    add(total, cut_fuzz(organ, first, each));
   for (const std::string& failure : total.failures)
     FAIL_CHECK(failure);
   CHECK(total.refused == 0);

@@ -31,8 +31,8 @@ deb)
   for field in 'Depends:.*gnuplot-nox' 'Depends:.*libopenvdb' 'Depends:.*libcholmod' 'Architecture: amd64' 'Version: [0-9.]*$'; do
     dpkg-deb -f "$deb" | grep -q "$field" || fail "the package does not say '$field'"
   done
-  dpkg-deb -x "$deb" "$work/root"
-  usr=$work/root/usr
+  dpkg-deb -x "$deb" "$work/unpacked"
+  usr=$work/unpacked/usr
   for name in include/spherecut/solvers/discretisation.hpp lib/cmake/spherecut/spherecutConfig.cmake lib/libspherecut_app.a \
     share/doc/spherecut/README.md share/doc/spherecut/LICENSE share/doc/spherecut/docs/start.md share/doc/spherecut/examples/python/press_a_liver.py; do
     [ -s "$usr/$name" ] || fail "the package has no /usr/$name"

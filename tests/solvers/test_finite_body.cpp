@@ -3,6 +3,7 @@
 #include "experiments/analytic/finite_strain.hpp"
 #include "experiments/support/finite_block.hpp"
 #include "solvers/parallel.hpp"
+#include "tests/support/cut_block.hpp"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
@@ -189,6 +190,36 @@ TEST_CASE("A ball pressed into a block bears what the base bears and stays outsi
   const EquilibriumStatus released = equilibrium.solve(away);
   CHECK(released.touching == 0);
   CHECK(equilibrium.coefficients().lpNorm<Eigen::Infinity>() < 0.01);
+}
+
+TEST_CASE("A block cut through comes apart without force, one cut in part opens and balances") {
+  for (const bool through : {true, false}) {
+    const tests::CutBlock block = tests::cut_block(6, through, 2);
+    Problem problem = tests::problem_of(block, {1, 0.45, 0});
+    problem.prescribed.clear();
+    for (int i = 0; i < problem.nodes.size(); ++i)
+      if (problem.nodes.kinds[i] != NodeKind::lip && std::abs(problem.nodes.positions[i].z()) > 0.5 - 1e-9)
+        problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+    problem.prescribed_region = [](const Vector3& x, const Vector3& normal) {
+      return std::abs(normal.z()) > 0.5 && std::abs(x.z()) > 0.5 - 1e-9;
+    };
+    const FiniteBody body(problem, experiments::neo_hookean(1, 0.45));
+    CHECK(body.consistency().after < 0.1 * body.consistency().before);
+    Equilibrium equilibrium(body);
+    EquilibriumStatus status;
+    for (const double pull : {0.1, 0.2, 0.3})
+      status = equilibrium.solve(
+          {body.prescribed_values([&](const Vector3& x) { return Vector3(0, 0, x.z() > 0 ? pull : 0); }), 1, {}});
+    const Vector3 top = face_force(body, equilibrium.constraint_forces(), 2, 0.5),
+                  base = face_force(body, equilibrium.constraint_forces(), 2, -0.5);
+    if (through) {
+      CHECK(top.norm() < 1e-6);
+      CHECK(status.least_jacobian == Approx(1).epsilon(1e-3));
+    } else {
+      CHECK(top.z() > 0.2);
+      CHECK((top + base).norm() < 1e-3 * top.norm());
+    }
+  }
 }
 
 TEST_CASE("What has no equilibrium is refused in words and leaves the state as it was") {

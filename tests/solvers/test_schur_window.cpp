@@ -68,9 +68,9 @@ TEST_CASE("Changed, added and removed unknowns give what a system built from scr
   kept[window.slot_of(n - 1)] = 1; // of the contact; the others see what is done ahead
   std::vector<char> more = kept;
   for (const int unknown : {5, 13, n - 2 - far})
-    more[window.slot_of(far + unknown)] = 1;
+    more.at(window.slot_of(far + unknown)) = 1;
   std::vector<char> less = kept;
-  less[window.slot_of(far + 9)] = 0;
+  less.at(window.slot_of(far + 9)) = 0;
   if (ahead == one_stage)
     window.prepare({kept});
   else if (ahead == too_much)

@@ -39,7 +39,7 @@ std::string liver() {
 }
 
 // Eight spacings long, two high, in five seconds; the blade turns into its way as a hand turns it.
-struct Stroke {
+struct WavyStroke {
   static constexpr std::uint64_t ticks = 5000, in = 300; // ms; the blade goes in first
 
   std::mt19937 random;
@@ -48,7 +48,7 @@ struct Stroke {
   int busy;          // ms between two solves, at most
   int level, levels; // of coarsening, at first and in the end
 
-  Stroke(unsigned seed, double fine) : random(seed), spacing(fine) {
+  WavyStroke(unsigned seed, double fine) : random(seed), spacing(fine) {
     waves = between(0.5, 3.5);
     phase = between(0, 2 * std::numbers::pi);
     depth = between(0.003, 0.014);
@@ -92,7 +92,7 @@ Outcome draw(unsigned seed) {
   const Session& session = simulation.session();
   const topology::Domain& domain = *session.organ().domain;
   const double whole = topology::volume(domain.surface());
-  Stroke stroke(seed, 0.006);
+  WavyStroke stroke(seed, 0.006);
   CAPTURE(stroke.depth, stroke.waves, stroke.busy, stroke.level, stroke.levels);
   SurfaceFollower follower;
   std::vector<Eigen::Vector3f> shown;
@@ -106,7 +106,7 @@ Outcome draw(unsigned seed) {
   for (std::size_t i = 0; i <= places; ++i)
     heights.push_back(height(domain, stroke.at(static_cast<double>(i) / places)));
   const auto pose = [&](std::uint64_t tick) {
-    const double t = std::clamp((static_cast<double>(tick) - Stroke::in) / Stroke::ticks, 0.0, 1.0);
+    const double t = std::clamp((static_cast<double>(tick) - WavyStroke::in) / WavyStroke::ticks, 0.0, 1.0);
     const auto place = std::min(static_cast<std::size_t>(t * places), places - 1);
     const double surface = std::lerp(heights[place], heights[place + 1], t * places - static_cast<double>(place));
     const Eigen::Vector2d x = stroke.at(t);
@@ -116,9 +116,9 @@ Outcome draw(unsigned seed) {
       const double turn = std::remainder(std::atan2(step.y(), step.x()) - heading, 2 * std::numbers::pi);
       heading += std::abs(turn) < 1.9 ? turn * (1 - std::exp(-step.norm() / 0.01)) : 0;
     }
-    double up = std::max(0.0, 1 - static_cast<double>(tick) / Stroke::in); // 1: well above
-    if (tick > Stroke::in + Stroke::ticks)
-      up = std::min(1.0, static_cast<double>(tick - Stroke::in - Stroke::ticks) / Stroke::in);
+    double up = std::max(0.0, 1 - static_cast<double>(tick) / WavyStroke::in); // 1: well above
+    if (tick > WavyStroke::in + WavyStroke::ticks)
+      up = std::min(1.0, static_cast<double>(tick - WavyStroke::in - WavyStroke::ticks) / WavyStroke::in);
     device.tick = tick;
     device.time = 1e-3 * static_cast<double>(tick);
     device.position = {x.x(), x.y(), surface - stroke.depth + (stroke.depth + 0.01) * up};
@@ -129,7 +129,7 @@ Outcome draw(unsigned seed) {
   SolveEvent event;
   event.aside = true;
   const double least = session.zone().spacing.fine; // m
-  constexpr std::uint64_t end = Stroke::ticks + 2 * Stroke::in + 3000;
+  constexpr std::uint64_t end = WavyStroke::ticks + 2 * WavyStroke::in + 3000;
   std::uint64_t next = 0;
   for (std::uint64_t tick = 0; tick <= end; ++tick) {
     pose(tick);
@@ -140,7 +140,7 @@ Outcome draw(unsigned seed) {
     next = tick + static_cast<std::uint64_t>(stroke.between(20, stroke.busy));
     event.sequence += 1;
     event.pose_tick = tick;
-    const double share = std::min(1.0, static_cast<double>(tick) / Stroke::ticks);
+    const double share = std::min(1.0, static_cast<double>(tick) / WavyStroke::ticks);
     event.degradation = stroke.level + static_cast<int>(std::lround((stroke.levels - stroke.level) * share));
     event.swaps = session.recondensing() && stroke.between(0, 1) < 0.5;
     const SolveRecord record = solve_recording(simulation, device, event, snapshot);

@@ -1,4 +1,5 @@
 // Thickness of walls and width of gaps, measured by rays from the surface.
+#include "experiments/support/slit_block.hpp"
 #include "topology/organs.hpp"
 #include "topology/surface_widths.hpp"
 
@@ -12,29 +13,12 @@ namespace {
 
 /// A U: two legs of 8 mm that face each other across a slit, on a base.
 SurfaceMesh legs(double slit) {
-  const std::vector<Vector3> outline = {{0, 0, 0},
-                                        {0.016 + slit, 0, 0},
-                                        {0.016 + slit, 0, 0.03},
-                                        {0.008 + slit, 0, 0.03},
-                                        {0.008 + slit, 0, 0.01},
-                                        {0.008, 0, 0.01},
-                                        {0.008, 0, 0.03},
-                                        {0, 0, 0.03}};
-  SurfaceMesh mesh;
-  const int n = static_cast<int>(outline.size());
-  for (const double y : {0.0, 0.02})
-    for (const Vector3& corner : outline)
-      mesh.vertices.emplace_back(corner.x(), y, corner.z());
-  for (const Triangle& t : {Triangle{0, 1, 4}, {0, 4, 5}, {1, 2, 3}, {1, 3, 4}, {0, 5, 6}, {0, 6, 7}}) {
-    mesh.triangles.push_back(t); // seen from y < 0
-    mesh.triangles.push_back({t[0] + n, t[2] + n, t[1] + n});
-  }
-  for (int i = 0; i < n; ++i) {
-    const int next = (i + 1) % n;
-    mesh.triangles.push_back({i, i + n, next + n});
-    mesh.triangles.push_back({i, next + n, next});
-  }
-  return mesh;
+  experiments::SlitBlock block;
+  block.leg = 0.008;
+  block.slit = slit;
+  block.depth = 0.02;
+  block.height = 0.03;
+  return block.surface();
 }
 
 double least_of(const std::vector<WidthSample>& samples) {

@@ -489,7 +489,10 @@ export class Page {
     this.view.drawWhole();
     const { frame, session } = this;
     const force = frame ? `${Math.hypot(...frame.force).toFixed(3)} N, ` : '';
-    savePicture(this.view.canvas, `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);
+    const { canvas } = this.view;
+    const gl = canvas.getContext('webgl2');
+    if (!gl) return;
+    savePicture(gl, canvas.width / Math.max(canvas.clientWidth, 1), `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);
   }
 
   togglePanels(): void {

@@ -1,6 +1,8 @@
-/** Saves a canvas that has just been drawn as a PNG with a line of text below. */
-export function savePicture(picture: HTMLCanvasElement, caption: string): void {
-  const ratio = picture.width / Math.max(picture.clientWidth, 1);
+import { drawnPixels } from './pixels';
+
+/** Saves what has just been drawn with `gl` as a PNG with a line of text below; `ratio`: its pixels per pixel of the page. */
+export function savePicture(gl: WebGL2RenderingContext, ratio: number, caption: string): void {
+  const picture = drawnPixels(gl);
   const foot = Math.round(26 * ratio);
   const canvas = document.createElement('canvas');
   canvas.width = picture.width;
@@ -9,7 +11,7 @@ export function savePicture(picture: HTMLCanvasElement, caption: string): void {
   if (!context) return;
   context.fillStyle = '#151c22';
   context.fillRect(0, 0, canvas.width, canvas.height);
-  context.drawImage(picture, 0, 0);
+  context.putImageData(picture, 0, 0);
   context.fillStyle = '#dbe4ea';
   context.font = `${13 * ratio}px system-ui, 'DejaVu Sans', sans-serif`;
   context.textBaseline = 'middle';

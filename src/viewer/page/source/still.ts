@@ -3,6 +3,7 @@
 // them, so that the tool still goes in behind the surface. Nothing has to be put back into a canvas that the browser clears
 // between two pictures but the depths where the tool is.
 import { Box3, type Camera, Material, Mesh, type Object3D, Vector3, type WebGLRenderer } from 'three';
+import { drawnPixels } from './pixels';
 
 /** A rectangle of the drawn canvas, px from its lower left corner: [left, bottom, right, top]. */
 export type Window = readonly [number, number, number, number];
@@ -18,7 +19,7 @@ export class Still {
 
   constructor(
     private readonly renderer: WebGLRenderer,
-    private readonly canvas: HTMLCanvasElement,
+    canvas: HTMLCanvasElement,
     changed: () => void, // what was kept is gone
   ) {
     this.gl = renderer.getContext() as WebGL2RenderingContext;
@@ -58,10 +59,12 @@ export class Still {
     // Depths are copied between buffers of one format alone; of the canvas's it is not told.
     if (first) this.cannot = gl.getError() !== gl.NO_ERROR;
     if (this.cannot) return false;
-    context.drawImage(this.canvas, 0, 0);
-    // Black is no colour of a picture: while a process that draws is started again nothing is copied, and nobody says so.
-    const [red, green, blue] = context.getImageData(0, 0, 1, 1).data;
-    return red !== 0 || green !== 0 || blue !== 0;
+    const picture = drawnPixels(gl);
+    // Black is no colour of a picture: while a process that draws is started again nothing is read, and nobody says so.
+    const [red, green, blue] = picture.data;
+    if (red === 0 && green === 0 && blue === 0) return false;
+    context.putImageData(picture, 0, 0);
+    return true;
   }
 
   /**

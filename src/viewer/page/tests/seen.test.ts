@@ -1,13 +1,15 @@
 // What a person sees of the page, however the browser draws: node seen.test.mjs BUILD_FOLDER SOURCE_FOLDER
 // Every picture is the one that the browser has composited, ten frames after the last change.
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import test, { after, before } from 'node:test';
 import type { Browser, Page as Tab } from 'playwright-core';
+import { PNG } from 'pngjs';
 import { openBare } from './bare';
 import { block, press, withdraw } from './block';
 import { launch, type Opened, openPage, patience, until } from './browser';
-import { box, frames, organIsSeen, see } from './composited';
+import { box, count, frames, organIsSeen, see } from './composited';
 import { above, ready } from './hand';
 import { serve, type Served } from './server';
 
@@ -130,6 +132,10 @@ test('They are seen again when the process that draws has died', async () => {
     await until(tab, 'the page says that the picture is back', () => /is back/.test(document.getElementById('messages')!.textContent!));
     organIsSeen(await see(tab), 'given back by another process');
     await hovers(tab, 'given back by another process', 2);
+    const [saved] = await Promise.all([tab.waitForEvent('download'), tab.keyboard.press('Enter')]);
+    const { width, height, data } = PNG.sync.read(readFileSync(await saved.path()));
+    const tissue = count({ width, height, ratio: 1, data }, 'tissue');
+    assert.ok(tissue > 0.02 * width * height, `${tissue} px of the organ in a saved picture of ${width} x ${height}`);
   });
 });
 
