@@ -12,11 +12,9 @@
 namespace spherecut::app {
 namespace {
 
-/// Of the spacing: what is left of a share's middle in the tool. Ten times as much takes 7 % of the force at a depth of
-/// a 400th of the spacing.
-constexpr double most_penetration = 1e-4;
-/// Of the acting forces, gravity among them: with ten times as much a small force of contact is not told from what is
-/// left, and its shares do not settle.
+/// Of the spacing: what is left of a share's middle in the tool.
+constexpr double most_penetration = 1e-3;
+/// Of the acting forces, gravity among them: a small force of contact is to be told from what is left.
 constexpr double most_unbalanced = 1e-4;
 
 solvers::EquilibriumOptions equilibrium_options() {

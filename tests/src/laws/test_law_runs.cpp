@@ -2,11 +2,15 @@
 // large, what they refuse, and their bits against threads.
 #include "solvers/elasticity/homogeneous.hpp"
 #include "solvers/parallel.hpp"
+#include "src/finite_model.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 
+#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <sstream>
 
 using namespace spherecut;
@@ -62,6 +66,36 @@ figures = false
   return text;
 }
 
+/// A ball that goes down into the middle of the block's top, and up again on the same way.
+const std::string there_and_back = R"([tool]
+shape = "sphere_tip"
+radius = 0.01
+step = 0.25
+[[tool.path]]
+time = 0
+position = [0, 0, 0.031]
+[[tool.path]]
+time = 1
+position = [0, 0, 0.026]
+[[tool.path]]
+time = 2
+position = [0, 0, 0.031]
+)";
+
+/// The last row of a table, by the names of its columns.
+std::map<std::string, double> last_row(const std::string& table) {
+  std::istringstream lines(table);
+  std::string names, line, last, name, value;
+  std::getline(lines, names);
+  while (std::getline(lines, line))
+    last = line;
+  std::istringstream head(names), row(last);
+  std::map<std::string, double> result;
+  while (std::getline(head, name, ',') && std::getline(row, value, ','))
+    result[name] = std::stod(value);
+  return result;
+}
+
 StepResult last_of(const std::string& text) {
   Session session = session_of(text);
   return run(session).back();
@@ -102,6 +136,47 @@ TEST_CASE("A cube pressed by a quarter has the force of the closed form, the lin
     CHECK(finite.force.z() == Approx(exact).epsilon(0.02));
     CHECK(finite.least_jacobian == Approx(state.gradient.determinant()).epsilon(0.02));
     CHECK(std::abs(last_of(text).force.z() / exact - 1) > 0.08);
+  }
+}
+
+TEST_CASE("The program's table has the force of the closed form at 30 % of compression") {
+  const TemporaryFolder folder;
+  for (const bool confined : {true, false}) {
+    const std::string text = with_law(pressed_cube(confined, 0.006)), name = confined ? "confined" : "free";
+    const std::filesystem::path file = write_file(folder.path() / (name + ".toml"), text);
+    const ProgramResult result = run_spherecut({"run", file.string(), "--out", (folder.path() / name).string()});
+    INFO(name << ": " << result.out << result.err);
+    REQUIRE(result.status == 0);
+    const solvers::LawSpec spec = scenario_of(text).law.spec;
+    const solvers::homogeneous::State state =
+        confined ? solvers::homogeneous::confined(spec, 0.7) : solvers::homogeneous::uniaxial(spec, 0.7);
+    std::map<std::string, double> row = last_row(read_file(folder.path() / name / "forces.csv"));
+    CHECK(row.at("depth_m") == Approx(0.006));
+    CHECK(row.at("force_z_N") == Approx(-state.stress(0, 0) * 0.02 * 0.02).epsilon(0.01));
+    CHECK(row.at("least_jacobian") == Approx(state.gradient.determinant()).epsilon(0.02));
+  }
+}
+
+TEST_CASE("A block of a law gives back what a tool does to it: the way up is the way down") {
+  const std::string block = small_scenario.substr(0, small_scenario.find("[tool]"));
+  Session session = session_of(with_law(block + there_and_back));
+  const std::vector<StepResult> steps = run(session);
+  REQUIRE(steps.size() == 9);
+  const double most = steps[4].force.z();
+  CHECK(most > 0);
+  for (std::size_t k = 1; k < 4; ++k) {
+    CHECK(steps[8 - k].force.z() == Approx(steps[k].force.z()).margin(1e-3 * most));
+    CHECK(steps[8 - k].active_nodes == steps[k].active_nodes);
+  }
+  CHECK(steps.back().force.norm() == 0);
+  CHECK(session.at({0, 0, 0.03}).displacement.norm() < 1e-3 * 0.004);
+}
+
+TEST_CASE("The angle of a deformation is that of its rotation, whatever the stretch") {
+  const Matrix3 stretch = Vector3(0.6, 1.1, 1.7).asDiagonal();
+  for (const double degrees : {0.0, 1e-3, 30.0, 90.0, 179.0}) {
+    const Eigen::AngleAxisd turn(degrees * std::numbers::pi / 180, Vector3(1, 2, -2).normalized());
+    CHECK(rotation_degrees(turn.toRotationMatrix() * stretch) == Approx(degrees).margin(1e-9));
   }
 }
 
