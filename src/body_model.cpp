@@ -70,9 +70,10 @@ solvers::DiscretisationOptions method_of(const Scenario& scenario) {
   return options;
 }
 
+} // namespace
+
 solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                             const BodyModel& model) {
-  require_computed(scenario.file, scenario.law);
   solvers::Problem problem;
   problem.domain = domain;
   problem.incision = model.incision;
@@ -116,8 +117,6 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
   }
   return problem;
 }
-
-} // namespace
 
 bool cut_appends(const Scenario& scenario) {
   return scenario.method.method == solvers::Method::galerkin && scenario.cut.sight == solvers::SightRule::appended;
@@ -270,6 +269,7 @@ bool window_pays(const Scenario& scenario, const solvers::Problem& problem, cons
 
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
               const topology::SurfaceMesh& way_ahead, const std::vector<int>& candidates) {
+  require_linear(scenario.file, scenario.law);
   const solvers::DiscretisationOptions options = method_of(scenario);
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
   solvers::Problem problem = problem_of(scenario, domain, model);

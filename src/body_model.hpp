@@ -92,6 +92,10 @@ std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domai
 solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Domain& domain,
                                     const solvers::SprinkleOptions& options, const solvers::NodeCloud& previous);
 
+/// What a body on the nodes and the incision of a model is made of: regions held and loads, as the scenario has them.
+solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                            const BodyModel& model);
+
 /// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead the body
 /// is one that can follow it. Throws as solvers::discretise does.
 void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,

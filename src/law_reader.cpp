@@ -118,25 +118,22 @@ std::string law_text(const LawSettings& law) {
     text += fmt::format("\n  these hold of a sudden strain; after a long time E = {:.4g} Pa, nu = {:.4g}",
                         lasting.young_modulus(), lasting.poisson_ratio());
   }
-  if (!is_computed(law))
-    text += "\n  a run of it is refused; one is possible with law = \"linear\" and without material.prony";
   return text;
 }
 
-bool is_computed(const LawSettings& law) {
-  return std::holds_alternative<solvers::LinearLaw>(law.spec.law) && law.spec.prony.empty();
+bool is_nonlinear(const LawSettings& law) {
+  return !std::holds_alternative<solvers::LinearLaw>(law.spec.law);
 }
 
-void require_computed(const std::filesystem::path& file, const LawSettings& law) {
-  if (is_computed(law))
-    return;
-  const bool linear = std::holds_alternative<solvers::LinearLaw>(law.spec.law);
-  const std::string what =
-      linear ? "material.prony" : fmt::format("material.law = \"{}\"", solvers::law_name(law.spec));
-  throw InputError(
-      fmt::format("{}:{}: {}: it can be checked, but bodies are computed with the linear elastic law alone; "
-                  "possible: material.law = \"linear\" without material.prony",
-                  file.string(), law.line, what));
+void require_linear(const std::filesystem::path& file, const LawSettings& law) {
+  if (is_nonlinear(law))
+    throw InputError(fmt::format("{}:{}: material.law = \"{}\": runs off line alone compute it; possible here: "
+                                 "material.law = \"linear\" without material.prony",
+                                 file.string(), law.line, solvers::law_name(law.spec)));
+  if (!law.spec.prony.empty())
+    throw InputError(fmt::format("{}:{}: material.prony: it can be checked, but no body is computed with it; possible: "
+                                 "a material without it",
+                                 file.string(), law.line));
 }
 
 } // namespace spherecut::app

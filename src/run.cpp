@@ -40,9 +40,14 @@ std::string findings_text(const Session& session, const RunOutput& output, const
                           (peak.force - peak.tangential).norm(), along);
     text += fmt::format("  on the tool [{:.4g}, {:.4g}, {:.4g}] N; contact radius {:.3g} mm, {} nodes in contact\n",
                         peak.force.x(), peak.force.y(), peak.force.z(), 1e3 * peak.contact_radius, peak.active_nodes);
-    text += fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
-                        solvers::to_string(session.scenario().method.method),
-                        session.body()->report().condition_estimate, found.largest_residual);
+    text += session.body() == nullptr
+                ? fmt::format("  {} nodes, law {}, {} iterations a step, least volume ratio {:.3g}, largest residual "
+                              "{:.1e}\n",
+                              peak.nodes, solvers::law_name(session.scenario().law.spec), median(found.iterations),
+                              found.least_jacobian, found.largest_residual)
+                : fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
+                              solvers::to_string(session.scenario().method.method),
+                              session.body()->report().condition_estimate, found.largest_residual);
   } else if (session.scenario().tool) {
     text += fmt::format("no contact: the force is zero in all {} steps\n", found.steps);
   }
@@ -190,7 +195,7 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
   Scenario scenario = read_scenario(file);
-  require_computed(scenario.file, scenario.law);
+  require_run(scenario);
   FolderClaim claim(out);
   Session session(std::move(scenario), say);
   say(short_text(session));
@@ -244,10 +249,17 @@ void check_scenario(const std::filesystem::path& file, const std::filesystem::pa
   say(short_text(session));
   say(walls_text(session.walls()));
   say(law_text(session.scenario().law));
+  if (!can_run(session.scenario()))
+    try {
+      require_run(session.scenario());
+    } catch (const InputError& error) {
+      say(fmt::format("a run of it is refused: {}", error.what()));
+    }
   if (session.computes()) {
     say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
-    say(estimate_text(session));
+    if (!is_nonlinear(session.scenario().law)) // measured on linear bodies
+      say(estimate_text(session));
   }
   say(fmt::format("{}: good, {} step{}", file.string(), session.steps().size(),
                   session.steps().size() == 1 ? "" : "s"));

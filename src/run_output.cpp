@@ -1,5 +1,6 @@
 #include "src/run_output.hpp"
 
+#include "src/law_reader.hpp"
 #include "src/summary.hpp"
 #include "src/tear_output.hpp"
 #include "topology/errors.hpp"
@@ -13,22 +14,23 @@
 namespace spherecut::app {
 namespace {
 
-constexpr std::string_view force_columns =
+constexpr std::string_view force_columns = // followed by least_jacobian where the law is not linear
     "time_s,tool_x_m,tool_y_m,tool_z_m,axis_x,axis_y,axis_z,force_x_N,force_y_N,force_z_N,force_N,contact_x_m,"
     "contact_y_m,contact_z_m,depth_m,contact_radius_m,active_nodes,candidate_nodes,nodes,iterations,converged,residual,"
     "penetration_m,rotation_deg,resprinkled,force_jump,seconds,normal_x_N,normal_y_N,normal_z_N,normal_N,"
-    "tangential_x_N,tangential_y_N,tangential_z_N,tangential_N\n";
+    "tangential_x_N,tangential_y_N,tangential_z_N,tangential_N";
 
-std::string force_row(const StepResult& s) {
+std::string force_row(const StepResult& s, bool is_nonlinear) {
   const auto vector = [](const Vector3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z()); };
   const Vector3 normal = s.force - s.tangential;
   return fmt::format("{:.9g},{},{},{},{:.9g},{},{:.9g},{:.9g},{},{},{},{},{},{:.3e},{:.3e},{:.4g},{},{:.4g},{:.4g},"
-                     "{},{:.9g},{},{:.9g}\n",
+                     "{},{:.9g},{},{:.9g}{}\n",
                      s.time, vector(s.pose.point), vector(s.pose.axis), vector(s.force), s.force.norm(),
                      vector(s.contact.point), s.contact.depth, s.contact_radius, s.active_nodes, s.candidates, s.nodes,
                      s.iterations, s.converged ? 1 : 0, s.residual, s.largest_penetration, s.rotation_degrees,
                      s.resprinkled ? 1 : 0, s.force_jump, s.seconds, vector(normal), normal.norm(),
-                     vector(s.tangential), s.tangential.norm());
+                     vector(s.tangential), s.tangential.norm(),
+                     is_nonlinear ? fmt::format(",{:.6g}", s.least_jacobian) : "");
 }
 
 struct SampledField {
@@ -85,6 +87,14 @@ constexpr double open_account = 0.25; // of what a run's tears have spent; a fif
 
 } // namespace
 
+int median(std::vector<int> values) {
+  if (values.empty())
+    return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : folder_(std::move(folder)) {
   findings_.planned = session.steps().size();
   const auto open = [this](std::optional<OutputFile>& file, const std::string& name, std::string_view columns) {
@@ -94,7 +104,8 @@ RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : fol
     rows_[name] = 0;
   };
   if (session.scenario().tool)
-    open(forces_, "forces.csv", force_columns);
+    open(forces_, "forces.csv",
+         fmt::format("{}{}\n", force_columns, is_nonlinear(session.scenario().law) ? ",least_jacobian" : ""));
   if (session.cuts())
     open(cuts_, "cuts.csv", cut_columns());
   if (session.tears())
@@ -108,7 +119,7 @@ void RunOutput::add_row(OutputFile& file, const std::string& name, const std::st
 
 void RunOutput::add(const Session& session, const StepResult& step) {
   if (forces_)
-    add_row(*forces_, "forces.csv", force_row(step));
+    add_row(*forces_, "forces.csv", force_row(step, is_nonlinear(session.scenario().law)));
   if (step.cut) {
     add_row(*cuts_, "cuts.csv", cut_row(step.time, *step.cut));
     const int before = findings_.steps == 0 ? 1 : findings_.cut.pieces;
@@ -138,6 +149,9 @@ void RunOutput::add(const Session& session, const StepResult& step) {
   findings_.self_penetration = std::max(findings_.self_penetration, step.self_penetration);
   findings_.largest_residual = std::max(findings_.largest_residual, step.residual);
   findings_.largest_rotation_degrees = std::max(findings_.largest_rotation_degrees, step.rotation_degrees);
+  if (step.iterations > 0)
+    findings_.iterations.push_back(step.iterations);
+  findings_.least_jacobian = std::min(findings_.least_jacobian, step.least_jacobian);
   if (step.resprinkled)
     findings_.resprinkles.emplace_back(step.time, step.force_jump);
   if (step.force.norm() > 0)

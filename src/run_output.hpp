@@ -21,6 +21,8 @@ struct RunFindings {
   bool touched = false;    // a force was felt
   StepResult peak;         // step of the largest force
   double largest_residual = 0, largest_rotation_degrees = 0;
+  std::vector<int> iterations;                        // of the steps of a body at finite strain that took any
+  double least_jacobian = 1;                          // of these
   std::vector<std::pair<double, double>> resprinkles; // time, relative jump of the force
   CutReport cut;                                      // of the last step
   double largest_opening = 0;                         // m
@@ -43,6 +45,9 @@ struct RunFindings {
   };
   std::vector<PieceCheck> piece_checks;
 };
+
+/// Middle of the values, the upper one of two; 0 of none.
+int median(std::vector<int> values);
 
 class RunOutput {
  public:

@@ -83,8 +83,8 @@ constexpr std::array keys = {
         choice,
         "",
         "\"linear\"",
-        "Law of the material: small strain, or one of finite strain. All of them are read and checked, and check "
-        "tells their moduli; bodies are computed with linear alone.",
+        "Law of the material: small strain, or one of finite strain. check tells its moduli; run computes all of them, "
+        "those of finite strain for a tool that presses without friction.",
         {},
         "linear, neo_hookean, yeoh, ogden, holzapfel_gasser_ogden"},
     ScenarioKey{"material.young_modulus", number, "Pa", "required",

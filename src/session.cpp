@@ -56,6 +56,8 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
     : scenario_(std::move(scenario)), say_(std::move(say)), organ_(timed_organ(scenario_.organ, profile_.organ)),
       query_(organ_.domain->surface()) {
   interruption_point();
+  if (leader == Leader::device)
+    require_linear(scenario_.file, scenario_.law);
   use_one_blas_thread();
   for (const std::string& remark : organ_.remarks)
     warn(remark, remark);
@@ -69,7 +71,8 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
   steps_ = schedule(scenario_, motion, zone_.spacing.fine, sheet_edge(zone_), topology::SweepOptions{}.most_triangles);
   if (scenario_.method.method == solvers::Method::published)
     warn("published", "the published scheme does not converge and its force is not one in newtons: see docs");
-  if (scenario_.method.method == solvers::Method::galerkin && scenario_.material.poisson_ratio > stiffest_galerkin)
+  if (scenario_.method.method == solvers::Method::galerkin && !is_nonlinear(scenario_.law) &&
+      scenario_.material.poisson_ratio > stiffest_galerkin)
     warn("locking",
          fmt::format("method galerkin has no pressure of its own: at poisson_ratio = {:g}, above {:g}, it is "
                      "too stiff, by some percent at usual spacings; collocation is not",
@@ -121,14 +124,19 @@ void Session::approach_hanging() {
   const bool is_loaded = scenario_.gravity || !scenario_.pretension.isZero() ||
                          std::any_of(scenario_.precuts.begin(), scenario_.precuts.end(),
                                      [](const PrecutSettings& precut) { return precut.pressure != 0; });
-  if (!is_loaded || !is_computed(scenario_.law) || !touch_ || !std::holds_alternative<Approach>(scenario_.tool->motion))
+  if (!is_loaded || !can_run(scenario_) || !touch_ || !std::holds_alternative<Approach>(scenario_.tool->motion))
     return;
-  assemble(model_, {}, candidates(model_));
-  app::condense({}, model_);
-  solve_contact(nullptr, nullptr, scenario_, model_);
+  if (is_nonlinear(scenario_.law)) {
+    make_finite();
+    static_cast<void>(solve_finite(steps_.front().time, std::nullopt));
+  } else {
+    assemble(model_, {}, candidates(model_));
+    app::condense({}, model_);
+    solve_contact(nullptr, nullptr, scenario_, model_);
+  }
   topology::SurfaceMesh hanging = organ_.domain->surface();
   for (Vector3& x : hanging.vertices)
-    x += model_.at(x).displacement;
+    x += at(x).displacement;
   model_.state.reset();
   seen_hanging_ = true;
   std::vector<ToolSample> motion;
@@ -153,7 +161,8 @@ std::optional<FirstTouch> Session::find_touch(const std::vector<ToolSample>& mot
 // Fine at the contact, at the fronts of the precuts, and where the blade is going to cut.
 void Session::lay_out_zone() {
   if (zone_contact_)
-    zone_.spacing.centres = {zone_contact_->point};
+    zone_.spacing.centres =
+        is_nonlinear(scenario_.law) ? places_of_contact() : std::vector<Vector3>{zone_contact_->point};
   if (scenario_.blade)
     tracks_ = blade_tracks(*scenario_.blade, *organ_.domain, 2 * zone_.spacing.fine);
   zone_.spacing.segments = model_.incision != nullptr ? fine_segments(*model_.incision) : tracks_;
@@ -237,6 +246,11 @@ StepResult Session::step(const StepSample& sample) {
     result.pose = *sample.tool;
     result.contact = find_contact(*sample.tool);
     last_contact_ = result.contact;
+  }
+  if (is_nonlinear(scenario_.law)) {
+    step_finite(sample, result);
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return result;
   }
   if (cuts())
     result.cut = aside_cut_.value_or(CutReport{});
@@ -323,6 +337,11 @@ std::optional<solvers::GripMemory> Session::remembered_grip() const {
 }
 
 void Session::prepare(const StepSample& sample) {
+  if (is_nonlinear(scenario_.law)) {
+    if (computes() && finite_ == nullptr)
+      make_finite();
+    return;
+  }
   if (!computes() || (model_.body != nullptr && !std::exchange(seen_hanging_, false)))
     return;
   if (sample.tool)
@@ -539,7 +558,13 @@ void Session::evaluate(StepResult& result) {
                      is_open ? "cut.lips = \"open\" leaves the contact of its parts out"
                              : "its parts push on one another from node to node, and the nodes do not tell it finer"));
   }
-  // Where that deep a tip touches one or two nodes, its force is that of these nodes' places.
+  judge_fineness(result);
+  if (!model_.state->lips.converged)
+    warn("lips", fmt::format("the contact of the lips did not converge at t = {:g} s", result.time));
+}
+
+// Where that deep a tip touches one or two nodes, its force is that of these nodes' places.
+void Session::judge_fineness(const StepResult& result) {
   const double depth = touch_ ? depth_of_press(result.contact) : 0;
   if (touch_ && !scenario_.tool->grasp && result.active_nodes < few_in_contact &&
       (result.active_nodes > 0 || model_.incision == nullptr) &&
@@ -550,8 +575,16 @@ void Session::evaluate(StepResult& result) {
                      "make them finer",
                      depth, result.time, result.active_nodes, zone_.spacing.fine,
                      topology::tip_radius(scenario_.tool->shape)));
-  if (!model_.state->lips.converged)
-    warn("lips", fmt::format("the contact of the lips did not converge at t = {:g} s", result.time));
+}
+
+solvers::PointState Session::at(const Vector3& x) const {
+  if (finite_ == nullptr)
+    return model_.at(x);
+  try {
+    return finite_->at(x);
+  } catch (const InputError&) {
+    return finite_->at(model_.sprinkling.nodes.positions[model_.nearest_seen(x)]);
+  }
 }
 
 void Session::evaluate_nodes(StepResult& result) {

@@ -5,6 +5,7 @@
 
 #include "src/blade_force.hpp"
 #include "src/cut_report.hpp"
+#include "src/finite_model.hpp"
 #include "src/incision_builder.hpp"
 #include "src/node_zone.hpp"
 #include "src/organ_walls.hpp"
@@ -42,6 +43,7 @@ struct StepResult {
   double largest_penetration = 0; // m, deepest that the deformed surface lies in the tool
   double self_penetration = 0;    // m, deepest that it reaches through itself, from node to node
   double rotation_degrees = 0;    // largest rotation of the tissue
+  double least_jacobian = 1;      // least volume ratio of a body at finite strain
   bool resprinkled = false;       // the fine zone has followed the tool
   double force_jump = 0;          // |force after - before| / |force before| at the re-sprinkle
   Rebuild rebuild = Rebuild::none;
@@ -116,7 +118,7 @@ class Session {
   [[nodiscard]] const solvers::Sprinkling& sprinkling() const { return model_.sprinkling; }
   [[nodiscard]] const FineZone& zone() const { return zone_; }
   [[nodiscard]] const OrganWalls& walls() const { return walls_; }
-  /// Null before the first step that needs it.
+  /// Null before the first step that needs it, and where the law is not linear.
   [[nodiscard]] const solvers::Discretisation* body() const { return model_.body.get(); }
   /// Solution of the last step.
   [[nodiscard]] const solvers::Field& field() const { return model_.field; }
@@ -185,7 +187,7 @@ class Session {
     return !cuts() ? nullptr : shown_wound_ ? &*shown_wound_ : &incisions_->wound();
   }
   /// Displacement and stress at a point of the body in the last step; at rest before the first.
-  [[nodiscard]] solvers::PointState at(const Vector3& x) const { return model_.at(x); }
+  [[nodiscard]] solvers::PointState at(const Vector3& x) const;
   /// Displacement, gradient and stress at every node in the last step.
   [[nodiscard]] const std::vector<solvers::PointState>& node_states() const { return node_states_; }
   [[nodiscard]] const SessionProfile& profile() const { return profile_; }
@@ -320,6 +322,12 @@ class Session {
   [[nodiscard]] double depth_of_press(const topology::SurfaceContact& contact) const;
   void evaluate(StepResult& result);
   void evaluate_nodes(StepResult& result);
+  void judge_fineness(const StepResult& result);
+  [[nodiscard]] std::vector<Vector3> places_of_contact() const;
+  void make_finite();
+  FiniteStep solve_finite(double time, const std::optional<topology::ToolPose>& pose);
+  void step_finite(const StepSample& sample, StepResult& result);
+  void watch_banks(StepResult& result);
   void warn(const std::string& key, const std::string& text);
 
   /// A body that follows the tool or a cut, made on a thread of its own.
@@ -381,6 +389,8 @@ class Session {
   std::optional<topology::SurfaceContact> first_zone_;   // the first of these
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
   BodyModel model_;
+  std::unique_ptr<FiniteModel> finite_;         // in place of the body of model_; null: the law is linear, or not yet
+  std::optional<topology::ToolPose> free_pose_; // of the tool before it touched
   std::unique_ptr<BladeForce> blade_force_;     // null: nothing resists the blade
   std::optional<IncisionBuilder::Mark> mark_;   // the cut without the blade's proposal
   std::optional<topology::Wound> shown_wound_;  // of the body while the cut is ahead of it; empty: that of the cut

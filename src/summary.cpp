@@ -1,8 +1,10 @@
 #include "src/summary.hpp"
 
 #include "src/blade_account.hpp"
+#include "src/law_reader.hpp"
 #include "src/version.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -92,6 +94,13 @@ OrderedJson solver(const Session& session, const RunFindings& findings) {
     out["worst_moment_condition"] = report.worst_moment_condition;
     out["grown_supports"] = report.grown_supports;
   }
+  if (is_nonlinear(session.scenario().law))
+    out["finite_strain"] = {
+        {"law", solvers::law_name(session.scenario().law.spec)},
+        {"median_iterations", median(findings.iterations)},
+        {"most_iterations",
+         findings.iterations.empty() ? 0 : *std::max_element(findings.iterations.begin(), findings.iterations.end())},
+        {"least_jacobian", findings.least_jacobian}};
   out["resprinkles"] = OrderedJson::array();
   for (const auto& [time, jump] : findings.resprinkles)
     out["resprinkles"].push_back({{"time_s", time}, {"force_jump", jump}});

@@ -16,7 +16,15 @@ constexpr double wanted_decrease = 1e-4;          // of what the slope promises
 constexpr double rounding = 1e-13;                // of an energy
 constexpr double most_extrapolated = 4;           // last steps that are gone once more
 constexpr int most_contact_rounds = 20;           // updates of the forces of contact in a step
+constexpr int most_newton_iterations = 30;        // of one round
+constexpr int most_times = 20;                    // the iterations of a round, before a solve gives up
+constexpr int most_factorisations = 200;          // before a solve gives up
 constexpr double floor_of_forces = 1e-8;          // mu h^2 of it: forces below are none
+
+/// Whether a solve has taken all that it may.
+bool is_spent(const EquilibriumStatus& status, const EquilibriumOptions& options) {
+  return status.iterations > most_times * options.maximum_iterations || status.factorisations > most_factorisations;
+}
 
 } // namespace
 
@@ -144,6 +152,8 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
 }
 
 bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& status) {
+  if (is_spent(status, options_))
+    return false;
   if (step(target, options_.method, status))
     return true;
   if (halvings > 0 && motion(state_, target).norm() > 0) {
@@ -178,11 +188,13 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     return false;
   bool converged = iterate(target, method, now, status);
   for (int round = 0; converged && contact_ && target.tool && contact_->deepest() > options_.penetration; ++round) {
-    if (round == most_contact_rounds)
+    if (round == most_contact_rounds) {
       converged = false;
+      break;
+    }
     contact_->accept_forces();
     evaluate(now.coefficients, target, now, status);
-    converged = converged && iterate(target, method, now, status);
+    converged = iterate(target, method, now, status);
   }
   last_residual_ = status.residual;
   if (!converged)
@@ -317,12 +329,13 @@ VectorX Equilibrium::newton_direction(const Trial& now, EquilibriumStatus& statu
 bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
   Trial next;
   const bool quasi = method == FiniteMethod::quasi_newton;
+  const int most = quasi ? options_.maximum_iterations : std::min(options_.maximum_iterations, most_newton_iterations);
   for (int iteration = 0;; ++iteration) {
     const double norm = now.residual.norm();
     status.residual = norm / now.acting;
     if (status.residual < options_.tolerance)
       return true;
-    if (iteration == options_.maximum_iterations)
+    if (iteration == most || is_spent(status, options_))
       return false;
     ++status.iterations;
     VectorX direction;

@@ -147,7 +147,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   if (!(command.duration > 0) || command.duration > 1e5)
     throw InputError(fmt::format("--duration {:g} s: allowed: above 0, at most 1e5", command.duration));
   const Scenario scenario = read_scenario(command.scenario);
-  require_computed(scenario.file, scenario.law);
+  require_linear(scenario.file, scenario.law);
   const HapticSettings& settings = scenario.haptics;
   if (command.in_virtual_time && settings.device == HeldDevice::bridge)
     throw InputError("haptics.device = \"bridge\" cannot follow virtual time; allowed: without --virtual");

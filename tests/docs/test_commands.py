@@ -58,7 +58,7 @@ HOW = [
     (r"python3 -m venv --system-site-packages env && \. env/bin/activate", "run_short",
      {"--system-site-packages": "--system-site-packages --without-pip"}),
     (rf"{S} experiment run \w+(?: --out DIR)?(?: \[--quick\])?", "parse"),
-    (rf"{S} run scenarios/\w+\.toml(?: --out (?:DIR|out/demo))?", "parse"),
+    (rf"{S} run scenarios/\w+\.toml(?: --out (?:DIR|out/(?:demo|soft)))?", "parse"),
     (rf"{S} run /usr/share/spherecut/scenarios/liver_cut\.toml --out out/demo", "parse"),
     (rf"{S} serve(?: --open)?", "parse"),
     (rf"{S} serve \[SCENARIO\.toml\].*", "parse"),

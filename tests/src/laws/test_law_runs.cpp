@@ -1,0 +1,267 @@
+// Runs whose law is not linear: against the linear run where strains are small, against closed forms where they are
+// large, what they refuse, and their bits against threads.
+#include "solvers/elasticity/homogeneous.hpp"
+#include "solvers/parallel.hpp"
+#include "src/finite_model.hpp"
+#include "tests/src/scenario_session.hpp"
+#include "tests/src/scenario_text.hpp"
+
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+using Catch::Contains;
+
+namespace {
+
+const std::string law = "law = \"neo_hookean\"\n";
+
+std::string with_law(const std::string& text) {
+  return replaced(text, "[material]\n", "[material]\n" + law);
+}
+
+/// A cube of 20 mm on rollers at its base, its sides free or on rollers too, under a punch wider than it.
+std::string pressed_cube(bool confined, double depth) {
+  std::string text = fmt::format(R"([organ]
+shape = "block"
+size = [0.02, 0.02, 0.02]
+edge = 0.004
+[material]
+young_modulus = 1e4
+poisson_ratio = 0.3
+[[fixed]]
+region = "half_space"
+point = [0, 0, 1e-6]
+normal = [0, 0, 1]
+axes = ["z"]
+[nodes]
+fine_spacing = 0.004
+coarse_spacing = 0.004
+[tool]
+shape = "flat_punch"
+radius = 0.03
+step = 0.25
+[tool.approach]
+target = [0, 0, 0.02]
+direction = [0, 0, -1]
+depth = {}
+clearance = 0.0005
+[output]
+figures = false
+)",
+                                 depth);
+  for (const double side : {-1.0, 1.0})
+    for (const int axis : {0, 1})
+      if (confined || side < 0)
+        text += fmt::format("[[fixed]]\nregion = \"half_space\"\npoint = [{0}, {1}, 0]\nnormal = [{2}, {3}, "
+                            "0]\naxes = [\"{4}\"]\n",
+                            axis == 0 ? side * 0.009999 : 0, axis == 1 ? side * 0.009999 : 0, axis == 0 ? -side : 0,
+                            axis == 1 ? -side : 0, axis == 0 ? "x" : "y");
+  return text;
+}
+
+/// A ball that goes down into the middle of the block's top, and up again on the same way.
+const std::string there_and_back = R"([tool]
+shape = "sphere_tip"
+radius = 0.01
+step = 0.25
+[[tool.path]]
+time = 0
+position = [0, 0, 0.031]
+[[tool.path]]
+time = 1
+position = [0, 0, 0.026]
+[[tool.path]]
+time = 2
+position = [0, 0, 0.031]
+)";
+
+/// The last row of a table, by the names of its columns.
+std::map<std::string, double> last_row(const std::string& table) {
+  std::istringstream lines(table);
+  std::string names, line, last, name, value;
+  std::getline(lines, names);
+  while (std::getline(lines, line))
+    last = line;
+  std::istringstream head(names), row(last);
+  std::map<std::string, double> result;
+  while (std::getline(head, name, ',') && std::getline(row, value, ','))
+    result[name] = std::stod(value);
+  return result;
+}
+
+StepResult last_of(const std::string& text) {
+  Session session = session_of(text);
+  return run(session).back();
+}
+
+} // namespace
+
+TEST_CASE("At small depth a neo-Hookean block resists a ball as the linear one does, on the same nodes") {
+  // A wide ball and fine nodes: several of them touch. Gradients and quadrature differ from those of the linear body.
+  const std::string text = replaced(replaced(replaced(small_scenario, "depth = 0.002", "depth = 0.0001"),
+                                             "fine_spacing = 0.004", "fine_spacing = 0.002"),
+                                    "radius = 0.01\nstep", "radius = 0.1\nstep");
+  Session linear = session_of(text), finite = session_of(with_law(text));
+  REQUIRE(linear.sprinkling().nodes.positions == finite.sprinkling().nodes.positions);
+  const StepResult a = run(linear).back(), b = run(finite).back();
+  REQUIRE(a.force.z() > 0);
+  CHECK(b.force.z() == Approx(a.force.z()).epsilon(0.01));
+  CHECK(a.active_nodes > 5);
+  CHECK(b.active_nodes == a.active_nodes);
+  CHECK(b.residual < 1e-4);
+  CHECK(b.least_jacobian < 1);
+  CHECK(finite.warnings().empty());
+  // Displacement and stress under the tip.
+  const Vector3 below(0, 0, 0.026);
+  CHECK((finite.at(below).displacement - linear.at(below).displacement).norm() <
+        0.02 * linear.at(below).displacement.norm());
+}
+
+TEST_CASE("A cube pressed by a quarter has the force of the closed form, the linear law does not") {
+  const solvers::LawSpec spec = scenario_of(with_law(pressed_cube(true, 0.005))).law.spec;
+  for (const bool confined : {true, false}) {
+    INFO((confined ? "confined" : "free"));
+    const std::string text = pressed_cube(confined, 0.005);
+    const solvers::homogeneous::State state =
+        confined ? solvers::homogeneous::confined(spec, 0.75) : solvers::homogeneous::uniaxial(spec, 0.75);
+    const double exact = -state.stress(0, 0) * 0.02 * 0.02;
+    const StepResult finite = last_of(with_law(text));
+    CHECK(finite.force.z() == Approx(exact).epsilon(0.02));
+    CHECK(finite.least_jacobian == Approx(state.gradient.determinant()).epsilon(0.02));
+    CHECK(std::abs(last_of(text).force.z() / exact - 1) > 0.08);
+  }
+}
+
+TEST_CASE("The program's table has the force of the closed form at 30 % of compression") {
+  const TemporaryFolder folder;
+  for (const bool confined : {true, false}) {
+    const std::string text = with_law(pressed_cube(confined, 0.006)), name = confined ? "confined" : "free";
+    const std::filesystem::path file = write_file(folder.path() / (name + ".toml"), text);
+    const ProgramResult result = run_spherecut({"run", file.string(), "--out", (folder.path() / name).string()});
+    INFO(name << ": " << result.out << result.err);
+    REQUIRE(result.status == 0);
+    const solvers::LawSpec spec = scenario_of(text).law.spec;
+    const solvers::homogeneous::State state =
+        confined ? solvers::homogeneous::confined(spec, 0.7) : solvers::homogeneous::uniaxial(spec, 0.7);
+    std::map<std::string, double> row = last_row(read_file(folder.path() / name / "forces.csv"));
+    CHECK(row.at("depth_m") == Approx(0.006));
+    CHECK(row.at("force_z_N") == Approx(-state.stress(0, 0) * 0.02 * 0.02).epsilon(0.01));
+    CHECK(row.at("least_jacobian") == Approx(state.gradient.determinant()).epsilon(0.02));
+  }
+}
+
+TEST_CASE("A block of a law gives back what a tool does to it: the way up is the way down") {
+  const std::string block = small_scenario.substr(0, small_scenario.find("[tool]"));
+  Session session = session_of(with_law(block + there_and_back));
+  const std::vector<StepResult> steps = run(session);
+  REQUIRE(steps.size() == 9);
+  const double most = steps[4].force.z();
+  CHECK(most > 0);
+  for (std::size_t k = 1; k < 4; ++k) {
+    CHECK(steps[8 - k].force.z() == Approx(steps[k].force.z()).margin(1e-3 * most));
+    CHECK(steps[8 - k].active_nodes == steps[k].active_nodes);
+  }
+  CHECK(steps.back().force.norm() == 0);
+  CHECK(session.at({0, 0, 0.03}).displacement.norm() < 1e-3 * 0.004);
+}
+
+TEST_CASE("The angle of a deformation is that of its rotation, whatever the stretch") {
+  const Matrix3 stretch = Vector3(0.6, 1.1, 1.7).asDiagonal();
+  for (const double degrees : {0.0, 1e-3, 30.0, 90.0, 179.0}) {
+    const Eigen::AngleAxisd turn(degrees * std::numbers::pi / 180, Vector3(1, 2, -2).normalized());
+    CHECK(rotation_degrees(turn.toRotationMatrix() * stretch) == Approx(degrees).margin(1e-9));
+  }
+}
+
+TEST_CASE("A neo-Hookean block hangs by its weight from the tool's way on") {
+  const std::string text =
+      replaced(with_law(small_scenario), "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\ndensity = 1000\n") +
+      "[gravity]\nacceleration = [0, 0, -9.81]\n";
+  Session session = session_of(text);
+  const std::vector<StepResult> results = run(session);
+  const Vector3 top(0.02, 0.02, 0.03);
+  CHECK(session.at(top).displacement.z() < 0);
+  CHECK(results.front().force.norm() == 0); // the way counts from the sagged surface
+  CHECK(results.back().force.z() > 0);
+}
+
+TEST_CASE("What a law other than linear does not go with is refused with its line") {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::string& text, const std::string& what) {
+    const std::filesystem::path file = write_file(folder.path() / "law.toml", text), out = folder.path() / "out";
+    const ProgramResult result = run_spherecut({"run", file.string(), "--out", out.string()});
+    INFO(result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Contains("law.toml:") &&
+                               Contains(what + " does not go with material.law = \"neo_hookean\"; possible with it: "));
+    CHECK_FALSE(std::filesystem::exists(out));
+    const ProgramResult check = run_spherecut({"check", file.string()});
+    CHECK(check.status == 0);
+    CHECK_THAT(check.out, Contains("a run of it is refused: ") && Contains(what));
+  };
+  const std::string small = with_law(small_scenario), block = with_law(cut_block);
+  refused(small + "[method]\nname = \"collocation\"\n", "method.name = \"collocation\"");
+  refused(small + "[contact]\ncondition = \"bonded\"\n", "contact.condition = \"bonded\"");
+  refused(small + "[contact]\ncondition = \"frictional\"\nfriction = 0.3\n", "contact.condition = \"frictional\"");
+  refused(block + disc_precut, "[[precut]]");
+  refused(block + incision_at_end, "[blade]");
+  refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]"),
+          "material.pretension");
+  refused(replaced(small, "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\n[[material.prony]]\nshare = 0.3\ntime = 2\n"),
+          "material.prony");
+  CHECK_THROWS_WITH(Session(
+                        scenario_of(small), [](const std::string&) {}, Leader::device),
+                    Contains("material.law = \"neo_hookean\": runs off line alone compute it"));
+}
+
+TEST_CASE("A run of a law has the same bits with one thread and with two") {
+  const std::string text = with_law(small_scenario);
+  const int before = solvers::thread_count();
+  std::vector<Vector3> forces[2];
+  for (const int threads : {1, 2}) {
+    solvers::set_thread_count(threads);
+    Session session = session_of(text);
+    for (const StepResult& step : run(session))
+      forces[threads - 1].push_back(step.force);
+  }
+  solvers::set_thread_count(before);
+  CHECK(forces[0].back().norm() > 0);
+  CHECK(forces[0] == forces[1]);
+}
+
+TEST_CASE("A run tells iterations and the least volume ratio; one that finds no equilibrium keeps its rows") {
+  const TemporaryFolder folder;
+  const auto run_of = [&](const std::string& text, const std::string& name) {
+    const std::filesystem::path file = write_file(folder.path() / (name + ".toml"), text);
+    return run_spherecut({"run", file.string(), "--out", (folder.path() / name).string()});
+  };
+  const ProgramResult good = run_of(with_law(small_scenario), "good");
+  CHECK(good.status == 0);
+  CHECK_THAT(good.out, Contains("law neo_hookean"));
+  const auto summary = nlohmann::json::parse(read_file(folder.path() / "good/summary.json"));
+  const auto& found = summary["solver"]["finite_strain"];
+  CHECK(found["law"] == "neo_hookean");
+  CHECK(found["median_iterations"] > 0);
+  CHECK(found["least_jacobian"] < 1);
+  CHECK_THAT(read_file(folder.path() / "good/forces.csv"), Contains("tangential_N,least_jacobian\n"));
+
+  // A confined cube is pressed flat: no state is left.
+  const ProgramResult bad = run_of(replaced(with_law(pressed_cube(true, 0.0199)), node_spacings("0.004", "0.004"),
+                                            node_spacings("0.0065", "0.0065")),
+                                   "bad");
+  CHECK(bad.status == 3);
+  CHECK_THAT(bad.err, Contains("no equilibrium found: "));
+  const auto failed = nlohmann::json::parse(read_file(folder.path() / "bad/summary.json"));
+  CHECK(failed["status"] == "failed");
+  const int done = failed["steps"]["done"];
+  CHECK(done > 0);
+  const std::string rows = read_file(folder.path() / "bad/forces.csv");
+  CHECK(std::count(rows.begin(), rows.end(), '\n') == done + 1);
+}
