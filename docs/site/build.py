@@ -179,9 +179,10 @@ def tutorial(name: str, text: str, staging: Staging, build: Path, cache: Path, r
 # --- reference of the Python package, by autodoc
 
 # Modules of the package: name, title, what it is for.
-MODULES = {  # sweep.md has studies
+MODULES = {
     "spherecut": "Floors, sessions and runs",
     "spherecut.env": "Environment",
+    "spherecut.sweep": "Studies",
 }
 # All names of a staged module are told as those of the module that a user imports.
 AS_IMPORTED = """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import difflib
+import functools
 import hashlib
 import itertools
 import json
@@ -22,7 +23,12 @@ from .._core import InputError, Scenario, scenario_keys
 MOST_RUNS = 100_000
 COMPONENTS = ("[x, y, z]", "three or six numbers")  # kinds of keys whose components may be named by [i]
 FILE_KEYS = ("organ.file", "precut[].file")
-KEY_LINES = {key["path"]: key for key in scenario_keys()}
+
+
+@functools.cache
+def key_lines() -> dict[str, dict[str, str]]:
+    """Every key of a scenario by its path."""
+    return {key["path"]: key for key in scenario_keys()}
 
 
 @dataclass(frozen=True)
@@ -112,9 +118,9 @@ def key_of(path: str) -> Optional[dict[str, str]]:
     """The line of docs/scenario.md that a key of a study is about, or None."""
     if not parts_of(path):
         return None
-    key = KEY_LINES.get(re.sub(r"\[\d+\]", "[]", path))
+    key = key_lines().get(re.sub(r"\[\d+\]", "[]", path))
     if key is None and path.endswith("]"):
-        key = KEY_LINES.get(re.sub(r"\[\d+\]", "[]", path[: path.rindex("[")]))
+        key = key_lines().get(re.sub(r"\[\d+\]", "[]", path[: path.rindex("[")]))
         if key is not None and key["type"] not in COMPONENTS:
             return None
     return None if key is None or "table" in key["type"] else key
@@ -166,7 +172,7 @@ class _Reader:
                 yield from self.leaves(value, where, inner)
                 continue
             if key_of(inner) is None:
-                near = difflib.get_close_matches(re.sub(r"\[\d+\]", "[]", inner), KEY_LINES, 1, 0.5)
+                near = difflib.get_close_matches(re.sub(r"\[\d+\]", "[]", inner), key_lines(), 1, 0.5)
                 raise InputError(f"{self.file}: {where}.{inner} = {shown(value)[:60]}: a scenario has no such key"
                                  + (f"; nearest: {near[0]}" if near else "") + "; allowed: docs/scenario.md")
             yield inner, value
