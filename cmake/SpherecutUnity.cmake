@@ -2,11 +2,14 @@
 # Whoever changes one file often builds with -DSPHERECUT_UNITY=OFF (the preset debug does).
 option(SPHERECUT_UNITY "Compile several sources together" ON)
 
-# spherecut_unity(TARGET [ALONE name...]): up to eight sources of a folder in one unit. Names in unnamed namespaces are
-# therefore unique within a folder. On their own stay units of the large template libraries (time and memory), of one
+# spherecut_unity(TARGET [SIZE n] [ALONE name...]): up to n (8) sources of a folder in one unit. Names in unnamed namespaces
+# are therefore unique within a folder. On their own stay units of the large template libraries (time and memory), of one
 # instruction set, and those given as ALONE.
 function(spherecut_unity target)
-  cmake_parse_arguments(PARSE_ARGV 1 unity "" "" "ALONE")
+  cmake_parse_arguments(PARSE_ARGV 1 unity "" "SIZE" "ALONE")
+  if(NOT unity_SIZE)
+    set(unity_SIZE 8)
+  endif()
   if(NOT SPHERECUT_UNITY)
     return()
   endif()
@@ -23,7 +26,7 @@ function(spherecut_unity target)
       cmake_path(GET source PARENT_PATH folder)
       string(MD5 key "${folder}")
       math(EXPR count_${key} "0${count_${key}} + 1")
-      math(EXPR part "(${count_${key}} - 1) / 8")
+      math(EXPR part "(${count_${key}} - 1) / ${unity_SIZE}")
       cmake_path(GET folder FILENAME folder)
       set_source_files_properties("${source}" PROPERTIES UNITY_GROUP "${folder}_${part}")
     endif()

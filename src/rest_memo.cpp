@@ -16,13 +16,15 @@ bool same(const VectorX& a, const VectorX& b) {
 } // namespace
 
 void RestMemo::turn_to(const solvers::Discretisation* body, const std::shared_ptr<const topology::Incision>& incision,
-                       bool is_solved, const solvers::Field& field) {
-  if (found_.size() < most_places && body == body_ && incision == incision_ && is_solved == is_solved_ &&
+                       bool is_solved, const solvers::Field& field, double spacing) {
+  if (found_.size() < most_places && spacing == spacing_ && body == body_ && incision == incision_ &&
+      is_solved == is_solved_ &&
       (!is_solved || (field.load_factor == field_.load_factor && same(field.coefficients, field_.coefficients) &&
                       same(field.pressure, field_.pressure) && same(field.prescribed, field_.prescribed))))
     return;
   found_.clear();
   body_ = body;
+  spacing_ = spacing;
   incision_ = incision;
   is_solved_ = is_solved;
   field_ = is_solved ? field : solvers::Field{};

@@ -18,9 +18,10 @@ class RestMemo {
     std::string error{};            // not empty: none was found, and why
   };
 
-  /// Forgets everything unless it is of this body, cut and field; `is_solved`: whether the field counts.
+  /// Forgets everything unless it is of this body, cut and field, and of this spacing, m, of which tolerances are
+  /// parts; `is_solved`: whether the field counts.
   void turn_to(const solvers::Discretisation* body, const std::shared_ptr<const topology::Incision>& incision,
-               bool is_solved, const solvers::Field& field);
+               bool is_solved, const solvers::Field& field, double spacing);
   /// What was kept for the place that is now at x, m; null: nothing.
   [[nodiscard]] const Found* find(const Vector3& x) const;
   const Found& keep(const Vector3& x, Found found);
@@ -33,6 +34,7 @@ class RestMemo {
   const solvers::Discretisation* body_ = nullptr;
   std::shared_ptr<const topology::Incision> incision_;
   bool is_solved_ = false;
+  double spacing_ = 0;
   solvers::Field field_;
   std::unordered_map<Key, Found, Hash> found_;
 };

@@ -16,7 +16,8 @@ constexpr double coarse_tolerance = 0.02; // the same where the field jumps by a
 constexpr double gap_reach = 1;           // fine spacings from a sheet: a place without material lies in its opening
 constexpr double difference = 0.05;       // fine spacings, over which the displacement's derivative is taken
 constexpr double outside_reach = 1.5;     // spacings from the nearest node: farther a place is outside the body
-constexpr double surely_out = 0.1;        // fine spacings out of the body by Newton's first step: a place is outside it
+constexpr double surely_out = 0.1;        // spacings out of the body by Newton's first step: a place is outside it
+constexpr double least_volume = 0.1;      // over that at rest, for such a step to tell anything
 constexpr double on_path = 1e-6;          // of the fine spacing: nearer to its path a blade is on it
 constexpr double way_detail = 0.25;       // fine spacings from pose to pose of the way ahead
 
@@ -54,13 +55,15 @@ std::optional<Vector3> place_in_opening(const Vector3& x, const topology::Incisi
   return std::nullopt;
 }
 
-// Whether Newton's first step from `start`, where the body is in `state`, towards what is now at x ends outside the
-// domain, farther than `margin` m.
-bool leads_out(const Vector3& x, const Vector3& start, const solvers::PointState& state, const topology::Domain& domain,
-               double margin) {
+// Where Newton's first step from `start`, where the body is in `state`, leads towards what is now at x, if that is out
+// of the domain by more than `margin` m.
+std::optional<Vector3> step_outside(const Vector3& x, const Vector3& start, const solvers::PointState& state,
+                                    const topology::Domain& domain, double margin) {
   const Matrix3 deformation = Matrix3::Identity() + state.gradient;
-  const Vector3 rest = start + deformation.fullPivLu().solve(x - start - state.displacement);
-  return rest.allFinite() && domain.signed_distance(rest) > margin;
+  if (!(deformation.determinant() > least_volume))
+    return std::nullopt;
+  const Vector3 rest = start + deformation.inverse() * (x - start - state.displacement);
+  return domain.signed_distance(rest) > margin ? std::optional(rest) : std::nullopt;
 }
 
 } // namespace
@@ -70,7 +73,7 @@ std::vector<Vector3> Session::nearest_moved(const Vector3& x, const BodyModel& m
   constexpr std::size_t most = 4;
   if (!model.state)
     return {};
-  const VectorX displacements = model.body->nodal_displacements(model.field); // on any thread
+  const VectorX displacements = model.body->nodal_displacements(model.field);
   const std::vector<Vector3>& nodes = model.sprinkling.nodes.positions;
   std::vector<std::pair<double, std::size_t>> away;
   for (std::size_t i = 0; i < nodes.size(); ++i)
@@ -85,7 +88,7 @@ std::vector<Vector3> Session::nearest_moved(const Vector3& x, const BodyModel& m
 
 Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
   RestMemo& memo = model.rest_memo;
-  memo.turn_to(model.body.get(), model.incision, model.state.has_value(), model.field);
+  memo.turn_to(model.body.get(), model.incision, model.state.has_value(), model.field, zone_.spacing.fine);
   const RestMemo::Found* found = memo.find(x);
   if (found == nullptr)
     try {
@@ -125,10 +128,19 @@ Vector3 Session::find_rest(const Vector3& x, const BodyModel& model) const {
     const std::vector<Vector3> starts = nearest_moved(x, model);
     const bool guess_is_out = domain.signed_distance(guess) > 0;
     // Outside no material is cut, and none is looked for.
-    if (guess_is_out && !starts.empty() && std::all_of(starts.begin(), starts.end(), [&](const Vector3& start) {
-          return leads_out(x, start, model.at(start), domain, surely_out * fine);
-        }))
-      return guess;
+    if (guess_is_out) {
+      std::optional<Vector3> outside;
+      bool all_lead_out = !starts.empty();
+      for (std::size_t k = 0; all_lead_out && k < starts.size(); ++k) {
+        const auto place =
+            step_outside(x, starts[k], model.at(starts[k]), domain, surely_out * zone_.spacing(starts[k]));
+        all_lead_out = place.has_value();
+        if (!outside)
+          outside = place;
+      }
+      if (all_lead_out)
+        return *outside;
+    }
     if (const auto rest =
             topology::rest_position_from(starts, x, displacement, coarse_tolerance * fine, difference * fine))
       return *rest;

@@ -11,6 +11,7 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <tbb/task_arena.h>
+#include <vector>
 
 namespace spherecut::topology {
 
@@ -23,21 +24,29 @@ constexpr double smallest_voxel = 2e-5; // m: OpenVDB takes no smaller scale, wh
 constexpr double bytes_per_voxel = sizeof(float) + sizeof(std::int32_t);
 constexpr double fill_of_leaves = 0.5; // share of allocated leaf voxels that the body and its band use, at least
 
-/// The surface in index space, as OpenVDB's mesh conversion reads it.
+/// The surface in index space, as the conversion takes it that is compiled in OpenVDB's library: an own type of surface
+/// would have half a minute of templates compiled here.
 class IndexSpaceMesh {
  public:
-  IndexSpaceMesh(const SurfaceMesh& surface, double voxel_size) : surface_(surface), scale_(1 / voxel_size) {}
-  [[nodiscard]] std::size_t polygonCount() const { return surface_.triangles.size(); }
-  [[nodiscard]] std::size_t pointCount() const { return surface_.vertices.size(); }
-  [[nodiscard]] static std::size_t vertexCount(std::size_t) { return 3; }
-  void getIndexSpacePoint(std::size_t polygon, std::size_t corner, openvdb::Vec3d& position) const {
-    const Vector3 p = scale_ * surface_.vertices[surface_.triangles[polygon][corner]];
-    position = {p.x(), p.y(), p.z()};
+  IndexSpaceMesh(const SurfaceMesh& surface, double voxel_size) {
+    points_.reserve(surface.vertices.size());
+    for (const Vector3& x : surface.vertices)
+      points_.emplace_back(x.x() / voxel_size, x.y() / voxel_size, x.z() / voxel_size);
+    triangles_.reserve(surface.triangles.size());
+    for (const Triangle& t : surface.triangles)
+      triangles_.emplace_back(t[0], t[1], t[2]);
+  }
+  openvdb::FloatGrid::Ptr distances(const openvdb::math::Transform& transform, float inside, int flags,
+                                    openvdb::Int32Grid* nearest = nullptr) const {
+    const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> mesh(points_, triangles_);
+    openvdb::util::NullInterrupter never;
+    return openvdb::tools::meshToVolume<openvdb::FloatGrid>(never, mesh, transform, band_voxels, inside, flags,
+                                                            nearest);
   }
 
  private:
-  const SurfaceMesh& surface_;
-  double scale_;
+  std::vector<openvdb::Vec3s> points_;
+  std::vector<openvdb::Vec3I> triangles_;
 };
 
 /// The triangles of the components that lie within `depth` others.
@@ -61,14 +70,14 @@ openvdb::FloatGrid::Ptr sampled_distances(const SurfaceMesh& surface, double vox
   for (const SurfaceComponent& component : found.components)
     deepest = std::max(deepest, component.within.size());
   constexpr float everywhere = std::numeric_limits<float>::max();
-  const auto distances = meshToVolume<openvdb::FloatGrid>(
-      IndexSpaceMesh(surface, voxel_size), transform, band_voxels, everywhere,
-      DISABLE_RENORMALIZATION | (deepest > 0 ? DISABLE_INTERSECTING_VOXEL_REMOVAL : 0), &triangles);
+  const auto distances =
+      IndexSpaceMesh(surface, voxel_size)
+          .distances(transform, everywhere,
+                     DISABLE_RENORMALIZATION | (deepest > 0 ? DISABLE_INTERSECTING_VOXEL_REMOVAL : 0), &triangles);
   auto values = distances->getAccessor();
   for (std::size_t depth = 1; depth <= deepest; ++depth) {
     const SurfaceMesh part = nested_part(surface, found, depth);
-    const auto nested = meshToVolume<openvdb::FloatGrid>(IndexSpaceMesh(part, voxel_size), transform, band_voxels,
-                                                         everywhere, DISABLE_RENORMALIZATION);
+    const auto nested = IndexSpaceMesh(part, voxel_size).distances(transform, everywhere, DISABLE_RENORMALIZATION);
     for (auto it = nested->cbeginValueAll(); it; ++it) {
       if (!(*it < 0))
         continue;

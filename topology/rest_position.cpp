@@ -35,6 +35,8 @@ RestPlace rest_position(const Vector3& x, const std::function<Vector3(const Vect
   }
   if (residual.norm() <= tolerance)
     return {rest};
+  if (!coarse && residual.norm() <= coarse_tolerance)
+    coarse = rest;
   if (coarse)
     return {*coarse, false};
   throw NumericalError(fmt::format("no rest position found for ({}, {}, {}): {} m left after {} steps, {} m wanted",

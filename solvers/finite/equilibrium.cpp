@@ -21,9 +21,10 @@ constexpr int most_times = 20;                    // the iterations of a round, 
 constexpr int most_factorisations = 200;          // before a solve gives up
 constexpr double floor_of_forces = 1e-8;          // mu h^2 of it: forces below are none
 
-/// Whether a solve has taken all that it may.
-bool is_spent(const EquilibriumStatus& status, const EquilibriumOptions& options) {
-  return status.iterations > most_times * options.maximum_iterations || status.factorisations > most_factorisations;
+/// Whether a solve has taken all that it may by this method.
+bool is_spent(FiniteMethod method, const EquilibriumStatus& status, const EquilibriumOptions& options) {
+  return method == FiniteMethod::newton ? status.factorisations >= most_factorisations
+                                        : status.iterations >= most_times * options.maximum_iterations;
 }
 
 } // namespace
@@ -132,7 +133,7 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
   const bool had_before = has_before_;
   const std::vector<Vector3> reactions = reactions_;
   EquilibriumStatus status;
-  least_seen_ = 1;
+  least_seen_ = last_residual_ = 1;
   if (!go(target, options_.halvings, status)) {
     const double whole = motion(begin, target).norm();
     const double reached = whole > 0 ? motion(begin, state_).norm() / whole : 0;
@@ -143,25 +144,33 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
     memory_.clear();
     throw NumericalError(fmt::format(
         "no equilibrium found: {:.3g} of the step was reached in {} iterations and {} halvings; the unbalanced force "
-        "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}; the condition of the rest "
+        "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}{}; the condition of the rest "
         "stiffness is {:.3g}",
         reached, status.iterations, status.halvings, last_residual_, options_.tolerance, least_seen_,
-        least_seen_ <= options_.least_jacobian ? ": the body is about to be inverted" : "", rest_.condition()));
+        least_seen_ <= options_.least_jacobian ? ": the body is about to be inverted" : "",
+        contact_ && last_residual_ < options_.tolerance
+            ? fmt::format(", the surface {:.3g} spacings deep in the tool (limit {:.3g})", contact_->deepest(),
+                          options_.penetration)
+            : "",
+        rest_.condition()));
   }
   return status;
 }
 
 bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& status) {
-  if (is_spent(status, options_))
+  const bool may_go_on = !is_spent(options_.method, status, options_);
+  const bool has_newton = options_.fall_back && options_.method != FiniteMethod::newton &&
+                          !is_spent(FiniteMethod::newton, status, options_);
+  if (!may_go_on && !has_newton)
     return false;
-  if (step(target, options_.method, status))
+  if (step(target, may_go_on ? options_.method : FiniteMethod::newton, status))
     return true;
   if (halvings > 0 && motion(state_, target).norm() > 0) {
     ++status.halvings;
     const State middle = between(state_, target, 0.5);
     return go(middle, halvings - 1, status) && go(target, halvings - 1, status);
   }
-  return options_.fall_back && options_.method != FiniteMethod::newton && step(target, FiniteMethod::newton, status);
+  return may_go_on && has_newton && step(target, FiniteMethod::newton, status);
 }
 
 bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
@@ -335,7 +344,7 @@ bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, 
     status.residual = norm / now.acting;
     if (status.residual < options_.tolerance)
       return true;
-    if (iteration == most || is_spent(status, options_))
+    if (iteration == most || is_spent(method, status, options_))
       return false;
     ++status.iterations;
     VectorX direction;

@@ -13,9 +13,8 @@ TEST_CASE("Places at rest are kept for one state of a body, and for no other", "
   field.coefficients = VectorX::LinSpaced(6, 0, 1);
   field.prescribed = VectorX::Zero(3);
   RestMemo memo;
-  const auto turn_to = [&](const solvers::Field& to, bool is_solved = true,
-                           const std::shared_ptr<const topology::Incision>& incision = nullptr) {
-    memo.turn_to(nullptr, incision, is_solved, to);
+  const auto turn_to = [&](const solvers::Field& to, bool is_solved = true, double spacing = 0.004) {
+    memo.turn_to(nullptr, nullptr, is_solved, to, spacing);
   };
   turn_to(field);
   CHECK(memo.find(x) == nullptr);
@@ -45,5 +44,10 @@ TEST_CASE("Places at rest are kept for one state of a body, and for no other", "
   CHECK(memo.find(x) == nullptr);
   memo.keep(x, {rest});
   turn_to(other, false);
+  CHECK(memo.find(x) == nullptr);
+  memo.keep(x, {rest});
+  turn_to(field, false); // the field does not count
+  CHECK(memo.find(x) != nullptr);
+  turn_to(field, false, 0.008);
   CHECK(memo.find(x) == nullptr);
 }
