@@ -28,7 +28,7 @@ static_assert(sizeof(Pose) == 88 && sizeof(Force) == 88, "packets have no gaps")
 /// Where a device is, in the axes of the scenario.
 struct Motion {
   double position[3] = {};              // m, from wherever the device counts
-  double orientation[4] = {0, 0, 0, 1}; // x, y, z, w: turns +z into the tool's axis
+  double orientation[4] = {0, 0, 0, 1}; // x, y, z, w, from wherever the device counts
   std::uint16_t mode = 0, buttons = 0;
 };
 
@@ -54,12 +54,17 @@ class Client {
 
   bool open() const { return open_; }
   /// Says where the device is and gives the newest force on the hand, N; none while nobody answers. Once a
-  /// millisecond; it never waits. The device's motion is added to where the tool waited when the session began.
+  /// millisecond; it never waits. The device's motion since the session began is added to where the tool waited, and
+  /// its turn since then turns a tool whose axis is +z.
   const double* exchange(const Motion& motion) {
     for (Force next; recv(link_, &next, sizeof next, MSG_DONTWAIT) == sizeof next;)
       if (next.magic == pose_.magic && next.version == 1 && next.kind == 4) {
-        for (int axis = 0; axis < 3 && next.token != session_; ++axis)
-          start_[axis] = next.position[axis] - motion.position[axis];
+        if (next.token != session_) {
+          for (int axis = 0; axis < 3; ++axis)
+            start_[axis] = next.position[axis] - motion.position[axis];
+          for (int i = 0; i < 4; ++i)
+            unturned_[i] = (i < 3 ? -1 : 1) * motion.orientation[i];
+        }
         pose_.token = session_ = next.token;
         force_ = next;
         silent_ = 0;
@@ -69,8 +74,7 @@ class Client {
       pose_.token = 0;
     for (int axis = 0; axis < 3; ++axis)
       pose_.position[axis] = start_[axis] + motion.position[axis];
-    for (int i = 0; i < 4; ++i)
-      pose_.orientation[i] = motion.orientation[i];
+    turn(motion.orientation, unturned_, pose_.orientation);
     pose_.mode = motion.mode;
     pose_.buttons = motion.buttons;
     ++pose_.sequence;
@@ -84,11 +88,20 @@ class Client {
   bool held() const { return pose_.token != 0; }
 
  private:
+  /// The second turn first.
+  static void turn(const double a[4], const double b[4], double product[4]) {
+    for (int i = 0; i < 3; ++i) {
+      const int j = (i + 1) % 3, k = (i + 2) % 3;
+      product[i] = a[3] * b[i] + b[3] * a[i] + a[j] * b[k] - a[k] * b[j];
+    }
+    product[3] = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2];
+  }
+
   int link_;
   bool open_ = false;
   Pose pose_;
   Force force_;
-  double start_[3] = {}, none_[3] = {};
+  double start_[3] = {}, unturned_[4] = {0, 0, 0, 1}, none_[3] = {}; // of the motion, its inverse turn, no force
   long heard_ = 0, silent_ = 0;
   std::uint64_t session_ = 0; // the token of the last one
 };
