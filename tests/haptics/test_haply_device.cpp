@@ -241,6 +241,25 @@ TEST_CASE("A service that ends and begins again is found again, and one without 
   CHECK(loop.until([&] { return service->named() == 1; }));
 }
 
+TEST_CASE(
+    "A service slower than the loop is a slow client: the tool goes evenly, and energy is counted by its readings") {
+  HaplyService service;
+  service.set_pause(12);
+  HaplyDevice device(at(service), waiting, 1000);
+  Loop loop(device);
+  CHECK(loop.until([&] { return device.pace().kind == PaceKind::interpolated && loop.state.client.period > 2; }));
+  service.set_cursor({0, -0.12, 0.149});
+  double largest = 0;
+  double before = loop.state.position.z();
+  CHECK(loop.until([&] {
+    largest = std::max(largest, std::abs(loop.state.position.z() - before));
+    before = loop.state.position.z();
+    return std::abs(before - (waiting.position.z() - 0.001)) < 1e-9;
+  }));
+  CHECK(largest < 0.0006); // of the millimetre that the cursor jumped
+  CHECK(device.counters().interpolated > 0);
+}
+
 TEST_CASE("Ticks with an Inverse3 do not allocate") {
   HaplyService service;
   HaplyDevice device(at(service), waiting, 1000);

@@ -6,6 +6,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/websocket.hpp>
+#include <chrono>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -138,6 +139,7 @@ struct HaplyService::Data {
     return inventory.dump();
   }
   std::string locked_answer() {
+    std::this_thread::sleep_for(std::chrono::milliseconds(pause.load()));
     const std::lock_guard lock(guard);
     return answer();
   }
@@ -158,7 +160,8 @@ struct HaplyService::Data {
   tcp::acceptor acceptor;
   int own = 0;
   std::atomic<bool> stopping{false};
-  std::mutex guard; // of all below
+  std::atomic<int> pause{0}; // ms
+  std::mutex guard;          // of all below
   int descriptor = -1;
   Vector cursor, force{};
   std::optional<std::array<double, 4>> turn;
@@ -210,6 +213,10 @@ void HaplyService::set_silent(bool silent) {
 void HaplyService::set_plugged(bool plugged) {
   const std::lock_guard lock(data_->guard);
   data_->plugged = plugged;
+}
+
+void HaplyService::set_pause(int milliseconds) {
+  data_->pause = milliseconds;
 }
 
 void HaplyService::close_after(int messages) {

@@ -29,6 +29,7 @@ class HaplyService {
   void set_grip(const std::array<double, 4>& turn, bool pressed); // w, x, y, z; from now on there is a wireless one
   void set_silent(bool silent);                                   // messages are taken and not answered
   void set_plugged(bool plugged);                                 // false: the Inverse3 has gone, the service has not
+  void set_pause(int milliseconds);                               // before each answer
   void close_after(int messages);                                 // ends connection and service
   void set_nonsense(bool nonsense);                               // answers are no JSON
 
