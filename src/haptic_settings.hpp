@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -42,6 +43,7 @@ enum class HeldDevice {
   hand,      // mass, spring and damper on that path
   recording, // follows what a device did in a recorded session
   bridge,    // whatever a client behind a socket holds
+  haply,     // an Inverse3 behind its maker's WebSocket service
 };
 
 /// Where clients with real hardware find the loop (docs/haptic_bridge.md).
@@ -49,6 +51,22 @@ struct BridgeSettings {
   std::string address = "127.0.0.1"; // of this machine, IPv4, that the socket is bound to
   int port = 27510;                  // 0: one that is free
   double timeout = 0.1;              // s without a pose after which a client has gone
+};
+
+/// Where a WebSocket is found.
+struct WebSocketAddress {
+  std::string host; // a name or an IP address, IPv6 without its brackets
+  int port = 0;
+  std::string path = "/";
+};
+/// Of ws://HOST:PORT or ws://HOST:PORT/PATH [RFC 6455, 3]; none where it is not of that form. The port must be there.
+std::optional<WebSocketAddress> websocket_address(std::string_view text);
+
+/// The service of an Inverse3 (docs/devices.md).
+struct HaplySettings {
+  std::string address = "ws://localhost:10001";
+  std::string device_id; // of the Inverse3; empty: the first that the service has
+  double timeout = 0.1;  // s without a pose after which the device has gone
 };
 
 struct HapticSettings {
@@ -61,6 +79,7 @@ struct HapticSettings {
   HeldDevice device = HeldDevice::hand;
   std::filesystem::path recording; // of the device of that name
   BridgeSettings bridge;
+  HaplySettings haply;
   DeviceLimits limits;
   HandSettings hand;
 };

@@ -31,6 +31,11 @@ int run(int argc, char** argv) {
       ->required()
       ->check(named);
   haptics->add_option("--duration", haptic.duration, "Length of the session, s; default 10");
+  haptics
+      ->add_flag("--bench", haptic.bench,
+                 "A press, a tap, a slide and a cut with the device of the scenario (left out: a simulated hand), and "
+                 "what they were like in figures; with a real device --duration each")
+      ->excludes("--replay");
   haptics->add_flag("--virtual", haptic.in_virtual_time,
                     "Without clock and threads: a solve every budget, the same bits every time");
   haptics

@@ -212,7 +212,18 @@ HeldDevice held_device(const std::string& name) {
     return HeldDevice::script;
   if (name == "recording")
     return HeldDevice::recording;
+  if (name == "haply")
+    return HeldDevice::haply;
   return name == "bridge" ? HeldDevice::bridge : HeldDevice::hand;
+}
+
+HaplySettings haply(const Section& section, Offences& offences) {
+  HaplySettings haply{section.text("address"), section.text("device_id"), section.number("timeout")};
+  if (!websocket_address(haply.address))
+    offences.add(section.line("address"),
+                 fmt::format("haptics.haply.address = \"{}\": allowed: ws://HOST:PORT, as in ws://localhost:10001",
+                             haply.address));
+  return haply;
 }
 
 HapticSettings haptics(const Section& section, const std::filesystem::path& scenario, Offences& offences) {
@@ -231,6 +242,7 @@ HapticSettings haptics(const Section& section, const std::filesystem::path& scen
                                          "haptics.recording = \"FILE\"");
   const Section bridge = section.table("bridge");
   haptics.bridge = {bridge.text("address"), static_cast<int>(bridge.integer("port")), bridge.number("timeout")};
+  haptics.haply = haply(section.table("haply"), offences);
   const Section limits = section.table("limits");
   haptics.limits = {limits.number("gain"),
                     limits.number("force"),

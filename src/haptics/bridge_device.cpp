@@ -136,7 +136,7 @@ void BridgeDevice::release() noexcept {
   state_.connected = false;
   state_.buttons = 0;
   state_.client = {}; // the tool stays where the loop has it
-  kind_shown_.store(PaceKind::unknown, std::memory_order_relaxed);
+  pace_watch_.forget();
   socket_->connect_to(socket_->own);
 }
 
@@ -212,23 +212,11 @@ DeviceState BridgeDevice::read(std::uint64_t tick) noexcept {
     ++counters_.lost;
     release();
   }
-  if (held_)
-    follow_pace();
-  return state_;
-}
-
-void BridgeDevice::follow_pace() noexcept {
-  pace_.lead(state_);
-  const double rate = pace_.measured();
-  if (rate > 0) {
-    counters_.rate = rate;
-    if (pace_.kind() != PaceKind::unknown)
-      counters_.slowest = counters_.slowest > 0 ? std::min(counters_.slowest, rate) : rate;
+  if (held_) {
+    pace_.lead(state_);
+    pace_watch_.count(pace_, state_, counters_);
   }
-  counters_.interpolated += state_.client.period > 1 ? 1 : 0;
-  counters_.faded += pace_.kind() == PaceKind::too_slow ? 1 : 0;
-  kind_shown_.store(pace_.kind(), std::memory_order_relaxed);
-  rate_shown_.store(rate, std::memory_order_relaxed);
+  return state_;
 }
 
 // What has to come back before anybody gets more than one packet for one of his own. It is made from the address that a

@@ -12,7 +12,6 @@
 #include "src/haptics/device.hpp"
 
 #include <array>
-#include <atomic>
 #include <memory>
 
 struct sockaddr_in;
@@ -20,7 +19,7 @@ struct sockaddr_in;
 namespace spherecut::app {
 
 /// What has come in.
-struct BridgeCounters {
+struct BridgeCounters : PaceCounters {
   std::uint64_t poses = 0;   // of the client that held the tool, taken
   std::uint64_t old = 0;     // of that client, with a sequence that was not newer
   std::uint64_t garbage = 0; // not a packet
@@ -28,15 +27,6 @@ struct BridgeCounters {
   std::uint64_t clients = 0; // that have held the tool: sent a pose with the token that answered their hello
   std::uint64_t lost = 0;    // clients that fell silent
   std::uint64_t unsent = 0;  // forces that the system did not take
-  double rate = 0;           // poses a second of the last client, as measured last; 0: not known
-  double slowest = 0;        // the least that was measured
-  std::uint64_t interpolated = 0, faded = 0; // ticks with a pose on its way, with a client too slow for a force
-};
-
-/// A client's rate, as other threads may see it.
-struct BridgePace {
-  PaceKind kind = PaceKind::unknown;
-  double rate = 0; // poses a second
 };
 
 class BridgeDevice : public Device {
@@ -59,9 +49,7 @@ class BridgeDevice : public Device {
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
   /// From any thread.
-  [[nodiscard]] BridgePace pace() const noexcept {
-    return {kind_shown_.load(std::memory_order_relaxed), rate_shown_.load(std::memory_order_relaxed)};
-  }
+  [[nodiscard]] PaceReading pace() const noexcept { return pace_watch_.shown(); }
   /// From the haptic thread, or after it has ended.
   [[nodiscard]] const BridgeCounters& counters() const { return counters_; }
 
@@ -70,7 +58,6 @@ class BridgeDevice : public Device {
   void take_from(int descriptor, int most) noexcept;
   void take(std::size_t packet) noexcept;
   void release() noexcept;
-  void follow_pace() noexcept;
   [[nodiscard]] std::uint64_t token_for(const sockaddr_in& from) const noexcept;
   void reply(const sockaddr_in& to, std::uint64_t token, const Vector3& force) noexcept;
 
@@ -84,9 +71,7 @@ class BridgeDevice : public Device {
   std::uint64_t sessions_ = 0;         // that have begun
   std::uint64_t token_ = 0, sequence_ = 0, heard_ = 0;
   ClientPace pace_;
-  std::atomic<PaceKind> kind_shown_{PaceKind::unknown};
-  std::atomic<double> rate_shown_{0};
-  static_assert(std::atomic<double>::is_always_lock_free && std::atomic<PaceKind>::is_always_lock_free);
+  PaceWatch pace_watch_;
   BridgeCounters counters_;
 };
 

@@ -81,4 +81,17 @@ void ClientPace::lead(DeviceState& state) noexcept {
   fresh_ = false;
 }
 
+void PaceWatch::count(const ClientPace& pace, const DeviceState& state, PaceCounters& counters) noexcept {
+  const double rate = pace.measured();
+  if (rate > 0) {
+    counters.rate = rate;
+    if (pace.kind() != PaceKind::unknown)
+      counters.slowest = counters.slowest > 0 ? std::min(counters.slowest, rate) : rate;
+  }
+  counters.interpolated += state.client.period > 1 ? 1 : 0;
+  counters.faded += pace.kind() == PaceKind::too_slow ? 1 : 0;
+  kind_.store(pace.kind(), std::memory_order_relaxed);
+  rate_.store(rate, std::memory_order_relaxed);
+}
+
 } // namespace spherecut::app

@@ -4,6 +4,7 @@
 #include "src/haptics/device.hpp"
 
 #include <array>
+#include <atomic>
 
 namespace spherecut::app {
 
@@ -16,6 +17,19 @@ enum class PaceKind : std::uint8_t {
 };
 
 inline constexpr double slowest_client = 50; // poses a second
+
+/// A client's rate, as other threads may see it.
+struct PaceReading {
+  PaceKind kind = PaceKind::unknown;
+  double rate = 0; // poses a second
+};
+
+/// What a session's clients sent.
+struct PaceCounters {
+  double rate = 0;                           // poses a second of the last client, as measured last; 0: not known
+  double slowest = 0;                        // the least that was measured
+  std::uint64_t interpolated = 0, faded = 0; // ticks with a pose on its way, with a client too slow for a force
+};
 
 /// Neither allocates, locks nor throws.
 ///
@@ -51,6 +65,24 @@ class ClientPace {
   std::uint64_t began_ = 0, taken_ = 0; // ticks: of the way, of the newest pose
   double length_ = 1;                   // of the way, ticks
   double share_ = 1;
+};
+
+/// Counts what ClientPace finds, and shows the newest of it to other threads.
+class PaceWatch {
+ public:
+  /// Once a tick, after ClientPace::lead().
+  void count(const ClientPace& pace, const DeviceState& state, PaceCounters& counters) noexcept;
+  /// Nobody sends any more.
+  void forget() noexcept { kind_.store(PaceKind::unknown, std::memory_order_relaxed); }
+  /// From any thread.
+  [[nodiscard]] PaceReading shown() const noexcept {
+    return {kind_.load(std::memory_order_relaxed), rate_.load(std::memory_order_relaxed)};
+  }
+
+ private:
+  std::atomic<PaceKind> kind_{PaceKind::unknown};
+  std::atomic<double> rate_{0};
+  static_assert(std::atomic<double>::is_always_lock_free && std::atomic<PaceKind>::is_always_lock_free);
 };
 
 } // namespace spherecut::app

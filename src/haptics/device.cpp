@@ -54,6 +54,22 @@ Leg leg_at(const std::vector<PathPose>& path, double time, std::size_t& low) noe
 
 } // namespace
 
+std::string_view device_name(HeldDevice device) {
+  switch (device) {
+  case HeldDevice::script:
+    return "script";
+  case HeldDevice::hand:
+    return "hand";
+  case HeldDevice::recording:
+    return "recording";
+  case HeldDevice::bridge:
+    return "bridge";
+  case HeldDevice::haply:
+    return "haply";
+  }
+  return "unknown";
+}
+
 PathPose path_pose(const std::vector<PathPose>& path, double time) noexcept {
   std::size_t low = 0;
   const Leg leg = leg_at(path, time, low);

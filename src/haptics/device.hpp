@@ -14,6 +14,9 @@
 
 namespace spherecut::app {
 
+/// As a scenario names it.
+std::string_view device_name(HeldDevice device);
+
 /// What the hand holds, as DeviceState::mode has it.
 enum class HandMode : std::uint16_t {
   usual,   // the tool, beside which a blade keeps to its own path; the blade in a scenario without a tool

@@ -93,18 +93,26 @@ void write_deadlines(const std::filesystem::path& file, const std::vector<TickRe
   table.write(file);
 }
 
-std::string rate_text(const BridgeCounters& bridge, double ticks) {
-  if (bridge.rate <= 0)
+std::string rate_text(const PaceCounters& pace, double ticks) {
+  if (pace.rate <= 0)
     return "";
-  std::string text = fmt::format("  the last client sent {:.0f} poses a second, the least {:.0f}\n", bridge.rate,
-                                 bridge.slowest > 0 ? bridge.slowest : bridge.rate);
-  if (bridge.interpolated > 0)
+  std::string text = fmt::format("  the last client sent {:.0f} poses a second, the least {:.0f}\n", pace.rate,
+                                 pace.slowest > 0 ? pace.slowest : pace.rate);
+  if (pace.interpolated > 0)
     text += fmt::format("  {:.3g} s with the pose interpolated, as late as the time between two of the client's\n",
-                        static_cast<double>(bridge.interpolated) / ticks);
-  if (bridge.faded > 0)
-    text += fmt::format("  {:.3g} s without force: {}\n", static_cast<double>(bridge.faded) / ticks,
-                        too_slow_text(bridge.slowest));
+                        static_cast<double>(pace.interpolated) / ticks);
+  if (pace.faded > 0)
+    text += fmt::format("  {:.3g} s without force: {}\n", static_cast<double>(pace.faded) / ticks,
+                        too_slow_text(pace.slowest));
   return text;
+}
+
+void add_pace(nlohmann::json& json, const PaceCounters& pace) {
+  json["client_rate"] = pace.rate;
+  json["slowest_client_rate"] = pace.slowest;
+  json["interpolated_ticks"] = pace.interpolated;
+  json["faded_ticks"] = pace.faded;
+  json["faded_because"] = pace.faded > 0 ? too_slow_text(pace.slowest) : "";
 }
 
 } // namespace
@@ -114,19 +122,34 @@ std::string too_slow_text(double rate) {
                      rate, slowest_client);
 }
 
-std::string pace_text(const BridgePace& pace) {
+std::string pace_text(const PaceReading& pace, const std::string& client) {
   switch (pace.kind) {
   case PaceKind::full:
-    return fmt::format("bridge: the client sends {:.0f} poses a second", pace.rate);
+    return fmt::format("{} sends {:.0f} poses a second", client, pace.rate);
   case PaceKind::interpolated:
-    return fmt::format("bridge: the client sends {:.0f} poses a second; its pose is interpolated, {:.2g} ms late",
-                       pace.rate, 1e3 / pace.rate);
+    return fmt::format("{} sends {:.0f} poses a second; its pose is interpolated, {:.2g} ms late", client, pace.rate,
+                       1e3 / pace.rate);
   case PaceKind::too_slow:
-    return "bridge: the force fades: " + too_slow_text(pace.rate);
+    return client.substr(0, client.find(':')) + ": the force fades: " + too_slow_text(pace.rate);
   case PaceKind::unknown:
     break;
   }
   return "bridge: nobody holds the tool";
+}
+
+std::string link_text(HaplyLink link, const HaplySettings& settings) {
+  switch (link) {
+  case HaplyLink::streams:
+    break;
+  case HaplyLink::silent:
+    return fmt::format("haply: no pose for {:g} s: the force goes to zero", settings.timeout);
+  case HaplyLink::no_device:
+    return "haply: the service has the Inverse3 no more: the force goes to zero";
+  case HaplyLink::gone:
+    return fmt::format("haply: the service at {} has gone: the force goes to zero; it is looked for again",
+                       settings.address);
+  }
+  return "haply: the Inverse3 is back; the tool goes on from where it is";
 }
 
 Percentiles percentiles(std::vector<double> samples) {
@@ -268,6 +291,11 @@ std::string text_of(const HapticFindings& f) {
                         f.bridge->poses, f.bridge->clients, f.bridge->lost, f.bridge->old, f.bridge->garbage,
                         f.bridge->others, f.bridge->unsent) +
             rate_text(*f.bridge, f.tick_rate);
+  if (f.haply)
+    text += fmt::format("haply: {} messages of the service, {} of them garbage; {} poses taken; {} times silent, "
+                        "connected again {} times\n",
+                        f.haply->messages, f.haply->garbage, f.haply->poses, f.haply->lost, f.haply->renewed) +
+            rate_text(*f.haply, f.tick_rate);
   if (has_clock)
     text += fmt::format("time: ticks {:.3g} s, solves {:.3g} s, {} frames {:.3g} s, of {:.3g} s; {:.3g} s to prepare",
                         f.loop.haptic_cpu_seconds, f.loop.solve_seconds, f.loop.frames, f.loop.viewer_seconds,
@@ -322,18 +350,19 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
   for (const AccountEntry& entry : account_of(f.blade_account))
     json["blade"][entry.key] = entry.joules;
   if (f.bridge)
-    json["bridge"] = {{"poses", f.bridge->poses},
-                      {"clients", f.bridge->clients},
-                      {"silent", f.bridge->lost},
-                      {"old", f.bridge->old},
-                      {"garbage", f.bridge->garbage},
-                      {"others", f.bridge->others},
-                      {"unsent", f.bridge->unsent},
-                      {"client_rate", f.bridge->rate},
-                      {"slowest_client_rate", f.bridge->slowest},
-                      {"interpolated_ticks", f.bridge->interpolated},
-                      {"faded_ticks", f.bridge->faded},
-                      {"faded_because", f.bridge->faded > 0 ? too_slow_text(f.bridge->slowest) : ""}};
+    json["bridge"] = {{"poses", f.bridge->poses},  {"clients", f.bridge->clients}, {"silent", f.bridge->lost},
+                      {"old", f.bridge->old},      {"garbage", f.bridge->garbage}, {"others", f.bridge->others},
+                      {"unsent", f.bridge->unsent}};
+  if (f.bridge)
+    add_pace(json["bridge"], *f.bridge);
+  if (f.haply) {
+    json["haply"] = {{"messages", f.haply->messages},
+                     {"garbage", f.haply->garbage},
+                     {"poses", f.haply->poses},
+                     {"silent", f.haply->lost},
+                     {"connected_again", f.haply->renewed}};
+    add_pace(json["haply"], *f.haply);
+  }
   replace_file(folder / "haptic.json", json.dump(2) + "\n");
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/haptics/bridge_device.hpp"
+#include "src/haptics/haply_device.hpp"
 #include "src/haptics/realtime_loop.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
@@ -50,11 +51,14 @@ struct HapticFindings {
   bool unfollowed = false;            // at the end that had yet to follow the blade (blade.advance)
   int highest_degradation = 0;
   std::optional<BridgeCounters> bridge; // with that device
+  std::optional<HaplyCounters> haply;   // likewise
 };
 HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report);
 
 /// What a client's rate means for its force, as a line for a screen; and why one has none.
-std::string pace_text(const BridgePace& pace);
+std::string pace_text(const PaceReading& pace, const std::string& client = "bridge: the client");
+/// What is left of an Inverse3, likewise.
+std::string link_text(HaplyLink link, const HaplySettings& settings);
 std::string too_slow_text(double rate);
 
 /// As lines for a screen.

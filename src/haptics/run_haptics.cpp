@@ -1,5 +1,6 @@
 #include "src/haptics/run_haptics.hpp"
 
+#include "src/haptics/bench.hpp"
 #include "src/haptics/haptic_report.hpp"
 #include "src/haptics/replay.hpp"
 #include "src/interrupt.hpp"
@@ -63,18 +64,24 @@ RunEnd run_replay(const HapticCommand& command, const InterruptWatch& watch, Pro
 
 } // namespace
 
-std::unique_ptr<Device> make_device(const HapticSettings& settings, const HapticSimulation& simulation) {
+std::unique_ptr<Device> make_device(const HapticSettings& settings, const std::vector<PathPose>& path) {
   switch (settings.device) {
   case HeldDevice::script:
-    return std::make_unique<ScriptedPath>(simulation.path(), settings.rate);
+    return std::make_unique<ScriptedPath>(path, settings.rate);
   case HeldDevice::recording:
     return std::make_unique<RecordedMotion>(read_recording(settings.recording), settings.rate);
   case HeldDevice::bridge:
-    return std::make_unique<BridgeDevice>(settings.bridge, simulation.path().front(), settings.rate);
+    return std::make_unique<BridgeDevice>(settings.bridge, path.front(), settings.rate);
+  case HeldDevice::haply:
+    return std::make_unique<HaplyDevice>(settings.haply, path.front(), settings.rate);
   case HeldDevice::hand:
     break;
   }
-  return std::make_unique<SimulatedHand>(simulation.path(), settings.hand, settings.rate);
+  return std::make_unique<SimulatedHand>(path, settings.hand, settings.rate);
+}
+
+std::unique_ptr<Device> make_device(const HapticSettings& settings, const HapticSimulation& simulation) {
+  return make_device(settings, simulation.path());
 }
 
 namespace {
@@ -86,36 +93,56 @@ struct HapticRun {
   RealtimeReport report;
 };
 
+std::uint64_t ticks_of(const HapticSettings& settings, double seconds) {
+  return static_cast<std::uint64_t>(std::max(1.0, std::round(seconds * settings.rate)));
+}
+
+// In virtual time, with a solve every budget that takes all of it.
+LoopRecords run_solving(const HapticSettings& settings, HapticSimulation& simulation, Device& device,
+                        std::uint64_t ticks, const VirtualOptions& options) {
+  const std::uint64_t period = ticks_of(settings, settings.budget);
+  return run_virtual(settings, simulation, device, regular_solves(ticks, period, period), ticks, options);
+}
+
 LoopRecords run_loop(const HapticCommand& command, const HapticSettings& settings, HapticSimulation& simulation,
                      Device& device, const InterruptWatch& watch, HapticRun& run, Progress& progress) {
   const auto stop = [&watch] { return watch.interrupted(); };
   if (command.in_virtual_time) {
-    const auto ticks = static_cast<std::uint64_t>(std::max(1.0, std::round(command.duration * settings.rate)));
-    const auto period = static_cast<std::uint64_t>(std::max(1.0, std::round(settings.budget * settings.rate)));
     VirtualOptions options;
     options.stop = stop;
     run.recorder->listen(options);
-    LoopRecords records =
-        run_virtual(settings, simulation, device, regular_solves(ticks, period, period), ticks, options);
+    const std::uint64_t ticks = ticks_of(settings, command.duration);
+    LoopRecords records = run_solving(settings, simulation, device, ticks, options);
     run.report.stopped = records.ticks.size() < ticks;
     return records;
   }
   progress.say(
       fmt::format("{:g} s at {:g} ticks/s, model {}", command.duration, settings.rate, to_string(settings.model)));
-  if (const auto* bridge = dynamic_cast<const BridgeDevice*>(&device))
+  const auto* bridge = dynamic_cast<const BridgeDevice*>(&device);
+  const auto* haply = dynamic_cast<const HaplyDevice*>(&device);
+  if (bridge != nullptr)
     progress.say(fmt::format("bridge at {} port {}", settings.bridge.address, bridge->port()));
+  if (haply != nullptr)
+    progress.say(fmt::format("Inverse3 {} at {}", haply->device_id(), settings.haply.address));
   RealtimeOptions options;
-  options.stop = stop;
   PaceKind told = PaceKind::unknown;
-  if (const auto* bridge = dynamic_cast<const BridgeDevice*>(&device))
-    options.stop = [&, bridge] { // asked now and then by the viewer's thread, which may say what it sees
-      if (const BridgePace pace = bridge->pace(); pace.kind != told) {
-        told = pace.kind;
-        progress.say(pace_text(pace));
+  HaplyLink linked = HaplyLink::streams;
+  options.stop = [&] { // asked now and then by the viewer's thread, which may say what it sees
+    if (haply != nullptr)
+      if (const HaplyLink link = haply->link(); link != linked) {
+        linked = link;
+        progress.say(link_text(link, settings.haply));
       }
-      return watch.interrupted();
-    };
-  run.recorder->listen(options);
+    const PaceReading pace = bridge != nullptr ? bridge->pace() : haply != nullptr ? haply->pace() : PaceReading{};
+    if (pace.kind != told) {
+      told = pace.kind;
+      if (bridge != nullptr || told != PaceKind::unknown) // of an Inverse3 its link tells more
+        progress.say(pace_text(pace, bridge != nullptr ? "bridge: the client" : "haply: the service"));
+    }
+    return watch.interrupted();
+  };
+  if (run.recorder)
+    run.recorder->listen(options);
   return run_realtime(settings, simulation, device, command.duration, options, run.report);
 }
 
@@ -132,6 +159,61 @@ RunEnd say_nothing_was_run(const HapticCommand& command, const HapticSettings& s
   return RunEnd::interrupted;
 }
 
+// Real hardware has the clock's time.
+void require_clock(const HapticCommand& command, const HapticSettings& settings) {
+  if (command.in_virtual_time && (settings.device == HeldDevice::bridge || settings.device == HeldDevice::haply))
+    throw InputError(fmt::format("haptics.device = \"{}\" cannot follow virtual time; allowed: without --virtual",
+                                 device_name(settings.device)));
+}
+
+// A simulated device does its four manoeuvres in virtual time; a real one as somebody does them, for so long each.
+RunEnd run_bench(const HapticCommand& command, const InterruptWatch& watch, Progress& progress) {
+  HapticSettings settings;
+  if (command.scenario.empty())
+    settings.hand.resolution = settings.limits.resolution;
+  else
+    settings = read_scenario(command.scenario).haptics;
+  require_clock(command, settings);
+  const bool simulated = settings.device == HeldDevice::hand || settings.device == HeldDevice::script;
+  if (settings.device == HeldDevice::recording)
+    throw InputError("--bench with haptics.device = \"recording\": allowed: hand, script, bridge, haply");
+  std::optional<ResultsClaim> claim;
+  std::vector<BenchResult> results;
+  try {
+    for (const Manoeuvre& manoeuvre : bench_manoeuvres(settings)) {
+      interruption_point();
+      HapticSimulation simulation(manoeuvre.scenario);
+      const std::unique_ptr<Device> device = make_device(settings, manoeuvre.path);
+      if (!claim)
+        claim = claim_results_folder(command.out);
+      LoopRecords records;
+      if (simulated) {
+        VirtualOptions options;
+        options.stop = [&watch] { return watch.interrupted(); };
+        records = run_solving(settings, simulation, *device, ticks_of(settings, manoeuvre.seconds), options);
+      } else {
+        progress.say(fmt::format("{}, {:g} s: {}", manoeuvre.name, command.duration, manoeuvre.asks));
+        HapticRun run; // without a recorder
+        records = run_loop(command, settings, simulation, *device, watch, run, progress);
+      }
+      interruption_point();
+      results.push_back({manoeuvre.name, bench_figures(bench_series(settings, records), manoeuvre.holds)});
+      progress.say(fmt::format("{}: {} ticks", manoeuvre.name, records.ticks.size()));
+    }
+  } catch (const Interrupted&) { // the manoeuvre at hand is given up
+  }
+  const WindingUp winding_up(watch.interrupted());
+  watch.wind_up();
+  if (!claim)
+    claim = claim_results_folder(command.out);
+  progress.say(fmt::format("device {}, {:g} ticks/s, model {}, controller {}", device_name(settings.device),
+                           settings.rate, to_string(settings.model), settings.passivity ? "on" : "off"));
+  progress.say(bench_table(results));
+  write_bench(command.out, settings, results);
+  progress.say(fmt::format("results in {}: haptic_bench.json", command.out.string()));
+  return watch.interrupted() ? RunEnd::interrupted : RunEnd::complete;
+}
+
 } // namespace
 
 RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
@@ -140,17 +222,18 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
       status_of_interrupted);
   Progress progress(screen);
   const auto say = [&](const std::string& line) { progress.say(line); };
-  if (command.scenario.empty() == command.replay.empty())
-    throw InputError("spherecut haptics needs a scenario, or --replay with a recording");
+  if (!command.bench && command.scenario.empty() == command.replay.empty())
+    throw InputError("spherecut haptics needs a scenario, or --replay with a recording, or --bench");
   if (!command.replay.empty())
     return run_replay(command, watch, progress);
   if (!(command.duration > 0) || command.duration > 1e5)
     throw InputError(fmt::format("--duration {:g} s: allowed: above 0, at most 1e5", command.duration));
+  if (command.bench)
+    return run_bench(command, watch, progress);
   const Scenario scenario = read_scenario(command.scenario);
   require_linear(scenario.file, scenario.law);
   const HapticSettings& settings = scenario.haptics;
-  if (command.in_virtual_time && settings.device == HeldDevice::bridge)
-    throw InputError("haptics.device = \"bridge\" cannot follow virtual time; allowed: without --virtual");
+  require_clock(command, settings);
   HapticRun run;
   std::unique_ptr<HapticSimulation> made;
   std::unique_ptr<Device> device;
@@ -175,6 +258,8 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   findings.unfollowed = simulation.session().lags_behind_blade();
   if (bridge != nullptr)
     findings.bridge = bridge->counters();
+  if (const auto* haply = dynamic_cast<const HaplyDevice*>(device.get()))
+    findings.haply = haply->counters();
   std::vector<SolvedForce> solved;
   bool is_cut_short = false; // the session is complete, what follows it is not
   if (command.solved_stride > 0 && (scenario.tool || simulation.session().blade() != nullptr) && !report.stopped) {

@@ -77,6 +77,8 @@ HOW = [
     (r"tests/page/run\.sh build/release \w+.*", "page_tests"),
     (r"build/release/tests/haptic_bridge_client/haptic_bridge_client 27510 60", "elsewhere", "tests/CMakeLists.txt", "SPHERECUT_BRIDGE_CLIENT"),
     (r"cmake -S examples/haptic_bridge_client -B client && cmake --build client", "run"),
+    (r"cmake -S examples/devices -B devices && cmake --build devices", "run"),
+    (rf"{S} haptics SCENARIO\.toml --bench --out DIR", "parse"),
     (r"cmake --preset release -DSPHERECUT_BUILD_REFERENCES=ON", "targets"),
     (r"ninja -C build/release spherecut_reference_getfem", "targets"),
     (r"build/release/spherecut_reference_getfem 0\.\d+ experiments/hemisphere_palpation/reference_nu\d+\.csv", "targets"),

@@ -346,8 +346,10 @@ TEST_CASE("A mode that leaves the tool in the hand leaves the force, another han
 }
 
 TEST_CASE("The device of a scenario is the one that it names") {
-  const std::vector<std::pair<std::string, HeldDevice>> devices = {
-      {"script", HeldDevice::script}, {"hand", HeldDevice::hand}, {"bridge", HeldDevice::bridge}};
+  const std::vector<std::pair<std::string, HeldDevice>> devices = {{"script", HeldDevice::script},
+                                                                   {"hand", HeldDevice::hand},
+                                                                   {"bridge", HeldDevice::bridge},
+                                                                   {"haply", HeldDevice::haply}};
   for (const auto& [name, device] : devices)
     CHECK(scenario_of(small_scenario + "[haptics]\ndevice = \"" + name + "\"\n").haptics.device == device);
 }
