@@ -235,6 +235,7 @@ HapticSettings haptics(const Section& section, const std::filesystem::path& scen
   haptics.limits = {limits.number("gain"),
                     limits.number("force"),
                     limits.number("slew"),
+                    limits.number("torque"),
                     limits.number("stiffness"),
                     limits.number("damping"),
                     limits.number("resolution"),

@@ -47,6 +47,7 @@ struct EquilibriumStatus {
   int touching = 0;                     // shares that touch the tool
   double penetration = 0;               // in spacings
   Vector3 tool_force = Vector3::Zero(); // N, of the body on the tool
+  Vector3 tool_torque = Vector3::Zero(); // N m, of the same about the tool's point
 };
 
 class Equilibrium {
