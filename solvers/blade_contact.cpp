@@ -228,8 +228,7 @@ BladeTorque blade_torque(const BladePatch& patch, const BladeState& state, const
     throw InputError(fmt::format("{} places for {} contacts of a blade", places.size(), count(patch)));
   BladeTorque torque;
   for (std::size_t c = 0; c < places.size(); ++c)
-    torque.edge -=
-        state.forces[static_cast<Eigen::Index>(c)] * (places[c] - about).cross(patch.contacts[c].push);
+    torque.edge -= state.forces[static_cast<Eigen::Index>(c)] * (places[c] - about).cross(patch.contacts[c].push);
   torque.blade = torque.edge;
   if (patch.dragged) {
     const Vector3 of_drag = patch.drag_torque + patch.drag_torques * state.forces - about.cross(patch.drag);

@@ -107,10 +107,10 @@ struct BladeTorque {
   Vector3 blade = Vector3::Zero(); // of edge and flanks
 };
 
-/// About a point, m, of the forces of a state: every piece of the edge bears its force where it is now (`places`, m, one
-/// a contact), the flanks bear their drag where the faces are that they rub. Turning the blade by a small angle about
-/// the point works against the edge's torque as moving it works against its force. Throws InputError unless there is a
-/// place for every contact.
+/// About a point, m, of the forces of a state: every piece of the edge bears its force where it is now (`places`, m,
+/// one a contact), the flanks bear their drag where the faces are that they rub. Turning the blade by a small angle
+/// about the point works against the edge's torque as moving it works against its force. Throws InputError unless there
+/// is a place for every contact.
 BladeTorque blade_torque(const BladePatch& patch, const BladeState& state, const std::vector<Vector3>& places,
                          const Vector3& about);
 

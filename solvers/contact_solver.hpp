@@ -82,10 +82,10 @@ struct ContactState {
   /// N m, of the same nodal forces about `pose.point`, each where its node is now: rest position and displacement. Of
   /// prescribe(), which has no tool, about the origin.
   Vector3 tool_torque = Vector3::Zero();
-  Vector3 centre = Vector3::Zero();     // m, rest position of the contact: mean weighted by normal force
-  double contact_radius = 0;            // m, outermost active node's distance from the centre plus half its spacing
-  double largest_penetration = 0;       // m, left over at convergence
-  double friction_work = 0;             // J, taken by friction on the way from the state before
+  Vector3 centre = Vector3::Zero(); // m, rest position of the contact: mean weighted by normal force
+  double contact_radius = 0;        // m, outermost active node's distance from the centre plus half its spacing
+  double largest_penetration = 0;   // m, left over at convergence
+  double friction_work = 0;         // J, taken by friction on the way from the state before
   int active_nodes = 0;
   int iterations = 0;
   bool converged = true;

@@ -45,7 +45,8 @@ std::string cut_row(double time, const CutReport& r) {
     volumes += fmt::format("{}{:.12g}", volumes.empty() ? "" : ";", volume);
   return fmt::format(
       "{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
-      "{:.4g},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g}\n",
+      "{:.4g},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:."
+      "9g},{:.9g}\n",
       time, r.triangles, r.refused ? 1 : 0, r.sheets, r.area, r.front_length, r.pieces, r.unheld, volumes, r.opening,
       r.opening_volume, r.lip_pairs, r.closed_pairs, r.lips_converged ? 1 : 0, r.nodes, r.kept_nodes,
       hash_text(r.surface_hash), r.seconds.topology, r.seconds.level_sets, r.seconds.visibility, r.seconds.sprinkling,

@@ -33,8 +33,8 @@ class FiniteContact {
   [[nodiscard]] std::vector<double> known_forces() const { return known_; }
   void set_known_forces(const std::vector<double>& forces) { known_ = forces; }
 
-  /// At the last call of add(): what the tool gets, N, and N m about its point; the largest depth of a middle in the tool, or gap of one that
-  /// bears a force, over the spacing there; how many shares touch; norm of the nodal forces.
+  /// At the last call of add(): what the tool gets, N, and N m about its point; the largest depth of a middle in the
+  /// tool, or gap of one that bears a force, over the spacing there; how many shares touch; norm of the nodal forces.
   [[nodiscard]] Vector3 tool_force() const;
   [[nodiscard]] Vector3 tool_torque() const;
   [[nodiscard]] double deepest() const { return deepest_; }

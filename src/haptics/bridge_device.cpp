@@ -246,9 +246,9 @@ std::uint64_t BridgeDevice::token_for(const sockaddr_in& from) const noexcept {
 void BridgeDevice::reply(const sockaddr_in& to, std::uint64_t token, std::uint16_t version, const Vector3& force,
                          const Vector3& torque) noexcept {
   std::array<std::byte, bridge_wrench> bytes{};
-  const std::size_t size = write_packet(BridgeReply{token, state_.tick, posed_ ? sequence_ : 0, force, state_.position,
-                                                    timeout_, torque, version},
-                                        bytes);
+  const std::size_t size = write_packet(
+      BridgeReply{token, state_.tick, posed_ ? sequence_ : 0, force, state_.position, timeout_, torque, version},
+      bytes);
   if (::sendto(socket_->open, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to),
                sizeof to) < 0)
     ++counters_.unsent;

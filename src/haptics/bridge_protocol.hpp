@@ -12,7 +12,7 @@
 
 namespace spherecut::app {
 
-inline constexpr std::uint16_t bridge_version = 2; // the newest; every one from 1 on is spoken
+inline constexpr std::uint16_t bridge_version = 2;               // the newest; every one from 1 on is spoken
 inline constexpr std::size_t bridge_head = 16, bridge_body = 88; // bytes: hello and goodbye; pose and force
 inline constexpr std::size_t bridge_wrench = 112;                // bytes: force with its torque, from version 2 on
 inline constexpr double bridge_farthest = 10;                    // m, of a coordinate of a pose

@@ -11,9 +11,9 @@
 namespace spherecut::app {
 
 struct ModelForce {
-  Vector3 force = Vector3::Zero(); // N, of the body on the tool
+  Vector3 force = Vector3::Zero();  // N, of the body on the tool
   Vector3 torque = Vector3::Zero(); // N m, of the same about the tool's point
-  std::optional<double> stored{};  // J, elastic energy behind the force; empty: the model knows of none
+  std::optional<double> stored{};   // J, elastic energy behind the force; empty: the model knows of none
   bool found = false;   // the stored energy may step at a solve: the hand has put in no more than its own work
   double stiffness = 0; // N/m, by which the force rises against a motion along it; 0: it does not know
   int active = 0;       // nodes in contact; pieces of a blade's edge

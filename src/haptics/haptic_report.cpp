@@ -27,7 +27,8 @@ void write_ticks(const std::filesystem::path& file, const LoopRecords& records,
                  const std::vector<SolvedForce>& solved) {
   OutputFile out(file);
   out.write("tick,time_s,x_m,y_m,z_m,force_x_N,force_y_N,force_z_N,tissue_N,solved_N,energy_J,depth_m,sinking_m,"
-            "sequence,arrived,active,rounds,converged,limited,outside,latency_us,compute_us,torque_x_Nm,torque_y_Nm,torque_z_Nm,tissue_Nm\n");
+            "sequence,arrived,active,rounds,converged,limited,outside,latency_us,compute_us,torque_x_Nm,torque_y_Nm,"
+            "torque_z_Nm,tissue_Nm\n");
   auto truth = solved.begin();
   std::string text;
   for (const TickRecord& tick : records.ticks) {

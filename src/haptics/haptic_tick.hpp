@@ -1,6 +1,6 @@
-// One tick of the haptic loop as a function of what has been, without a clock: pose in, force and torque out. The threads' shell
-// (realtime_loop.hpp) and the loop in virtual time (virtual_loop.hpp) both run it, so a recorded session replays bit by
-// bit.
+// One tick of the haptic loop as a function of what has been, without a clock: pose in, force and torque out. The
+// threads' shell (realtime_loop.hpp) and the loop in virtual time (virtual_loop.hpp) both run it, so a recorded session
+// replays bit by bit.
 #pragma once
 
 #include "src/haptics/client_passivity.hpp"
@@ -19,17 +19,17 @@ topology::ToolPose tool_pose(const topology::ToolShape& tool, const DeviceState&
 
 /// What a tick gives.
 struct TickResult {
-  Vector3 force = Vector3::Zero();  // N, on the hand
-  ModelForce model;                 // before hand-over, gain and limits
-  Vector3 tissue = Vector3::Zero(); // N, model and hand-over: what the tissue is said to do to the tool
-  Vector3 torque = Vector3::Zero(); // N m, on the hand, about the tool's reference point (of the blade's frame)
+  Vector3 force = Vector3::Zero();         // N, on the hand
+  ModelForce model;                        // before hand-over, gain and limits
+  Vector3 tissue = Vector3::Zero();        // N, model and hand-over: what the tissue is said to do to the tool
+  Vector3 torque = Vector3::Zero();        // N m, on the hand, about the tool's reference point (of the blade's frame)
   Vector3 tissue_torque = Vector3::Zero(); // N m, model and hand-over
-  topology::SurfaceContact contact; // deepest point on the surface at rest
-  std::uint64_t sequence = 0;       // of the snapshot in use
-  double energy = 0;                // J, put in by the hand so far
-  double softened = 1;              // share of the force that is rendered, for the device's stiffness
-  bool limited = false;             // by saturation or slew
-  bool outside = false;             // the contact has left the candidates of the snapshot
+  topology::SurfaceContact contact;        // deepest point on the surface at rest
+  std::uint64_t sequence = 0;              // of the snapshot in use
+  double energy = 0;                       // J, put in by the hand so far
+  double softened = 1;                     // share of the force that is rendered, for the device's stiffness
+  bool limited = false;                    // by saturation or slew
+  bool outside = false;                    // the contact has left the candidates of the snapshot
 };
 
 /// What is handed over at a solve: it goes on from where it would have been now, by its last two ticks, and the
@@ -116,10 +116,10 @@ class HapticTick {
   std::array<topology::SurfaceContact, BladeGrip::most_places> edge_; // of the blade's edge and the surface
   std::array<double, BladeGrip::most_places> edge_depth_{};           // m, below that where it was solved; at most 0
   bool edge_fresh_ = false;                                           // a solve has come since they were found
-  std::uint64_t located_ = 0;    // tick after which contact_ was found, plus one; 0: never
-  bool arrived_ = false;         // a snapshot that changes the force has come since the last tick
-  bool fresh_ = false;           // any snapshot has
-  Origin origin_ = Origin::none; // in the last tick
+  std::uint64_t located_ = 0;          // tick after which contact_ was found, plus one; 0: never
+  bool arrived_ = false;               // a snapshot that changes the force has come since the last tick
+  bool fresh_ = false;                 // any snapshot has
+  Origin origin_ = Origin::none;       // in the last tick
   HandOver force_, torque_;            // N, N m
   double paid_ = 0;                    // J, of what is stored behind a force that solves find: put in by the hand
   Vector3 position_ = Vector3::Zero(); // m, of the last tick

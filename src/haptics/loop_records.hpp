@@ -13,12 +13,12 @@ struct TickRecord {
   Vector3 tissue = Vector3::Zero(); // N, of the tissue on the tool, with hand-over, before gain, control and limits
   Vector3 model = Vector3::Zero();  // N, of the model alone
   Vector3 torque = Vector3::Zero(); // N m, on the hand, about the tool's reference point
-  Vector3 tissue_torque = Vector3::Zero();  // N m, what belongs to `tissue`
-  double energy = 0;                // J, put in by the hand so far
-  double depth = 0;                 // m, of the contact on the surface at rest
-  double sinking = 0;               // m, of the deepest candidate inside the tool
-  std::uint64_t sequence = 0;       // of the snapshot in use
-  bool arrived = false;             // it came at this tick
+  Vector3 tissue_torque = Vector3::Zero(); // N m, what belongs to `tissue`
+  double energy = 0;                       // J, put in by the hand so far
+  double depth = 0;                        // m, of the contact on the surface at rest
+  double sinking = 0;                      // m, of the deepest candidate inside the tool
+  std::uint64_t sequence = 0;              // of the snapshot in use
+  bool arrived = false;                    // it came at this tick
   bool limited = false, outside = false, converged = true;
   double softened = 1; // share of the force that was rendered, for the device's stiffness
   int active = 0, rounds = 0;

@@ -319,8 +319,8 @@ Recording read_recording(const std::filesystem::path& file) {
   Recording recording;
   recording.version = start.get<std::uint32_t>();
   if (recording.version < 1 || recording.version > recording_version)
-    refuse(signature.size(), fmt::format("a recording of format {}; this program reads 1 to {}", recording.version,
-                                         recording_version));
+    refuse(signature.size(),
+           fmt::format("a recording of format {}; this program reads 1 to {}", recording.version, recording_version));
   static_cast<void>(start.get<std::uint32_t>());
   const std::size_t torque = recording.version > 1 ? 0 : torque_size; // that is not there
   std::vector<RecordedClient> clients;

@@ -50,9 +50,9 @@ class RecordingWriter {
 /// A tick as recorded.
 struct RecordedTick {
   DeviceState device;
-  Vector3 force = Vector3::Zero(); // N, on the hand
+  Vector3 force = Vector3::Zero();  // N, on the hand
   Vector3 torque = Vector3::Zero(); // N m, on the hand; zero in version 1
-  std::uint64_t sequence = 0;      // of the snapshot in use
+  std::uint64_t sequence = 0;       // of the snapshot in use
 };
 
 struct Recording {

@@ -14,7 +14,7 @@ struct ReplayReport {
   std::optional<std::uint64_t> differing_tick;
   std::optional<std::uint64_t> differing_solve;
   std::size_t differing_ticks = 0;
-  double largest = 0; // N, of the differences between forces on the hand
+  double largest = 0;        // N, of the differences between forces on the hand
   double largest_torque = 0; // N m, likewise
   bool torques = true;       // recorded
   bool same_build = true, same_processor = true;

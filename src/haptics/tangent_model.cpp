@@ -121,7 +121,7 @@ bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
 }
 
 ModelForce TangentModel::at(const topology::ToolPose& pose, const Eigen::Quaterniond& orientation,
-                           double time) noexcept {
+                            double time) noexcept {
   if (blade_.pressing())
     return blade_.at(pose.point, orientation, time);
   if (snapshot_ == nullptr || snapshot_->count == 0)

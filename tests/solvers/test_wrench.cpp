@@ -43,7 +43,9 @@ struct TurningBlade {
   TurningBlade() {
     std::mt19937 random(5);
     std::normal_distribution<double> normal;
-    const auto vector = [&](double size) { return Vector3(size * Vector3(normal(random), normal(random), normal(random))); };
+    const auto vector = [&](double size) {
+      return Vector3(size * Vector3(normal(random), normal(random), normal(random)));
+    };
     for (int c = 0; c < 3; ++c) {
       const Vector3 push = vector(1).normalized();
       patch.contacts.push_back({vector(0.02), push, push.unitOrthogonal(), 0.01});
@@ -191,10 +193,10 @@ TEST_CASE("The drag of the flanks turns the blade about where the faces are that
   std::vector<FlankPoint> flanks;
   for (const double along : {-0.1, 0.15})
     flanks.push_back({frame.origin - 0.1 * frame.ahead + along * frame.tangent, frame.normal, 0.02});
-  const ForcePattern drag = drag_pattern(flanks, 0.5, frame.ahead, problem.nodes.spacings.front());
+  const ForcePattern drag = drag_pattern(flanks, 0.1, frame.ahead, problem.nodes.spacings.front());
   const Field base = body->solve();
   const BladePatch patch = condense_blade(*body, base, contacts, 0.15, {}, drag);
-  const BladeState state = push_blade(patch, VectorX::Constant(1, 0.05), 1);
+  const BladeState state = push_blade(patch, VectorX::Constant(1, 0.1), 1);
   REQUIRE(state.forces[0] > 0);
   const Field field = deform(patch, state, base);
   const Vector3 about{0.3, -0.2, 0.4}, edge = frame.origin + 0.05 * frame.ahead;

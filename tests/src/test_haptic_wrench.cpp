@@ -64,8 +64,7 @@ std::string pose_text(int time, double angle) {
 
 TEST_CASE("Between solves the torque of the tangent model is that of a solve") {
   for (const std::string condition : {"frictionless", "frictional", "bonded"}) {
-    HapticSimulation simulation(
-        scenario_of(small_scenario + "[contact]\ncondition = \"" + condition + "\"\n"));
+    HapticSimulation simulation(scenario_of(small_scenario + "[contact]\ncondition = \"" + condition + "\"\n"));
     simulation.prepare(device_at(0, around(0)));
     ContactSnapshot now;
     simulation.solve(device_at(0, around(0)), 0, now);
@@ -161,9 +160,8 @@ TEST_CASE("The torque on the hand is handed over, scaled with the force, limited
 TEST_CASE("A blade that is turned about its long axis feels a torque that opposes, of its force and its lever") {
   const double touch = std::asin((over - 0.03) / lever); // angle at which the edge is at the surface
   double before = 0;
-  Session session =
-      session_of(levered_blade(pose_text(0, 0) + pose_text(1, touch + 0.06) + pose_text(2, touch + 0.12) +
-                               pose_text(3, touch + 0.18) + pose_text(4, touch + 0.06)));
+  Session session = session_of(levered_blade(pose_text(0, 0) + pose_text(1, touch + 0.06) + pose_text(2, touch + 0.12) +
+                                             pose_text(3, touch + 0.18) + pose_text(4, touch + 0.06)));
   std::vector<double> torques;
   for (const StepResult& result : run(session)) {
     const BladeReport& blade = result.cut->blade;
