@@ -271,8 +271,10 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   const Vector3 wanted = gain * result.tissue;
   Vector3 force = slow_client_ ? client_.control(device.client, device.position, wanted, stored.value_or(0))
                                : passivity_.control(device.position, wanted, stored);
-  force *= device.client.share;
   double share = gain * device.client.share; // of what the tissue does
+  if (slow_client_ && wanted.squaredNorm() > 0)
+    share *= std::clamp(force.dot(wanted) / wanted.squaredNorm(), 0.0, 1.0);
+  force *= device.client.share;
   if (!device.connected) {
     force.setZero();
     share = 0;
