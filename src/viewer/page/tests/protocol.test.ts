@@ -160,7 +160,7 @@ test('Messages that do not keep to the protocol are refused in words', () => {
   refuses(message(2, frameBlock({}), [{ kind: 19, data: pack(u32(1, 1, 1)) }]), /section 19/);
   refuses(message(2, frameBlock({}), [{ kind: 20, data: pack(u32(9)) }]), /section 20/);
   const past = new Uint8Array(message(2, frameBlock({}), [{ kind: 50, data: pack(u32(1)) }]));
-  past.set(pack(u32(5)), 248 + 4);
+  past.set(pack(u32(5)), 272 + 4);
   refuses(past.buffer, /past the end/);
   assert.equal(decodeBinary(message(3, new Uint8Array(0), [])), null);
 });
