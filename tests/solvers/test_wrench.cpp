@@ -12,6 +12,7 @@
 
 using namespace spherecut;
 using namespace spherecut::solvers;
+using tests::place;
 using tests::pressed_block;
 using tests::PressedBlock;
 using topology::FlatPunch;
@@ -21,13 +22,9 @@ using topology::ToolShape;
 
 namespace {
 
-const Vector3 oblique = Vector3(0.3, -0.2, 1).normalized();
+const Vector3 oblique_axis = Vector3(0.3, -0.2, 1).normalized();
 
-Vector3 place(const ContactPatch& patch, const ContactState& state, std::size_t c) {
-  return patch.rest[c] + state.displacement.segment<3>(3 * static_cast<Eigen::Index>(c));
-}
-
-double stored(const ContactPatch& patch, const ContactState& state) {
+double stored_under(const ContactPatch& patch, const ContactState& state) {
   double sum = 0;
   for (std::size_t c = 0; c < patch.nodes.size(); ++c)
     sum += 0.5 * state.nodal_forces[c].dot(place(patch, state, c) - patch.rest[c]);
@@ -77,7 +74,7 @@ struct TurningBlade {
 TEST_CASE("A ball without friction has no torque about its centre, wherever it presses", "[wrench]") {
   const double radius = 0.012;
   for (const Method method : {Method::collocation, Method::galerkin})
-    for (const Vector3& axis : {Vector3(Vector3::UnitZ()), oblique}) {
+    for (const Vector3& axis : {Vector3(Vector3::UnitZ()), oblique_axis}) {
       const PressedBlock& on = pressed_block(method);
       const ToolPose pose = topology::pose_at(SphereTip{radius}, Vector3(0.02, -0.01, -0.003), axis);
       const ContactState state = press(on.patch, SphereTip{radius}, pose);
@@ -87,7 +84,7 @@ TEST_CASE("A ball without friction has no torque about its centre, wherever it p
       CHECK(torque_about(state, centre).norm() < 1e-6 * scale);
       // About the tip it is that of the force in the centre.
       CHECK((state.tool_torque - radius * pose.axis.cross(state.tool_force)).norm() < 1e-6 * scale);
-      if (axis == oblique)
+      if (axis == oblique_axis)
         CHECK(state.tool_torque.norm() > 0.01 * scale);
     }
 }
@@ -126,7 +123,7 @@ TEST_CASE("To turn a punch takes the work that its torque says", "[wrench]") {
       const ToolPose pose{point, Eigen::AngleAxisd(turned, about) * Vector3::UnitZ()};
       ContactOptions options;
       options.gap_tolerance = 1e-12;
-      return stored(on.patch, press(on.patch, punch, pose, options));
+      return stored_under(on.patch, press(on.patch, punch, pose, options));
     };
     const ContactState state = press(on.patch, punch, {point, Vector3::UnitZ()});
     const double slope = (energy(angle) - energy(-angle)) / (2 * angle);
@@ -140,7 +137,7 @@ TEST_CASE("The supports bear the torque of the tool", "[wrench]") {
   for (const ContactCondition condition :
        {ContactCondition::frictionless, ContactCondition::frictional, ContactCondition::bonded}) {
     const PressedBlock& on = pressed_block(Method::galerkin);
-    const ToolPose pose = topology::pose_at(SphereTip{0.01}, Vector3(0.012, -0.006, -0.003), oblique);
+    const ToolPose pose = topology::pose_at(SphereTip{0.01}, Vector3(0.012, -0.006, -0.003), oblique_axis);
     ContactOptions options;
     options.condition = condition;
     options.friction = 0.4;

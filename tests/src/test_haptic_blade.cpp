@@ -4,6 +4,7 @@
 #include "src/haptics/haptic_tick.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
+#include "tests/src/device_poses.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -17,6 +18,7 @@ using namespace spherecut::app;
 using spherecut::tests::cut_block;
 using spherecut::tests::replaced;
 using spherecut::tests::TemporaryFolder;
+using spherecut::tests::unturned;
 
 namespace {
 

@@ -2,6 +2,7 @@
 #include "src/haptics/haptic_tick.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
+#include "tests/src/device_poses.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/allocation_counter.hpp"
@@ -13,27 +14,18 @@
 
 using namespace spherecut;
 using namespace spherecut::app;
+using spherecut::tests::around;
+using spherecut::tests::device_at;
 using spherecut::tests::replaced;
 using spherecut::tests::scenario_of;
 using spherecut::tests::small_scenario;
+using spherecut::tests::unturned;
 
 namespace {
-
-const Eigen::Quaterniond unturned = Eigen::Quaterniond::Identity();
 
 Scenario small(const std::string& method, const std::string& condition = "frictionless") {
   return scenario_of(small_scenario + "[method]\nname = \"" + method + "\"\n[contact]\ncondition = \"" + condition +
                      "\"\n");
-}
-
-DeviceState device_at(std::uint64_t tick, const Vector3& position) {
-  return {tick, 1e-3 * static_cast<double>(tick), position, Eigen::Quaterniond::Identity(), true};
-}
-
-/// Down to 2 mm, 4 mm sideways, and up again, all within contact from tick 60 on: a closed loop of 400 ticks.
-Vector3 around(std::uint64_t tick) {
-  const double angle = 2 * std::numbers::pi * static_cast<double>(tick) / 400;
-  return {0.002 * std::sin(angle), 0.001 * std::sin(2 * angle), 0.0292 - 0.001 * std::cos(angle)};
 }
 
 /// A snapshot of one ball on one candidate whose compliance is a plain spring of `stiffness` N/m.

@@ -5,6 +5,7 @@
 #include "src/session.hpp"
 #include "src/viewer/wire.hpp"
 
+#include "tests/src/device_poses.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/allocation_counter.hpp"
@@ -16,32 +17,23 @@
 
 using namespace spherecut;
 using namespace spherecut::app;
+using spherecut::tests::around;
 using spherecut::tests::cut_block;
+using spherecut::tests::device_at;
 using spherecut::tests::replaced;
 using spherecut::tests::run;
 using spherecut::tests::scenario_of;
 using spherecut::tests::session_of;
 using spherecut::tests::small_scenario;
+using spherecut::tests::unturned;
 
 namespace {
-
-const Eigen::Quaterniond unturned = Eigen::Quaterniond::Identity();
-
-DeviceState device_at(std::uint64_t tick, const Vector3& position, const Eigen::Quaterniond& turn = unturned) {
-  return {tick, 1e-3 * static_cast<double>(tick), position, turn, true};
-}
-
-/// Down to 2 mm, 4 mm sideways, and up again, all within contact.
-Vector3 around(std::uint64_t tick) {
-  const double angle = 2 * std::numbers::pi * static_cast<double>(tick) / 400;
-  return {0.002 * std::sin(angle), 0.001 * std::sin(2 * angle), 0.0292 - 0.001 * std::cos(angle)};
-}
 
 Eigen::Quaterniond about_y(double angle) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, Vector3::UnitY()));
 }
 
-constexpr double lever = 0.012; // m, of an edge from the blade's long axis, which is along it
+constexpr double edge_lever = 0.012; // m, of an edge from the blade's long axis, which is along it
 
 /// A blade whose edge lies beside its long axis, over the block as long as that; far too tough to cut.
 std::string levered_blade(const std::string& poses) {
@@ -49,15 +41,15 @@ std::string levered_blade(const std::string& poses) {
          "[cut]\nfront_spacing = 0.004\n[blade]\nedge = [[0.012, -0.02, 0], [0.012, 0.02, 0]]\nstep = 1\n" + poses;
 }
 
-/// Its frame over the block, turned about y: the edge goes down by `lever` times the sine.
-constexpr double over = 0.0305; // m
+/// Its frame over the block, turned about y: the edge goes down by `edge_lever` times the sine.
+constexpr double frame_height = 0.0305; // m
 
-DeviceState turned(std::uint64_t tick, double angle) {
-  return device_at(tick, {-0.01, 0, over}, about_y(angle));
+DeviceState turned_by(std::uint64_t tick, double angle) {
+  return device_at(tick, {-0.01, 0, frame_height}, about_y(angle));
 }
 
-std::string pose_text(int time, double angle) {
-  return "[[blade.path]]\ntime = " + std::to_string(time) + "\nposition = [-0.01, 0, " + std::to_string(over) +
+std::string turned_pose(int time, double angle) {
+  return "[[blade.path]]\ntime = " + std::to_string(time) + "\nposition = [-0.01, 0, " + std::to_string(frame_height) +
          "]\nrotation = [0, " + std::to_string(angle * 180 / std::numbers::pi) + ", 0]\n";
 }
 
@@ -160,10 +152,11 @@ TEST_CASE("The torque on the hand is handed over, scaled with the force, limited
 }
 
 TEST_CASE("A blade that is turned about its long axis feels a torque that opposes, of its force and its lever") {
-  const double touch = std::asin((over - 0.03) / lever); // angle at which the edge is at the surface
+  const double touch = std::asin((frame_height - 0.03) / edge_lever); // angle at which the edge is at the surface
   double before = 0;
-  Session session = session_of(levered_blade(pose_text(0, 0) + pose_text(1, touch + 0.06) + pose_text(2, touch + 0.12) +
-                                             pose_text(3, touch + 0.18) + pose_text(4, touch + 0.06)));
+  Session session =
+      session_of(levered_blade(turned_pose(0, 0) + turned_pose(1, touch + 0.06) + turned_pose(2, touch + 0.12) +
+                               turned_pose(3, touch + 0.18) + turned_pose(4, touch + 0.06)));
   std::vector<double> torques;
   for (const StepResult& result : run(session)) {
     const BladeReport& blade = result.cut->blade;
@@ -171,7 +164,7 @@ TEST_CASE("A blade that is turned about its long axis feels a torque that oppose
     if (blade.force.norm() == 0)
       continue;
     CHECK(blade.torque.y() < 0); // turned about +y
-    CHECK(blade.torque.y() == Approx(-lever * blade.force.z()).epsilon(0.05));
+    CHECK(blade.torque.y() == Approx(-edge_lever * blade.force.z()).epsilon(0.05));
     before = std::min(before, blade.torque.y());
   }
   REQUIRE(torques.size() == 5);
@@ -183,24 +176,24 @@ TEST_CASE("A blade that is turned about its long axis feels a torque that oppose
 }
 
 TEST_CASE("Between solves a blade in the hand feels that it is turned, as a solve would have it") {
-  HapticSimulation simulation(scenario_of(levered_blade(pose_text(0, 0) + pose_text(1, 0.3))));
-  const double touch = std::asin((over - 0.03) / lever);
-  simulation.prepare(turned(0, 0));
+  HapticSimulation simulation(scenario_of(levered_blade(turned_pose(0, 0) + turned_pose(1, 0.3))));
+  const double touch = std::asin((frame_height - 0.03) / edge_lever);
+  simulation.prepare(turned_by(0, 0));
   ContactSnapshot snapshot;
-  simulation.solve(turned(0, 0), 0, snapshot);
-  simulation.solve(turned(10, touch + 0.06), 0, snapshot);
-  simulation.solve(turned(20, touch + 0.12), 0, snapshot);
+  simulation.solve(turned_by(0, 0), 0, snapshot);
+  simulation.solve(turned_by(10, touch + 0.06), 0, snapshot);
+  simulation.solve(turned_by(20, touch + 0.12), 0, snapshot);
   REQUIRE(snapshot.blade.contacts > 0);
   BladeModel model;
   REQUIRE(model.solved(snapshot));
-  const Vector3 place = turned(0, 0).position;
-  CHECK(model.at(place, turned(0, touch + 0.12).orientation, 0).torque.norm() == 0); // found, and goes on from none
-  const ModelForce here = model.at(place, turned(0, touch + 0.12).orientation, 1);
+  const Vector3 place = turned_by(0, 0).position;
+  CHECK(model.at(place, turned_by(0, touch + 0.12).orientation, 0).torque.norm() == 0); // found, and goes on from none
+  const ModelForce here = model.at(place, turned_by(0, touch + 0.12).orientation, 1);
   CHECK(here.force == snapshot.force);
   CHECK((here.torque - snapshot.torque).norm() < 1e-12 * snapshot.torque.norm());
   const std::size_t before = tests::allocations();
-  const ModelForce on = model.at(place, turned(0, touch + 0.14).orientation, 1),
-                   back = model.at(place, turned(0, touch + 0.10).orientation, 1);
+  const ModelForce on = model.at(place, turned_by(0, touch + 0.14).orientation, 1),
+                   back = model.at(place, turned_by(0, touch + 0.10).orientation, 1);
   CHECK(tests::allocations() == before);
   CHECK(on.torque.y() < here.torque.y());
   CHECK(back.torque.y() > here.torque.y());
@@ -208,7 +201,7 @@ TEST_CASE("Between solves a blade in the hand feels that it is turned, as a solv
   const double work = -0.5 * (on.torque + back.torque).y() * 0.04;
   CHECK(*on.stored - *back.stored == Approx(work).epsilon(1e-6));
   ContactSnapshot there;
-  simulation.solve(turned(30, touch + 0.14), 0, there);
+  simulation.solve(turned_by(30, touch + 0.14), 0, there);
   CHECK((on.torque - there.torque).norm() < 0.05 * there.torque.norm());
   CHECK((on.force - there.force).norm() < 0.05 * there.force.norm());
 }
