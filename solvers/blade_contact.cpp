@@ -117,6 +117,20 @@ std::vector<Eigen::Index> entries_in(const BladePatch& known, const BladePatch& 
   return entries;
 }
 
+/// Torque of the drag, sum (x + u) x g over its points x with forces g: (u x g) . e = u . (g x e) for every axis e.
+/// `same` (may be null): a patch whose entries are those of this one.
+void condense_drag_torque(const Discretisation& body, const Field& base, const BladePatch* same, BladePatch& patch) {
+  std::vector<ForcePattern> turns(3, {patch.flanks.points, {}});
+  for (std::size_t k = 0; k < patch.flanks.points.size(); ++k) {
+    const Vector3& force = patch.flanks.forces[k];
+    patch.drag_torque += patch.flanks.points[k].cross(force);
+    for (int axis = 0; axis < 3; ++axis)
+      turns[static_cast<std::size_t>(axis)].forces.emplace_back(force.cross(Vector3::Unit(axis)));
+  }
+  patch.drag_torque += body.pattern_displacements(turns, {base}).col(0);
+  patch.drag_torques = same != nullptr ? same->drag_torques : body.pattern_displacements(turns, patch.responses);
+}
+
 } // namespace
 
 BladePatch condense_blade(const Discretisation& body, const Field& base, const std::vector<EdgeContact>& contacts,
@@ -164,6 +178,8 @@ BladePatch condense_blade(const Discretisation& body, const Field& base, const s
     patch.compliance = 0.5 * (compliance + compliance.transpose());
   }
   patch.base = body.pattern_displacements(patterns, {base}).col(0);
+  if (patch.dragged)
+    condense_drag_torque(body, base, is_same ? &before : nullptr, patch);
   if (!patch.compliance.allFinite())
     throw NumericalError(fmt::format("the compliance under {} contacts of a blade is not finite", contacts.size()));
   return patch;
@@ -204,6 +220,21 @@ BladeState push_blade(const BladePatch& patch, const VectorX& advance, double dr
                     "{:g} m past where it met the tissue",
                     m, n - m, m > 0 ? advance.maxCoeff() : 0.0));
   return state;
+}
+
+BladeTorque blade_torque(const BladePatch& patch, const BladeState& state, const std::vector<Vector3>& places,
+                         const Vector3& about) {
+  if (std::ssize(places) != count(patch))
+    throw InputError(fmt::format("{} places for {} contacts of a blade", places.size(), count(patch)));
+  BladeTorque torque;
+  for (std::size_t c = 0; c < places.size(); ++c)
+    torque.edge -= state.forces[static_cast<Eigen::Index>(c)] * (places[c] - about).cross(patch.contacts[c].push);
+  torque.blade = torque.edge;
+  if (patch.dragged) {
+    const Vector3 of_drag = patch.drag_torque + patch.drag_torques * state.forces - about.cross(patch.drag);
+    torque.blade -= state.forces[unilateral(patch)] * of_drag;
+  }
+  return torque;
 }
 
 Field deform(const BladePatch& patch, const BladeState& state, const Field& base) {

@@ -69,6 +69,10 @@ struct BladePatch {
   bool dragged = false;
   ForcePattern flanks;            // of the drag
   Vector3 drag = Vector3::Zero(); // N, on the tissue at amplitude 1
+  /// Of the drag at amplitude 1 on the tissue about the frame's origin: N m with its faces where `base` has them, and
+  /// what a unit of every entry adds by moving them (a column an entry). Empty without drag.
+  Vector3 drag_torque = Vector3::Zero();
+  MatrixX drag_torques;
   MatrixX compliance;
   VectorX base;
   std::vector<Field> responses;
@@ -96,6 +100,19 @@ struct BladeState {
 /// Blade at `advance` (one a contact), its flanks dragging by `drag` (-1 to 1; 0 at rest): no contact pulls, none gives
 /// way less than the blade asks, no lips go through one another.
 BladeState push_blade(const BladePatch& patch, const VectorX& advance, double drag = 0);
+
+/// Torque of the tissue on a blade, N m.
+struct BladeTorque {
+  Vector3 edge = Vector3::Zero();  // of the edge alone
+  Vector3 blade = Vector3::Zero(); // of edge and flanks
+};
+
+/// About a point, m, of the forces of a state: every piece of the edge bears its force where it is now (`places`, m,
+/// one a contact), the flanks bear their drag where the faces are that they rub. Turning the blade by a small angle
+/// about the point works against the edge's torque as moving it works against its force. Throws InputError unless there
+/// is a place for every contact.
+BladeTorque blade_torque(const BladePatch& patch, const BladeState& state, const std::vector<Vector3>& places,
+                         const Vector3& about);
 
 /// Field of the body under the blade.
 Field deform(const BladePatch& patch, const BladeState& state, const Field& base);

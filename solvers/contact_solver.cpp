@@ -80,6 +80,7 @@ void condense_along(const std::vector<Vector3>& normals, const MatrixX& complian
 
 void summarise(const ContactPatch& patch, ContactState& state) {
   state.tool_force.setZero();
+  state.tool_torque.setZero();
   state.centre.setZero();
   state.active_nodes = 0;
   state.contact_radius = 0;
@@ -87,6 +88,9 @@ void summarise(const ContactPatch& patch, ContactState& state) {
   Vector3 middle = Vector3::Zero(); // of nodes that are held without a force
   for (int c = 0; c < size_of(patch); ++c) {
     state.tool_force -= state.nodal_forces[c];
+    if (!state.nodal_forces[c].isZero(0))
+      state.tool_torque -=
+          (patch.rest[c] + state.displacement.segment<3>(3 * c) - state.pose.point).cross(state.nodal_forces[c]);
     if (!state.active[c])
       continue;
     ++state.active_nodes;
@@ -485,6 +489,10 @@ ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, c
                  -gap_of(pressed, patch, c, state.displacement.segment<3>(3 * c), flank_hold).distance);
   summarise(patch, state);
   return state;
+}
+
+Vector3 torque_about(const ContactState& state, const Vector3& point) {
+  return state.tool_torque + (state.pose.point - point).cross(state.tool_force);
 }
 
 std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState& state, double friction) {

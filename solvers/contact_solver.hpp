@@ -79,10 +79,13 @@ struct ContactState {
   std::optional<GripMemory> memory; // set where a contact goes on with other nodes: the rest of the state is then empty
   topology::ToolPose pose;          // of the tool in this state
   Vector3 tool_force = Vector3::Zero(); // N, force of the body on the tool
-  Vector3 centre = Vector3::Zero();     // m, rest position of the contact: mean weighted by normal force
-  double contact_radius = 0;            // m, outermost active node's distance from the centre plus half its spacing
-  double largest_penetration = 0;       // m, left over at convergence
-  double friction_work = 0;             // J, taken by friction on the way from the state before
+  /// N m, of the same nodal forces about `pose.point`, each where its node is now: rest position and displacement. Of
+  /// prescribe(), which has no tool, about the origin.
+  Vector3 tool_torque = Vector3::Zero();
+  Vector3 centre = Vector3::Zero(); // m, rest position of the contact: mean weighted by normal force
+  double contact_radius = 0;        // m, outermost active node's distance from the centre plus half its spacing
+  double largest_penetration = 0;   // m, left over at convergence
+  double friction_work = 0;         // J, taken by friction on the way from the state before
   int active_nodes = 0;
   int iterations = 0;
   bool converged = true;
@@ -103,6 +106,9 @@ ContactState among(const ContactPatch& patch, const ContactState& state, const s
 /// range, and a `previous` of another patch.
 ContactState press(const ContactPatch& patch, const topology::ToolShape& tool, const topology::ToolPose& pose,
                    const ContactOptions& options = {}, const ContactState* previous = nullptr);
+
+/// Torque of the body on the tool about another point than the tool's, N m: it changes by (pose.point - point) x force.
+Vector3 torque_about(const ContactState& state, const Vector3& point);
 
 /// What friction needs to go on with other nodes than those of this patch; nothing without contact.
 std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState& state, double friction);

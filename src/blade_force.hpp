@@ -19,11 +19,12 @@ namespace spherecut::app {
 
 /// What the blade feels at the end of a step, and where its work has gone since the start.
 struct BladeReport {
-  Vector3 force = Vector3::Zero(); // N, of the tissue on the blade: edge and flanks
-  double edge_force = 0;           // N, of the edge alone
-  double advance = 0;              // m, farthest that the edge has pushed material ahead of itself
-  double release = 0;              // J/m2, of the edge's force on the front that it presses
-  int contacts = 0;                // pieces of the edge that press
+  Vector3 force = Vector3::Zero();  // N, of the tissue on the blade: edge and flanks
+  Vector3 torque = Vector3::Zero(); // N m, of the same about the origin of the blade's frame
+  double edge_force = 0;            // N, of the edge alone
+  double advance = 0;               // m, farthest that the edge has pushed material ahead of itself
+  double release = 0;               // J/m2, of the edge's force on the front that it presses
+  int contacts = 0;                 // pieces of the edge that press
   bool converged = true;
   solvers::BladeLedger ledger;
 };
@@ -149,6 +150,7 @@ class BladeForce {
   [[nodiscard]] std::vector<topology::BladePose> poses_up_to(std::size_t front, std::size_t last, double remaining);
   [[nodiscard]] std::vector<std::size_t> stops() const;
   [[nodiscard]] BladeReport report_of(const solvers::BladeState& state) const;
+  [[nodiscard]] solvers::BladeTorque torque() const;
   void press(const BodyModel& now);
 
   BladeSettings settings_;

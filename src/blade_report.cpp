@@ -16,7 +16,19 @@ solvers::Field BladeForce::field(const BodyModel& body) const {
 }
 
 BladeReport BladeForce::report() const {
-  return state_ ? report_of(*state_) : BladeReport{.ledger = ledger_};
+  if (!state_)
+    return BladeReport{.ledger = ledger_};
+  BladeReport report = report_of(*state_);
+  report.torque = torque().blade;
+  return report;
+}
+
+// About the origin of the blade's frame where the blade is; it must be in the body.
+solvers::BladeTorque BladeForce::torque() const {
+  std::vector<Vector3> places;
+  for (const int piece : meeting_.pieces)
+    places.push_back(placed(at_, edge_[static_cast<std::size_t>(piece)].point));
+  return solvers::blade_torque(meeting_.patch, *state_, places, at_.position);
 }
 
 // Stiffness and the force at which the next cut is due come from the blade moved on along the way of its edge.
@@ -27,12 +39,18 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
   if (!state_)
     return grip;
   const BladeReport here = report_of(*state_);
-  Vector3 way = Vector3::Zero();
-  for (const solvers::EdgeContact& contact : meeting_.patch.contacts)
+  Vector3 way = Vector3::Zero(), turn = Vector3::Zero();
+  for (std::size_t c = 0; c < meeting_.pieces.size(); ++c) {
+    const solvers::EdgeContact& contact = meeting_.patch.contacts[c];
     way += contact.length * contact.push;
+    const Vector3& point = edge_[static_cast<std::size_t>(meeting_.pieces[c])].point;
+    turn += contact.length * (at_.orientation * point).cross(contact.push);
+  }
   if (!(way.norm() > 0)) // pieces that are driven apart
     return grip;
   grip.along = here.edge_force > 0 ? Vector3(-state_->edge_force / here.edge_force) : way.normalized();
+  const solvers::BladeTorque torque = this->torque();
+  grip.arm = here.edge_force > 0 ? Vector3(-torque.edge / here.edge_force) : Vector3(turn / way.norm());
   grip.contacts = static_cast<int>(meeting_.pieces.size());
   grip.places = std::min(grip.contacts, BladeGrip::most_places);
   for (int k = 0; k < grip.places; ++k) { // from the first to the last
@@ -41,8 +59,10 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
     grip.place[static_cast<std::size_t>(k)] = way_.back().orientation * point;
   }
   grip.force = state_->blade_force;
+  grip.torque = torque.blade;
   grip.edge = here.edge_force;
   grip.drag = (meeting_.drawn_back ? -1.0 : 1.0) * (state_->blade_force - state_->edge_force);
+  grip.drag_torque = (meeting_.drawn_back ? -1.0 : 1.0) * (torque.blade - torque.edge);
   grip.stored = state_->stored;
   grip.release = here.release;
   const double friction = meeting_.patch.dragged ? 1 : 0;

@@ -32,7 +32,7 @@ std::string_view cut_columns() {
          "closed_pairs,lips_converged,nodes,kept_nodes,surface_hash,topology_s,level_sets_s,visibility_s,sprinkling_s,"
          "assembly_s,solve_s,update,update_reason,blade_force_x_N,blade_force_y_N,"
          "blade_force_z_N,edge_force_N,advance_m,release_J_m2,work_J,surface_J,crushing_J,friction_J,excess_J,stored_J,"
-         "reason\n";
+         "reason,blade_torque_x_Nm,blade_torque_y_Nm,blade_torque_z_Nm\n";
 }
 
 std::string hash_text(std::uint64_t hash) {
@@ -45,14 +45,15 @@ std::string cut_row(double time, const CutReport& r) {
     volumes += fmt::format("{}{:.12g}", volumes.empty() ? "" : ";", volume);
   return fmt::format(
       "{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
-      "{:.4g},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{}\n",
+      "{:.4g},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:."
+      "9g},{:.9g}\n",
       time, r.triangles, r.refused ? 1 : 0, r.sheets, r.area, r.front_length, r.pieces, r.unheld, volumes, r.opening,
       r.opening_volume, r.lip_pairs, r.closed_pairs, r.lips_converged ? 1 : 0, r.nodes, r.kept_nodes,
       hash_text(r.surface_hash), r.seconds.topology, r.seconds.level_sets, r.seconds.visibility, r.seconds.sprinkling,
       r.seconds.assembly, r.seconds.solve, to_string(r.update), csv_quoted(r.update_reason), r.blade.force.x(),
       r.blade.force.y(), r.blade.force.z(), r.blade.edge_force, r.blade.advance, r.blade.release, r.blade.ledger.work,
       r.blade.ledger.surface, r.blade.ledger.crushing, r.blade.ledger.friction, r.blade.ledger.excess,
-      r.blade.ledger.stored, csv_quoted(r.reason));
+      r.blade.ledger.stored, csv_quoted(r.reason), r.blade.torque.x(), r.blade.torque.y(), r.blade.torque.z());
 }
 
 void write_wound(const std::filesystem::path& file, const Session& session) {

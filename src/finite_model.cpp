@@ -162,6 +162,7 @@ FiniteStep FiniteModel::solve(const std::optional<topology::ToolPose>& pose) {
   const solvers::EquilibriumStatus status = equilibrium_.solve(loading);
   FiniteStep step;
   step.force = status.tool_force;
+  step.torque = status.tool_torque;
   step.active_nodes = status.touching;
   step.iterations = status.iterations;
   step.residual = status.residual;

@@ -22,6 +22,7 @@ struct DeviceLimits {
   double gain = 1;            // force on the hand per force of the tissue
   double force = 3.3;         // N, saturation
   double slew = 500;          // N/s, of the whole force vector
+  double torque = 0.1;        // N m, saturation; from none to it takes as long as from none to that of the force
   double stiffness = 1000;    // N/m, the stiffest contact it renders steadily
   double damping = 5;         // N s/m, most that the controller may add
   double resolution = 5.5e-5; // m, of its position sensor

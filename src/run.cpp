@@ -40,6 +40,9 @@ std::string findings_text(const Session& session, const RunOutput& output, const
                           (peak.force - peak.tangential).norm(), along);
     text += fmt::format("  on the tool [{:.4g}, {:.4g}, {:.4g}] N; contact radius {:.3g} mm, {} nodes in contact\n",
                         peak.force.x(), peak.force.y(), peak.force.z(), 1e3 * peak.contact_radius, peak.active_nodes);
+    if (const auto& turning = found.peak_torque; turning.torque.norm() > 0)
+      text += fmt::format("  largest torque about its point {:.4g} mN m at t = {:.3g} s\n", 1e3 * turning.torque.norm(),
+                          turning.time);
     text += session.body() == nullptr
                 ? fmt::format("  {} nodes, law {}, {} iterations a step, least volume ratio {:.3g}, largest residual "
                               "{:.1e}\n",

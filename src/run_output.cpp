@@ -18,18 +18,18 @@ constexpr std::string_view force_columns = // followed by least_jacobian where t
     "time_s,tool_x_m,tool_y_m,tool_z_m,axis_x,axis_y,axis_z,force_x_N,force_y_N,force_z_N,force_N,contact_x_m,"
     "contact_y_m,contact_z_m,depth_m,contact_radius_m,active_nodes,candidate_nodes,nodes,iterations,converged,residual,"
     "penetration_m,rotation_deg,resprinkled,force_jump,seconds,normal_x_N,normal_y_N,normal_z_N,normal_N,"
-    "tangential_x_N,tangential_y_N,tangential_z_N,tangential_N";
+    "tangential_x_N,tangential_y_N,tangential_z_N,tangential_N,torque_x_Nm,torque_y_Nm,torque_z_Nm,torque_Nm";
 
 std::string force_row(const StepResult& s, bool is_nonlinear) {
   const auto vector = [](const Vector3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z()); };
   const Vector3 normal = s.force - s.tangential;
   return fmt::format("{:.9g},{},{},{},{:.9g},{},{:.9g},{:.9g},{},{},{},{},{},{:.3e},{:.3e},{:.4g},{},{:.4g},{:.4g},"
-                     "{},{:.9g},{},{:.9g}{}\n",
+                     "{},{:.9g},{},{:.9g},{},{:.9g}{}\n",
                      s.time, vector(s.pose.point), vector(s.pose.axis), vector(s.force), s.force.norm(),
                      vector(s.contact.point), s.contact.depth, s.contact_radius, s.active_nodes, s.candidates, s.nodes,
                      s.iterations, s.converged ? 1 : 0, s.residual, s.largest_penetration, s.rotation_degrees,
                      s.resprinkled ? 1 : 0, s.force_jump, s.seconds, vector(normal), normal.norm(),
-                     vector(s.tangential), s.tangential.norm(),
+                     vector(s.tangential), s.tangential.norm(), vector(s.torque), s.torque.norm(),
                      is_nonlinear ? fmt::format(",{:.6g}", s.least_jacobian) : "");
 }
 
@@ -126,6 +126,7 @@ void RunOutput::add(const Session& session, const StepResult& step) {
     if (step.cut->pieces != before)
       check_pieces(session, step.time);
     findings_.cut = *step.cut;
+    findings_.peak_blade_torque.take(step.cut->blade.torque, step.time);
     findings_.largest_opening = std::max(findings_.largest_opening, step.cut->opening);
     findings_.increments += step.cut->update != SystemUpdate::none ? 1 : 0; // the blade's; a tear has its own
     findings_.refused_cuts += step.cut->refused ? 1 : 0;
@@ -154,6 +155,7 @@ void RunOutput::add(const Session& session, const StepResult& step) {
   findings_.least_jacobian = std::min(findings_.least_jacobian, step.least_jacobian);
   if (step.resprinkled)
     findings_.resprinkles.emplace_back(step.time, step.force_jump);
+  findings_.peak_torque.take(step.torque, step.time);
   if (step.force.norm() > 0)
     findings_.touched = true;
   if (step.force.norm() > findings_.peak.force.norm()) {

@@ -20,6 +20,18 @@ struct RunFindings {
   std::size_t planned = 0; // of the motion
   bool touched = false;    // a force was felt
   StepResult peak;         // step of the largest force
+  /// The largest torque about a reference point.
+  struct PeakTorque {
+    Vector3 torque = Vector3::Zero(); // N m
+    double time = 0;                  // s
+    void take(const Vector3& candidate, double at) {
+      if (candidate.norm() > torque.norm()) {
+        torque = candidate;
+        time = at;
+      }
+    }
+  };
+  PeakTorque peak_torque, peak_blade_torque; // of the tool, and of a blade that the tissue resists
   double largest_residual = 0, largest_rotation_degrees = 0;
   std::vector<int> iterations;                        // of the steps of a body at finite strain that took any
   double least_jacobian = 1;                          // of these

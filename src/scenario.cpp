@@ -244,13 +244,10 @@ HapticSettings haptics(const Section& section, const std::filesystem::path& scen
   haptics.bridge = {bridge.text("address"), static_cast<int>(bridge.integer("port")), bridge.number("timeout")};
   haptics.haply = haply(section.table("haply"), offences);
   const Section limits = section.table("limits");
-  haptics.limits = {limits.number("gain"),
-                    limits.number("force"),
-                    limits.number("slew"),
-                    limits.number("stiffness"),
-                    limits.number("damping"),
-                    limits.number("resolution"),
-                    static_cast<int>(limits.integer("delay"))};
+  haptics.limits = {limits.number("gain"),       limits.number("force"),
+                    limits.number("slew"),       limits.number("torque"),
+                    limits.number("stiffness"),  limits.number("damping"),
+                    limits.number("resolution"), static_cast<int>(limits.integer("delay"))};
   const Section hand = section.table("hand");
   haptics.hand = {hand.number("mass"),       hand.number("stiffness"), hand.number("damping"),
                   haptics.limits.resolution, haptics.limits.delay,     true};

@@ -503,6 +503,8 @@ constexpr std::array keys = {
     ScenarioKey{"haptics.limits.gain", number, "", "1.0", "Force on the hand per force of the tissue.", from(0, 1000)},
     ScenarioKey{"haptics.limits.force", number, "N", "3.3", "Largest force.", from(1e-3, 1000)},
     ScenarioKey{"haptics.limits.slew", number, "N/s", "500.0", "Fastest change of the force.", from(1e-3, 1e6)},
+    ScenarioKey{"haptics.limits.torque", number, "N m", "0.1",
+                "Largest torque; the time from none to it is that of the force, force / slew.", from(0, 100)},
     ScenarioKey{"haptics.limits.stiffness", number, "N/m", "1000.0",
                 "Stiffest contact that the device renders steadily; with the controller on, a stiffer one is rendered "
                 "as stiff as that.",

@@ -513,6 +513,7 @@ void Session::evaluate(StepResult& result) {
   const StageTimer timer(profile_.evaluate);
   const solvers::ContactState& tool = model_.state->tool;
   result.force = tool.tool_force;
+  result.torque = tool.tool_torque;
   result.tangential = solvers::tangential_force(
       model_.patch, tool, grasps() ? solvers::ContactCondition::bonded : scenario_.contact.condition);
   result.contact_radius = tool.contact_radius;

@@ -33,6 +33,7 @@ struct StepResult {
   double time = 0; // s
   topology::ToolPose pose;
   Vector3 force = Vector3::Zero();      // N, of the organ on the tool
+  Vector3 torque = Vector3::Zero();     // N m, of the organ on the tool about its reference point, pose.point
   Vector3 tangential = Vector3::Zero(); // N, the part of it along the surface (solvers::tangential_force)
   topology::SurfaceContact contact;     // deepest point on the surface at rest
   double contact_radius = 0;            // m

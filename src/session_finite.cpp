@@ -67,6 +67,7 @@ void Session::step_finite(const StepSample& sample, StepResult& result) {
   interruption_point();
   const FiniteStep step = solve_finite(sample.time, sample.tool);
   result.force = step.force;
+  result.torque = step.torque;
   result.contact_radius = step.contact_radius;
   result.active_nodes = step.active_nodes;
   result.candidates = finite_->candidates();

@@ -79,6 +79,10 @@ OrderedJson peak(const StepResult& step) {
           {"active_nodes", step.active_nodes}};
 }
 
+OrderedJson peak(const RunFindings::PeakTorque& peak) {
+  return {{"newton_metres", peak.torque.norm()}, {"vector_Nm", json(peak.torque)}, {"time_s", peak.time}};
+}
+
 OrderedJson solver(const Session& session, const RunFindings& findings) {
   OrderedJson out = {{"largest_residual", findings.largest_residual},
                      {"largest_rotation_degrees", findings.largest_rotation_degrees},
@@ -138,9 +142,11 @@ OrderedJson cut(const Session& session, const RunFindings& findings) {
                   {"closed_pairs", last.closed_pairs},
                   {"lips", solvers::to_string(session.scenario().cut.lips)},
                   {"surface_hash", hash_text(last.surface_hash)}};
-  if (session.blade() != nullptr)
+  if (session.blade() != nullptr) {
     for (const AccountEntry& entry : account_of(last.blade.ledger))
       out["blade"][entry.key] = entry.joules;
+    out["blade"]["peak_torque"] = peak(findings.peak_blade_torque);
+  }
   return out;
 }
 
@@ -191,6 +197,7 @@ std::string summary_json(const Session& session, const RunOutput& output, RunSta
   summary["touched"] = findings.touched;
   summary["steps"] = {{"done", findings.steps}, {"planned", findings.planned}};
   summary["peak_force"] = findings.touched ? peak(findings.peak) : OrderedJson(nullptr);
+  summary["peak_torque"] = findings.touched ? peak(findings.peak_torque) : OrderedJson(nullptr);
   summary["cut"] = session.cuts() ? cut(session, findings) : OrderedJson(nullptr);
   summary["tear"] = session.tears() ? tear(findings) : OrderedJson(nullptr);
   summary["nodes"] = nodes(session);

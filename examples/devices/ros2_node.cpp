@@ -47,8 +47,10 @@ class BridgeNode : public rclcpp::Node {
     stamped.wrench.force.x = force[0];
     stamped.wrench.force.y = force[1];
     stamped.wrench.force.z = force[2];
-    // Version 1 of the bridge carries force alone.
-    stamped.wrench.torque.x = stamped.wrench.torque.y = stamped.wrench.torque.z = 0;
+    const double* torque = bridge_.torque();
+    stamped.wrench.torque.x = torque[0];
+    stamped.wrench.torque.y = torque[1];
+    stamped.wrench.torque.z = torque[2];
     wrench_->publish(stamped);
   }
 

@@ -1,4 +1,4 @@
-// A client of the haptic bridge (docs/haptic_bridge.md, version 1): POSIX sockets and the standard library alone.
+// A client of the haptic bridge (docs/haptic_bridge.md, version 2): POSIX sockets and the standard library alone.
 #pragma once
 
 #include <arpa/inet.h>
@@ -11,19 +11,20 @@ namespace haptic_bridge {
 
 struct Pose { // what goes out: 88 bytes, little endian, nothing between the fields
   std::uint32_t magic = 0x42485053;
-  std::uint16_t version = 1, kind = 2; // 1 hello and 3 goodbye are the first 16 bytes alone
+  std::uint16_t version = 2, kind = 2; // 1 hello and 3 goodbye are the first 16 bytes alone
   std::uint64_t token = 0, sequence = 0;
   double position[3] = {}, orientation[4] = {0, 0, 0, 1}; // m; x, y, z, w
   std::uint16_t mode = 0, buttons = 0;
   std::uint32_t zero = 0;
 };
-struct Force { // what comes in: 88 bytes
+struct Force { // what comes in: 112 bytes; in version 1 it ends before the torque
   std::uint32_t magic = 0;
   std::uint16_t version = 0, kind = 0;
   std::uint64_t token = 0, tick = 0, sequence = 0;
   double force[3] = {}, position[3] = {}, timeout = 0; // N, m, s
+  double torque[3] = {};                               // N m
 };
-static_assert(sizeof(Pose) == 88 && sizeof(Force) == 88, "packets have no gaps");
+static_assert(sizeof(Pose) == 88 && sizeof(Force) == 112, "packets have no gaps");
 
 /// Where a device is, in the axes of the scenario.
 struct Motion {
@@ -58,7 +59,7 @@ class Client {
   /// its turn since then turns a tool whose axis is +z.
   const double* exchange(const Motion& motion) {
     for (Force next; recv(link_, &next, sizeof next, MSG_DONTWAIT) == sizeof next;)
-      if (next.magic == pose_.magic && next.version == 1 && next.kind == 4) {
+      if (next.magic == pose_.magic && next.version == pose_.version && next.kind == 4) {
         if (next.token != session_) {
           for (int axis = 0; axis < 3; ++axis)
             start_[axis] = next.position[axis] - motion.position[axis];
@@ -82,6 +83,8 @@ class Client {
     send(link_, &pose_, pose_.kind == 2 ? sizeof pose_ : 16, MSG_DONTWAIT);
     return pose_.token != 0 ? force_.force : none_;
   }
+  /// The torque that belongs to that force, about the tool's reference point, N m.
+  const double* torque() const { return held() ? force_.torque : none_; }
   /// Forces that have come.
   long heard() const { return heard_; }
   /// Whether a session goes on.

@@ -72,6 +72,16 @@ void bind_states(py::module_& module) {
           "force", [](const ContactState& self) { return array_of(self.tool_force); },
           "(3,), N, of the body on the tool.")
       .def_property_readonly(
+          "torque", [](const ContactState& self) { return array_of(self.tool_torque); },
+          "(3,), N m, of the same forces about the tool's point, each where its node is now; of prescribe() about the "
+          "origin.")
+      .def(
+          "torque_about",
+          [](const ContactState& self, const Doubles& point) {
+            return array_of(solvers::torque_about(self, vector_from(point, "point")));
+          },
+          "point"_a, "(3,), N m, about another point, (3,), m.")
+      .def_property_readonly(
           "nodal_forces",
           [](const py::object& self) { return view(self.cast<const ContactState&>().nodal_forces, self); },
           "(m, 3), N, on the body; the state's own memory.")

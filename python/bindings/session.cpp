@@ -196,12 +196,19 @@ void bind_results(py::module_& module) {
       .def_property_readonly(
           "force", [](const StepResult& self) { return array_of(self.force); }, "(3,), N, of the organ on the tool.")
       .def_property_readonly(
+          "torque", [](const StepResult& self) { return array_of(self.torque); },
+          "(3,), N m, of the organ on the tool about its reference point, the outermost point of its tip.")
+      .def_property_readonly(
           "tangential", [](const StepResult& self) { return array_of(self.tangential); },
           "(3,), N: the part of it along the surface.")
       .def_property_readonly(
           "blade_force",
           [](const StepResult& self) { return array_of(self.cut ? self.cut->blade.force : Vector3(Vector3::Zero())); },
           "(3,), N, of the tissue on the blade; zero where the material has no toughness.")
+      .def_property_readonly(
+          "blade_torque",
+          [](const StepResult& self) { return array_of(self.cut ? self.cut->blade.torque : Vector3(Vector3::Zero())); },
+          "(3,), N m, of the same about the origin of the blade's frame.")
       .def_readonly("contact", &StepResult::contact, "SurfaceContact at rest.")
       .def_readonly("contact_radius", &StepResult::contact_radius, "m.")
       .def_readonly("nodes", &StepResult::nodes, "Number of nodes.")

@@ -48,6 +48,8 @@ py::dict force_row(const app::StepResult& r) {
   row["normal_N"] = normal.norm();
   put(row, "tangential", r.tangential, "_N");
   row["tangential_N"] = r.tangential.norm();
+  put(row, "torque", r.torque, "_Nm");
+  row["torque_Nm"] = r.torque.norm();
   return row;
 }
 
@@ -84,6 +86,7 @@ py::dict cut_row(double time, const app::CutReport& r) {
   row["excess_J"] = r.blade.ledger.excess;
   row["stored_J"] = r.blade.ledger.stored;
   row["reason"] = r.reason;
+  put(row, "blade_torque", r.blade.torque, "_Nm");
   return row;
 }
 

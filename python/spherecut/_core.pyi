@@ -559,6 +559,13 @@ class ContactState:
     def force(self) -> npt.NDArray[Any]:
         """(3,), N, of the body on the tool."""
     @property
+    def torque(self) -> npt.NDArray[Any]:
+        """(3,), N m, of the same forces about the tool's point, each where its node is now; of prescribe() about the
+        origin.
+        """
+    def torque_about(self, point: npt.ArrayLike) -> npt.NDArray[Any]:
+        """(3,), N m, about another point, (3,), m."""
+    @property
     def nodal_forces(self) -> npt.NDArray[Any]:
         """(m, 3), N, on the body; the state's own memory."""
     @property
@@ -805,11 +812,17 @@ class StepResult:
     def force(self) -> npt.NDArray[Any]:
         """(3,), N, of the organ on the tool."""
     @property
+    def torque(self) -> npt.NDArray[Any]:
+        """(3,), N m, of the organ on the tool about its reference point, the outermost point of its tip."""
+    @property
     def tangential(self) -> npt.NDArray[Any]:
         """(3,), N: the part of it along the surface."""
     @property
     def blade_force(self) -> npt.NDArray[Any]:
         """(3,), N, of the tissue on the blade; zero where the material has no toughness."""
+    @property
+    def blade_torque(self) -> npt.NDArray[Any]:
+        """(3,), N m, of the same about the origin of the blade's frame."""
     @property
     def contact(self) -> SurfaceContact:
         """SurfaceContact at rest."""

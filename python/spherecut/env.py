@@ -138,6 +138,8 @@ class CuttingEnv(_Base):  # type: ignore[misc]
     time             (1,)   s
     tool_force       (3,)   N, of the organ on the tool; zero without a tool
     blade_force      (3,)   N, of the tissue on the blade; zero without a toughness
+    tool_torque      (3,)   N m, of that force about the tool's reference point
+    blade_torque     (3,)   N m, of that force about the origin of the blade's frame
     tool_position    (3,)   m, of its reference point
     blade_position   (3,)   m, origin of the blade's frame
     cut_area         (1,)   m2
@@ -193,7 +195,7 @@ class CuttingEnv(_Base):  # type: ignore[misc]
         if most_steps < 1 or places < 0:
             raise InputError(f"most_steps: {most_steps}, places: {places}; allowed: from 1, from 0")
         self.action_space = _Box(-1.0, 1.0, shape=(3 * len(holds),), dtype=np.float64)
-        free = {name: 3 for name in ("tool_force", "blade_force", "tool_position", "blade_position")}
+        free = {f"{thing}_{what}": 3 for what in ("force", "torque", "position") for thing in ("tool", "blade")}
         positive = {name: 1 for name in ("time", "cut_area", "front_length", "pieces", "opening")}
         if places > 0:
             positive["release"] = places
@@ -283,6 +285,8 @@ class CuttingEnv(_Base):  # type: ignore[misc]
             "time": np.array([result.time]),
             "tool_force": result.force,
             "blade_force": result.blade_force,
+            "tool_torque": result.torque,
+            "blade_torque": result.blade_torque,
             "tool_position": np.array(self._at["tool"]),
             "blade_position": np.array(self._at["blade"]),
             "cut_area": np.array([cut.get("area_m2", 0.0)]),

@@ -218,6 +218,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     status.touching = contact_->touching();
     status.penetration = contact_->deepest();
     status.tool_force = contact_->tool_force();
+    status.tool_torque = contact_->tool_torque();
   }
   before_ = std::move(state_);
   has_before_ = true;

@@ -41,12 +41,13 @@ struct EquilibriumStatus {
   bool converged = false;
   int iterations = 0, evaluations = 0, line_searches = 0; // line searches: of more than one evaluation
   int steps = 0, halvings = 0, factorisations = 0, newton_steps = 0;
-  double residual = 0;                  // unbalanced over acting forces
-  double least_jacobian = 1;            // of all points
-  double energy = 0;                    // J, strain energy
-  int touching = 0;                     // shares that touch the tool
-  double penetration = 0;               // in spacings
-  Vector3 tool_force = Vector3::Zero(); // N, of the body on the tool
+  double residual = 0;                   // unbalanced over acting forces
+  double least_jacobian = 1;             // of all points
+  double energy = 0;                     // J, strain energy
+  int touching = 0;                      // shares that touch the tool
+  double penetration = 0;                // in spacings
+  Vector3 tool_force = Vector3::Zero();  // N, of the body on the tool
+  Vector3 tool_torque = Vector3::Zero(); // N m, of the same about the tool's point
 };
 
 class Equilibrium {

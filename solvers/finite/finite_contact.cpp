@@ -40,7 +40,7 @@ double FiniteContact::add(const VectorX& coefficients, VectorX& forces) {
       continue;
     energy += 0.5 * force * force / stiffness_[c];
     deepest_ = std::max(deepest_, gap.distance / body_.problem().nodes.spacings[nodes_[c]]); // a force across a gap
-    active_.push_back({static_cast<int>(c), gap.normal, force});
+    active_.push_back({static_cast<int>(c), gap.normal, x, force});
     for (std::size_t k = 0; k < means_[c].nodes.size(); ++k)
       own.segment<3>(3 * means_[c].nodes[k]) -= means_[c].weights[k] * force * gap.normal;
   }
@@ -59,6 +59,13 @@ Vector3 FiniteContact::tool_force() const {
   Vector3 sum = Vector3::Zero();
   for (const Active& active : active_)
     sum -= active.force * active.normal;
+  return sum;
+}
+
+Vector3 FiniteContact::tool_torque() const {
+  Vector3 sum = Vector3::Zero();
+  for (const Active& active : active_)
+    sum -= active.force * (active.place - pose_.point).cross(active.normal);
   return sum;
 }
 

@@ -33,9 +33,10 @@ class FiniteContact {
   [[nodiscard]] std::vector<double> known_forces() const { return known_; }
   void set_known_forces(const std::vector<double>& forces) { known_ = forces; }
 
-  /// At the last call of add(): what the tool gets, N; the largest depth of a middle in the tool, or gap of one that
-  /// bears a force, over the spacing there; how many shares touch; norm of the nodal forces.
+  /// At the last call of add(): what the tool gets, N, and N m about its point; the largest depth of a middle in the
+  /// tool, or gap of one that bears a force, over the spacing there; how many shares touch; norm of the nodal forces.
   [[nodiscard]] Vector3 tool_force() const;
+  [[nodiscard]] Vector3 tool_torque() const;
   [[nodiscard]] double deepest() const { return deepest_; }
   [[nodiscard]] int touching() const { return static_cast<int>(active_.size()); }
   [[nodiscard]] double force_norm() const { return force_norm_; }
@@ -51,6 +52,7 @@ class FiniteContact {
   struct Active {
     int candidate;
     Vector3 normal; // out of the tool
+    Vector3 place;  // m, of the share's middle
     double force;   // N
   };
   const FiniteBody& body_;

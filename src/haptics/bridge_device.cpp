@@ -155,7 +155,7 @@ void BridgeDevice::take(std::size_t packet) noexcept {
     if (held_)
       counters_.others += holder ? 0 : 1;
     else
-      reply(from, token_for(from), Vector3::Zero());
+      reply(from, token_for(from), request.version, Vector3::Zero(), Vector3::Zero());
     return;
   }
   if (!held_ && request.kind == BridgePacket::pose && request.token == token_for(from)) {
@@ -163,12 +163,17 @@ void BridgeDevice::take(std::size_t packet) noexcept {
     held_ = true;
     posed_ = false;
     token_ = request.token;
+    version_ = request.version;
     ++sessions_;
     pace_.begin();
     socket_->client = from;
     socket_->connect_to(from);
   } else if (!holder || request.token != token_) {
     ++counters_.others;
+    return;
+  }
+  if (request.version != version_) {
+    ++counters_.garbage;
     return;
   }
   if (request.kind == BridgePacket::goodbye) {
@@ -226,18 +231,20 @@ std::uint64_t BridgeDevice::token_for(const sockaddr_in& from) const noexcept {
   return std::max<std::uint64_t>(keyed_hash(key_, sessions_, place), 1);
 }
 
-void BridgeDevice::reply(const sockaddr_in& to, std::uint64_t token, const Vector3& force) noexcept {
-  std::array<std::byte, bridge_body> bytes{};
-  const std::size_t size =
-      write_packet(BridgeReply{token, state_.tick, posed_ ? sequence_ : 0, force, state_.position, timeout_}, bytes);
+void BridgeDevice::reply(const sockaddr_in& to, std::uint64_t token, std::uint16_t version, const Vector3& force,
+                         const Vector3& torque) noexcept {
+  std::array<std::byte, bridge_wrench> bytes{};
+  const std::size_t size = write_packet(
+      BridgeReply{token, state_.tick, posed_ ? sequence_ : 0, force, state_.position, timeout_, torque, version},
+      bytes);
   if (::sendto(socket_->open, bytes.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to),
                sizeof to) < 0)
     ++counters_.unsent;
 }
 
-void BridgeDevice::apply(const Vector3& force) noexcept {
+void BridgeDevice::render(const Vector3& force, const Vector3& torque) noexcept {
   if (held_)
-    reply(socket_->client, token_, force);
+    reply(socket_->client, token_, version_, force, torque);
 }
 
 } // namespace spherecut::app

@@ -44,8 +44,9 @@ class BridgeDevice : public Device {
   /// The newest pose of the client that holds the tool, or where the loop has it on the way there (client_pace.hpp).
   /// Not connected: nobody does; the tool stays where it was.
   DeviceState read(std::uint64_t tick) noexcept override;
-  /// Sends the force to that client.
-  void apply(const Vector3& force) noexcept override;
+  /// Sends the force to that client, and the torque if it speaks of one (its version).
+  void apply(const Vector3& force) noexcept override { render(force, Vector3::Zero()); }
+  void render(const Vector3& force, const Vector3& torque) noexcept override;
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
   /// From any thread.
@@ -59,7 +60,8 @@ class BridgeDevice : public Device {
   void take(std::size_t packet) noexcept;
   void release() noexcept;
   [[nodiscard]] std::uint64_t token_for(const sockaddr_in& from) const noexcept;
-  void reply(const sockaddr_in& to, std::uint64_t token, const Vector3& force) noexcept;
+  void reply(const sockaddr_in& to, std::uint64_t token, std::uint16_t version, const Vector3& force,
+             const Vector3& torque) noexcept;
 
   std::unique_ptr<Socket> socket_;
   double rate_, timeout_;
@@ -70,6 +72,7 @@ class BridgeDevice : public Device {
   std::array<std::uint64_t, 2> key_{}; // of the tokens
   std::uint64_t sessions_ = 0;         // that have begun
   std::uint64_t token_ = 0, sequence_ = 0, heard_ = 0;
+  std::uint16_t version_ = 1; // of the client that holds the tool
   ClientPace pace_;
   PaceWatch pace_watch_;
   BridgeCounters counters_;

@@ -45,9 +45,9 @@ class Pen {
     for (int axis = 0; axis < 3; ++axis)
       put(v[axis]);
   }
-  void head(BridgePacket kind, std::uint64_t token) noexcept {
+  void head(BridgePacket kind, std::uint64_t token, std::uint16_t version) noexcept {
     put(magic);
-    put(bridge_version);
+    put(version);
     put(static_cast<std::uint16_t>(kind));
     put(token);
   }
@@ -56,9 +56,11 @@ class Pen {
   std::byte* at_;
 };
 
-bool read_head(Cursor& in, std::uint16_t& kind, std::uint64_t& token) noexcept {
-  const bool ours = in.get<std::uint32_t>() == magic && in.get<std::uint16_t>() == bridge_version;
-  if (!ours)
+bool read_head(Cursor& in, std::uint16_t& kind, std::uint64_t& token, std::uint16_t& version) noexcept {
+  if (in.get<std::uint32_t>() != magic)
+    return false;
+  version = in.get<std::uint16_t>();
+  if (version < 1 || version > bridge_version)
     return false;
   kind = in.get<std::uint16_t>();
   token = in.get<std::uint64_t>();
@@ -72,7 +74,7 @@ bool read_packet(std::span<const std::byte> bytes, BridgeRequest& request) noexc
     return false;
   Cursor in(bytes.data());
   std::uint16_t kind = 0;
-  if (!read_head(in, kind, request.token))
+  if (!read_head(in, kind, request.token, request.version))
     return false;
   request.kind = static_cast<BridgePacket>(kind);
   const bool short_one = request.kind == BridgePacket::hello || request.kind == BridgePacket::goodbye;
@@ -96,23 +98,26 @@ bool read_packet(std::span<const std::byte> bytes, BridgeRequest& request) noexc
 }
 
 bool read_packet(std::span<const std::byte> bytes, BridgeReply& reply) noexcept {
-  if (bytes.size() != bridge_body)
+  if (bytes.size() != bridge_body && bytes.size() != bridge_wrench)
     return false;
   Cursor in(bytes.data());
   std::uint16_t kind = 0;
-  if (!read_head(in, kind, reply.token) || static_cast<BridgePacket>(kind) != BridgePacket::force)
+  if (!read_head(in, kind, reply.token, reply.version) || static_cast<BridgePacket>(kind) != BridgePacket::force ||
+      bytes.size() != (reply.version > 1 ? bridge_wrench : bridge_body))
     return false;
   reply.tick = in.get<std::uint64_t>();
   reply.sequence = in.get<std::uint64_t>();
   reply.force = in.vector();
   reply.position = in.vector();
   reply.timeout = in.get<double>();
-  return reply.force.allFinite() && reply.position.allFinite() && std::isfinite(reply.timeout);
+  reply.torque = reply.version > 1 ? in.vector() : Vector3::Zero();
+  return reply.force.allFinite() && reply.position.allFinite() && std::isfinite(reply.timeout) &&
+         reply.torque.allFinite();
 }
 
 std::size_t write_packet(const BridgeRequest& request, std::span<std::byte, bridge_body> bytes) noexcept {
   Pen out(bytes.data());
-  out.head(request.kind, request.token);
+  out.head(request.kind, request.token, request.version);
   if (request.kind != BridgePacket::pose)
     return bridge_head;
   out.put(request.sequence);
@@ -125,15 +130,18 @@ std::size_t write_packet(const BridgeRequest& request, std::span<std::byte, brid
   return bridge_body;
 }
 
-std::size_t write_packet(const BridgeReply& reply, std::span<std::byte, bridge_body> bytes) noexcept {
+std::size_t write_packet(const BridgeReply& reply, std::span<std::byte, bridge_wrench> bytes) noexcept {
   Pen out(bytes.data());
-  out.head(BridgePacket::force, reply.token);
+  out.head(BridgePacket::force, reply.token, reply.version);
   out.put(reply.tick);
   out.put(reply.sequence);
   out.put_vector(reply.force);
   out.put_vector(reply.position);
   out.put(reply.timeout);
-  return bridge_body;
+  if (reply.version < 2)
+    return bridge_body;
+  out.put_vector(reply.torque);
+  return bridge_wrench;
 }
 
 } // namespace spherecut::app

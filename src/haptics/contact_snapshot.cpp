@@ -21,6 +21,7 @@ std::shared_ptr<const CondensedContact> numbered(CondensedContact condensed) {
 void clear(ContactSnapshot& snapshot) {
   snapshot.count = 0;
   snapshot.force.setZero();
+  snapshot.torque.setZero();
   snapshot.blade = {};
   snapshot.reach = 0;
   snapshot.rest_sum = 0;
@@ -101,6 +102,7 @@ void fill(const solvers::ContactPatch& patch, const solvers::ContactState& state
   snapshot.condition = condition;
   snapshot.pose = state.pose;
   snapshot.force = state.tool_force;
+  snapshot.torque = state.tool_torque;
   snapshot.reach = 0;
   snapshot.rest_sum = 0;
   for (int k = 0; k < snapshot.count; ++k) {

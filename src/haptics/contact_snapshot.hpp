@@ -6,6 +6,7 @@
 #include "src/blade_grip.hpp"
 #include "topology/contact.hpp"
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
 
@@ -42,6 +43,7 @@ struct ContactSnapshot {
   bool without_tool = false;        // of the scenario: HandMode::usual holds the blade
   topology::ToolPose pose;          // of the tool in the solve
   Vector3 force = Vector3::Zero();  // N, of the body on tool or blade in the hand, of the solve as it is
+  Vector3 torque = Vector3::Zero(); // N m, of the same about the tool's point, or the origin of the blade's frame
   topology::SurfaceContact contact; // deepest point on the surface at rest
   solvers::ContactCondition condition = solvers::ContactCondition::frictionless;
   double friction = 0; // coefficient, frictional
@@ -58,6 +60,7 @@ struct ContactSnapshot {
   std::shared_ptr<const CondensedContact> condensed; // null: no candidates
 
   BladeGrip blade; // of a blade that the tissue resists, in the hand; `pose.point` is then that of its frame
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity(); // of that frame, then
 
   bool resprinkled = false;   // the nodes have followed the tool since the last snapshot
   int cut_triangles = 0;      // added to the cut since the last snapshot

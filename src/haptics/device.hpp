@@ -2,8 +2,8 @@
 // alone: a scripted path, a simulated hand, a recording, a bridge to hardware.
 //
 // Chosen here: a device gives the pose of the tool's reference point (or of the blade's frame) already in the
-// scenario's frame and in metres; forces alone go back, no torques, as on the usual three-motor devices; and a device
-// has no clock, it is asked once a tick and answers with the newest it has.
+// scenario's frame and in metres; force and torque go back, of which a device of three motors renders the force alone;
+// and a device has no clock, it is asked once a tick and answers with the newest it has.
 #pragma once
 
 #include "src/haptic_settings.hpp"
@@ -52,6 +52,9 @@ class Device {
   virtual DeviceState read(std::uint64_t tick) noexcept = 0;
   /// Force on the hand, N, until the next call. Called once a tick after read(), under the same conditions.
   virtual void apply(const Vector3& force) noexcept = 0;
+  /// The same with the torque on the hand about the reference point, N m. It is this that a loop calls; a device that
+  /// renders no torque need not know of it.
+  virtual void render(const Vector3& force, const Vector3& /*torque*/) noexcept { apply(force); }
 };
 
 /// A pose at a time of a path.

@@ -27,7 +27,8 @@ void write_ticks(const std::filesystem::path& file, const LoopRecords& records,
                  const std::vector<SolvedForce>& solved) {
   OutputFile out(file);
   out.write("tick,time_s,x_m,y_m,z_m,force_x_N,force_y_N,force_z_N,tissue_N,solved_N,energy_J,depth_m,sinking_m,"
-            "sequence,arrived,active,rounds,converged,limited,outside,latency_us,compute_us\n");
+            "sequence,arrived,active,rounds,converged,limited,outside,latency_us,compute_us,torque_x_Nm,torque_y_Nm,"
+            "torque_z_Nm,tissue_Nm\n");
   auto truth = solved.begin();
   std::string text;
   for (const TickRecord& tick : records.ticks) {
@@ -36,11 +37,12 @@ void write_ticks(const std::filesystem::path& file, const LoopRecords& records,
     const bool known = truth != solved.end() && truth->tick == tick.device.tick;
     const Vector3& x = tick.device.position;
     text += fmt::format("{},{:.6g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:.6g},{:.3g},{},{:d},{},"
-                        "{},{:d},{:d},{:d},{:.1f},{:.1f}\n",
+                        "{},{:d},{:d},{:d},{:.1f},{:.1f},{:.6g},{:.6g},{:.6g},{:.6g}\n",
                         tick.device.tick, tick.device.time, x.x(), x.y(), x.z(), tick.force.x(), tick.force.y(),
                         tick.force.z(), tick.tissue.norm(), known ? fmt::format("{:.6g}", truth->force.norm()) : "",
                         tick.energy, tick.depth, tick.sinking, tick.sequence, tick.arrived, tick.active, tick.rounds,
-                        tick.converged, tick.limited, tick.outside, us * tick.latency, us * tick.compute);
+                        tick.converged, tick.limited, tick.outside, us * tick.latency, us * tick.compute,
+                        tick.torque.x(), tick.torque.y(), tick.torque.z(), tick.tissue_torque.norm());
     if (text.size() > 1'000'000) {
       out.write(text);
       text.clear();
@@ -55,13 +57,13 @@ void write_solves(const std::filesystem::path& file, const std::vector<SolveReco
   std::string text =
       "sequence,pose_tick,arrival_tick,degradation,failed,resprinkled,force_jump,cut_triangles,nodes,"
       "candidates,active,asymmetry,force_N,cut_area_m2,blade_N,edge_N,release_J_m2,edge_pieces,work_J,surface_J,"
-      "crushing_J,friction_J,excess_J,stored_J,update,residual,swapped,seconds\n";
+      "crushing_J,friction_J,excess_J,stored_J,update,residual,swapped,seconds,torque_Nm,blade_Nm\n";
   for (const SolveRecord& solve : solves)
     text +=
         fmt::format("{},{},{},{},{:d},{:d},{:.3g},{},{},{},{},{:.3g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{:."
                     "6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{},"
                     "{:d},{:"
-                    ".6g}\n",
+                    ".6g},{:.6g},{:.6g}\n",
                     solve.event.sequence, solve.event.pose_tick,
                     solve.event.arrival_tick == SolveEvent::never ? "" : fmt::format("{}", solve.event.arrival_tick),
                     solve.event.degradation, solve.failed, solve.resprinkled, solve.force_jump, solve.cut_triangles,
@@ -69,7 +71,8 @@ void write_solves(const std::filesystem::path& file, const std::vector<SolveReco
                     solve.blade_force.norm(), solve.blade_edge, solve.blade_release, solve.blade_contacts,
                     solve.blade_account.work, solve.blade_account.surface, solve.blade_account.crushing,
                     solve.blade_account.friction, solve.blade_account.excess, solve.blade_account.stored, solve.update,
-                    solve.residual > 0 ? fmt::format("{:.2g}", solve.residual) : "", solve.event.swaps, solve.seconds);
+                    solve.residual > 0 ? fmt::format("{:.2g}", solve.residual) : "", solve.event.swaps, solve.seconds,
+                    solve.torque.norm(), solve.blade_torque.norm());
   out.write(text);
   out.close();
 }
@@ -214,6 +217,7 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
     latency.push_back(tick.latency);
     compute.push_back(tick.compute);
     findings.peak = std::max(findings.peak, tick.force.norm());
+    findings.peak_torque = std::max(findings.peak_torque, tick.torque.norm());
     findings.lowest_energy = std::min(findings.lowest_energy, tick.energy);
     findings.outside += tick.outside ? 1 : 0;
     findings.unconverged += tick.converged ? 0 : 1;
@@ -227,6 +231,7 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
     findings.swaps += record.event.swaps ? 1 : 0;
     findings.increments += record.cut_triangles > 0 ? 1 : 0;
     findings.blade_peak = std::max(findings.blade_peak, record.blade_force.norm());
+    findings.blade_peak_torque = std::max(findings.blade_peak_torque, record.blade_torque.norm());
     if (!record.failed) {
       findings.blade_account = record.blade_account;
       findings.cut_area = record.cut_area;
@@ -272,10 +277,12 @@ std::string text_of(const HapticFindings& f) {
   text += fmt::format("force: peak {:.4g} N; largest step in a tick {:.3g} N (at hand-overs {:.3g}, onset {:.3g}, cut "
                       "increments {:.3g} N)\n",
                       f.peak, f.steps.any, f.steps.hand_over, f.steps.onset, f.steps.cut);
+  text += fmt::format("  torque: peak {:.4g} mN m\n", 1e3 * f.peak_torque);
   text += fmt::format("  {} ticks limited, {} softened, {} with the contact beyond the patch, {} not converged\n",
                       f.limited, f.softened, f.outside, f.unconverged);
   if (f.blade_account.work > 0)
-    text += fmt::format("blade: peak {:.4g} N; {}\n", f.blade_peak, account_text(f.blade_account));
+    text += fmt::format("blade: peak {:.4g} N, {:.4g} mN m; {}\n", f.blade_peak, 1e3 * f.blade_peak_torque,
+                        account_text(f.blade_account));
   if (f.increments > 0)
     text += fmt::format("cut: {:.4g} cm2{}\n", 1e4 * f.cut_area,
                         f.unfollowed ? "; the body had yet to follow the blade's last way" : "");
@@ -329,12 +336,13 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
       {"background_swaps", f.swaps},
       {"highest_degradation", f.highest_degradation},
       {"peak_force_N", f.peak},
+      {"peak_torque_Nm", f.peak_torque},
       {"largest_step_N",
        {{"any", f.steps.any}, {"hand_over", f.steps.hand_over}, {"onset", f.steps.onset}, {"cut", f.steps.cut}}},
       {"model_error_N",
        {{"rms", f.error.rms}, {"largest", f.error.largest}, {"solved_peak", f.error.peak}, {"ticks", f.error.ticks}}},
       {"port_energy_J", {{"end", f.energy}, {"lowest", f.lowest_energy}}},
-      {"blade", {{"peak_N", f.blade_peak}}},
+      {"blade", {{"peak_N", f.blade_peak}, {"peak_Nm", f.blade_peak_torque}}},
       {"cut_area_m2", f.cut_area},
       {"cut_unfollowed", f.unfollowed},
       {"ticks_limited", f.limited},

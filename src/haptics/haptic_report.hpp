@@ -41,10 +41,12 @@ struct HapticFindings {
   ForceSteps steps;
   ModelError error;
   double peak = 0;                      // N, on the hand
+  double peak_torque = 0;               // N m, likewise
   double energy = 0, lowest_energy = 0; // J, at the port
   std::uint64_t failed = 0, resprinkled = 0, swaps = 0, increments = 0, outside = 0, unconverged = 0, limited = 0;
   std::uint64_t softened = 0;         // ticks
   double blade_peak = 0;              // N, of the solves
+  double blade_peak_torque = 0;       // N m, likewise
   solvers::BladeLedger blade_account; // J, at the last solve
   double resprinkle_jump = 0;         // largest, as a share of the force
   double cut_area = 0;                // m2, of the last solve's body

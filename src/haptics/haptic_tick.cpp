@@ -116,13 +116,15 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
   if (origin_ == Origin::grasper) {
     ModelForce held;
     held.force = snapshot_->force;
+    held.torque = snapshot_->torque;
     return held;
   }
   topology::ToolPose pose = tool_pose(tool_, device);
   if (origin_ == Origin::blade) {
-    ModelForce held = model_->at(pose, device.time);
+    ModelForce held = model_->at(pose, device.orientation, device.time);
     const double share = held.active > 0 ? share_inside(device.position) : 1;
     held.force *= share;
+    held.torque *= share;
     held.stiffness *= share;
     if (held.stored)
       *held.stored *= share;
@@ -138,7 +140,7 @@ ModelForce HapticTick::ask(const DeviceState& device, bool& outside) noexcept {
       outside = true;
     }
   }
-  return model_->at(pose, device.time);
+  return model_->at(pose, device.orientation, device.time);
 }
 
 double HapticTick::steady_stiffness(const DeviceState& device) const noexcept {
@@ -158,10 +160,27 @@ void HapticTick::soften(const ModelForce& model, const DeviceState& device) noex
   const double steady = steady_stiffness(device);
   const double share = stiffness > steady ? steady / stiffness : 1;
   const bool slow = device.client.period > 1;
-  if (slow && last_model_.squaredNorm() == 0)
+  if (slow && force_.last().squaredNorm() == 0)
     softened_ = share;
   const double falling = slow ? hardening : softening; // its rate is measured anew with each of its poses
   softened_ += std::clamp(share - softened_, -falling / settings_.rate, hardening / settings_.rate);
+}
+
+Vector3 HandOver::pass(const Vector3& model, bool arrives, bool anew, double ticks) noexcept {
+  // On at a solve too: solves that come in every tick would hold the force where it was otherwise.
+  if (difference_.squaredNorm() > 0)
+    difference_ =
+        difference_.squaredNorm() > fading_.squaredNorm() ? Vector3(difference_ - fading_) : Vector3(Vector3::Zero());
+  if (arrives) {
+    // Where the force would have been now: on from its last two ticks. In nobody's hand there was none.
+    difference_ += 2 * last_ - before_ - model;
+    if (anew)
+      difference_ = -model;
+    fading_ = difference_ / ticks;
+  }
+  before_ = arrives ? model : last_;
+  last_ = model;
+  return model + difference_;
 }
 
 void HapticTick::place_controller() noexcept {
@@ -197,6 +216,19 @@ void HapticTick::arrive(const ContactSnapshot& snapshot) noexcept {
   snapshot_ = &snapshot;
 }
 
+// At a share of the tissue's, within the device's limit, which is reached as fast as that of the force.
+Vector3 HapticTick::rendered_torque(const Vector3& tissue, double share) noexcept {
+  const DeviceLimits& limits = settings_.limits;
+  Vector3 torque = share * tissue;
+  if (const double size = torque.norm(); size > limits.torque)
+    torque *= limits.torque / size;
+  const double largest_step = limits.slew / limits.force * limits.torque / settings_.rate;
+  if (const double step = (torque - sent_torque_).norm(); step > largest_step)
+    torque = sent_torque_ + largest_step / step * (torque - sent_torque_);
+  sent_torque_ = torque;
+  return torque;
+}
+
 TickResult HapticTick::tick(const DeviceState& device) noexcept {
   TickResult result;
   locate(device);
@@ -219,21 +251,10 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   finds_ = finds_ && !found;
   const bool arrives = std::exchange(arrived_, false) || turns || placed;
   result.model = ask(device, result.outside);
-  // On at a solve too: solves that come in every tick would hold the force where it was otherwise.
-  if (difference_.squaredNorm() > 0)
-    difference_ =
-        difference_.squaredNorm() > fading_.squaredNorm() ? Vector3(difference_ - fading_) : Vector3(Vector3::Zero());
-  if (arrives) {
-    // Where the force would have been now: on from its last two ticks. In nobody's hand there was none.
-    difference_ += 2 * last_model_ - model_before_ - result.model.force;
-    if (taken_up)
-      difference_ = -result.model.force;
-    fading_ = difference_ / std::max(1.0, std::round(settings_.hand_over * settings_.rate));
-  }
   soften(result.model, device);
-  model_before_ = arrives ? result.model.force : last_model_;
-  last_model_ = result.model.force;
-  result.tissue = result.model.force + difference_;
+  const double ticks = std::max(1.0, std::round(settings_.hand_over * settings_.rate));
+  result.tissue = force_.pass(result.model.force, arrives, taken_up, ticks);
+  result.tissue_torque = torque_.pass(result.model.torque, arrives, taken_up, ticks);
   const DeviceLimits& limits = settings_.limits;
   result.softened = softened_;
   const double gain = softened_ * limits.gain;
@@ -250,11 +271,17 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   const Vector3 wanted = gain * result.tissue;
   Vector3 force = slow_client_ ? client_.control(device.client, device.position, wanted, stored.value_or(0))
                                : passivity_.control(device.position, wanted, stored);
+  double share = gain * device.client.share; // of what the tissue does
+  if (slow_client_ && wanted.squaredNorm() > 0)
+    share *= std::clamp(force.dot(wanted) / wanted.squaredNorm(), 0.0, 1.0);
   force *= device.client.share;
-  if (!device.connected)
+  if (!device.connected) {
     force.setZero();
+    share = 0;
+  }
   if (const double size = force.norm(); size > limits.force) {
     force *= limits.force / size;
+    share *= limits.force / size;
     result.limited = true;
   }
   const double largest_step = limits.slew / settings_.rate;
@@ -266,6 +293,7 @@ TickResult HapticTick::tick(const DeviceState& device) noexcept {
   passivity_.sent(force);
   client_.sent(force);
   result.force = force;
+  result.torque = rendered_torque(result.tissue_torque, share);
   result.sequence = snapshot_ != nullptr ? snapshot_->sequence : 0;
   result.energy = passivity_.energy() + client_.energy();
   return result;

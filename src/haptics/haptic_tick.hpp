@@ -1,6 +1,6 @@
-// One tick of the haptic loop as a function of what has been, without a clock: pose in, force out. The threads' shell
-// (realtime_loop.hpp) and the loop in virtual time (virtual_loop.hpp) both run it, so a recorded session replays bit by
-// bit.
+// One tick of the haptic loop as a function of what has been, without a clock: pose in, force and torque out. The
+// threads' shell (realtime_loop.hpp) and the loop in virtual time (virtual_loop.hpp) both run it, so a recorded session
+// replays bit by bit.
 #pragma once
 
 #include "src/haptics/client_passivity.hpp"
@@ -19,15 +19,32 @@ topology::ToolPose tool_pose(const topology::ToolShape& tool, const DeviceState&
 
 /// What a tick gives.
 struct TickResult {
-  Vector3 force = Vector3::Zero();  // N, on the hand
-  ModelForce model;                 // before hand-over, gain and limits
-  Vector3 tissue = Vector3::Zero(); // N, model and hand-over: what the tissue is said to do to the tool
-  topology::SurfaceContact contact; // deepest point on the surface at rest
-  std::uint64_t sequence = 0;       // of the snapshot in use
-  double energy = 0;                // J, put in by the hand so far
-  double softened = 1;              // share of the force that is rendered, for the device's stiffness
-  bool limited = false;             // by saturation or slew
-  bool outside = false;             // the contact has left the candidates of the snapshot
+  Vector3 force = Vector3::Zero();         // N, on the hand
+  ModelForce model;                        // before hand-over, gain and limits
+  Vector3 tissue = Vector3::Zero();        // N, model and hand-over: what the tissue is said to do to the tool
+  Vector3 torque = Vector3::Zero();        // N m, on the hand, about the tool's reference point (of the blade's frame)
+  Vector3 tissue_torque = Vector3::Zero(); // N m, model and hand-over
+  topology::SurfaceContact contact;        // deepest point on the surface at rest
+  std::uint64_t sequence = 0;              // of the snapshot in use
+  double energy = 0;                       // J, put in by the hand so far
+  double softened = 1;                     // share of the force that is rendered, for the device's stiffness
+  bool limited = false;                    // by saturation or slew
+  bool outside = false;                    // the contact has left the candidates of the snapshot
+};
+
+/// What is handed over at a solve: it goes on from where it would have been now, by its last two ticks, and the
+/// difference to what the model says fades linearly.
+class HandOver {
+ public:
+  /// One tick of what the model says. `arrives`: it has a new solve, over whose difference `ticks` pass; `anew`: nobody
+  /// felt anything before. Returns what is felt.
+  Vector3 pass(const Vector3& model, bool arrives, bool anew, double ticks) noexcept;
+  [[nodiscard]] const Vector3& last() const { return last_; }
+
+ private:
+  Vector3 last_ = Vector3::Zero(), before_ = Vector3::Zero(); // of the last two ticks
+  Vector3 difference_ = Vector3::Zero();                      // still to fade
+  Vector3 fading_ = Vector3::Zero();                          // per tick
 };
 
 /// Neither allocates, locks, waits nor throws after construction. A tick with a new snapshot is arrive(snapshot);
@@ -40,6 +57,10 @@ struct TickResult {
 /// rim. Of a grasper the force is that of the last solve. A mode that leaves the tool in the hand changes nothing
 /// before its first solve; where tool and blade change places there is no force until then. Both are handed over as a
 /// solve is. A device that does not answer brings the force to zero at the slew limit.
+///
+/// The torque is that of the same model, is handed over and rendered by the same shares as the force, and is limited on
+/// its own besides (DeviceLimits::torque). Its work is not counted: a hand that a device turns has to keep its turning
+/// steady by its own damping. The damping of the controller is a force at the reference point, and has no torque.
 ///
 /// Energy is counted where it flows: at every tick, or from reading to reading of a client that gives fewer
 /// (DeviceState::client). Such a client gets its force as late as it interpolates, once more as it holds it, and may
@@ -75,6 +96,7 @@ class HapticTick {
   void locate(const DeviceState& device) noexcept;
   [[nodiscard]] double share_inside(const Vector3& position) noexcept;
   void soften(const ModelForce& model, const DeviceState& device) noexcept;
+  [[nodiscard]] Vector3 rendered_torque(const Vector3& tissue, double share) noexcept;
   [[nodiscard]] double steady_stiffness(const DeviceState& device) const noexcept;
   void choose_controller(const DeviceState& device) noexcept;
   void place_controller() noexcept;
@@ -94,13 +116,11 @@ class HapticTick {
   std::array<topology::SurfaceContact, BladeGrip::most_places> edge_; // of the blade's edge and the surface
   std::array<double, BladeGrip::most_places> edge_depth_{};           // m, below that where it was solved; at most 0
   bool edge_fresh_ = false;                                           // a solve has come since they were found
-  std::uint64_t located_ = 0;    // tick after which contact_ was found, plus one; 0: never
-  bool arrived_ = false;         // a snapshot that changes the force has come since the last tick
-  bool fresh_ = false;           // any snapshot has
-  Origin origin_ = Origin::none; // in the last tick
-  Vector3 last_model_ = Vector3::Zero(), model_before_ = Vector3::Zero(); // N, of the last two ticks
-  Vector3 difference_ = Vector3::Zero();                                  // N, still to fade
-  Vector3 fading_ = Vector3::Zero();                                      // N, per tick
+  std::uint64_t located_ = 0;          // tick after which contact_ was found, plus one; 0: never
+  bool arrived_ = false;               // a snapshot that changes the force has come since the last tick
+  bool fresh_ = false;                 // any snapshot has
+  Origin origin_ = Origin::none;       // in the last tick
+  HandOver force_, torque_;            // N, N m
   double paid_ = 0;                    // J, of what is stored behind a force that solves find: put in by the hand
   Vector3 position_ = Vector3::Zero(); // m, of the last tick
   topology::ToolPose located_pose_;    // of the tool, where contact_ was found
@@ -108,7 +128,7 @@ class HapticTick {
   bool finds_ = false;                 // no solve has come from where the tool was placed last,
   std::uint64_t placed_ = 0;           // at this tick
   double softened_ = 1;
-  Vector3 sent_ = Vector3::Zero();
+  Vector3 sent_ = Vector3::Zero(), sent_torque_ = Vector3::Zero();
 };
 
 } // namespace spherecut::app

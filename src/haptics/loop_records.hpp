@@ -12,11 +12,13 @@ struct TickRecord {
   Vector3 force = Vector3::Zero();  // N, on the hand
   Vector3 tissue = Vector3::Zero(); // N, of the tissue on the tool, with hand-over, before gain, control and limits
   Vector3 model = Vector3::Zero();  // N, of the model alone
-  double energy = 0;                // J, put in by the hand so far
-  double depth = 0;                 // m, of the contact on the surface at rest
-  double sinking = 0;               // m, of the deepest candidate inside the tool
-  std::uint64_t sequence = 0;       // of the snapshot in use
-  bool arrived = false;             // it came at this tick
+  Vector3 torque = Vector3::Zero(); // N m, on the hand, about the tool's reference point
+  Vector3 tissue_torque = Vector3::Zero(); // N m, what belongs to `tissue`
+  double energy = 0;                       // J, put in by the hand so far
+  double depth = 0;                        // m, of the contact on the surface at rest
+  double sinking = 0;                      // m, of the deepest candidate inside the tool
+  std::uint64_t sequence = 0;              // of the snapshot in use
+  bool arrived = false;                    // it came at this tick
   bool limited = false, outside = false, converged = true;
   double softened = 1; // share of the force that was rendered, for the device's stiffness
   int active = 0, rounds = 0;
@@ -46,6 +48,7 @@ struct SolveRecord {
   std::uint64_t topology = 0;               // of cut surface and nodes, as ContactSnapshot::topology
   double asymmetry = 0;                     // of the compliance
   Vector3 blade_force = Vector3::Zero();    // N, on a blade that the tissue resists, in the hand or beside it
+  Vector3 blade_torque = Vector3::Zero();   // N m, of the same about the origin of its frame
   double blade_edge = 0, blade_release = 0; // N, of its edge alone; J/m2, of that on the front
   solvers::BladeLedger blade_account;       // J since the start
   int blade_contacts = 0;                   // pieces of the edge that press
@@ -53,6 +56,7 @@ struct SolveRecord {
   double cut_area = 0;                      // m2
   std::string_view update;                  // how the system came to the cut of this solve; empty: nothing was cut
   Vector3 force = Vector3::Zero();          // N, of the solve
+  Vector3 torque = Vector3::Zero();         // N m, likewise, about the tool's point or the origin of the blade's frame
   double seconds = 0;                       // wall clock
 };
 

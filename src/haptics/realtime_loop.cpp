@@ -97,7 +97,7 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
       core.arrive(shared.snapshots.front());
     }
     const TickResult result = core.tick(state);
-    device.apply(result.force);
+    device.render(result.force, result.torque);
     record = record_of(state, result, arrives);
     record.latency = 1e-9 * static_cast<double>(began - due);
     record.compute = 1e-9 * static_cast<double>(clock_now(CLOCK_THREAD_CPUTIME_ID) - cpu);

@@ -21,7 +21,8 @@ static_assert(std::endian::native == std::endian::little, "recordings are writte
 constexpr std::string_view signature = "SPHCREC\n";
 constexpr std::uint32_t header_lot = 1, tick_lot = 2, solve_lot = 3, end_lot = 4, client_lot = 5;
 constexpr std::size_t lot_head = 16; // kind, size of the payload, its checksum
-constexpr std::size_t tick_size = 112, solve_size = 64, client_size = 56;
+constexpr std::size_t tick_size = 136, solve_size = 88, client_size = 56;
+constexpr std::size_t torque_size = 24; // of a tick and of a solve, from version 2 on
 constexpr std::size_t lot_of_ticks = 256;
 constexpr std::uint32_t longest_lot = 64U << 20U;
 constexpr std::uintmax_t largest_recording = 2'000'000'000; // bytes; an hour has 400 million
@@ -110,7 +111,7 @@ RecordingHeader header_of(Reader& in) {
   return header;
 }
 
-RecordedTick tick_of(Reader& in, std::size_t expected) {
+RecordedTick tick_of(Reader& in, std::uint32_t version, std::size_t expected) {
   RecordedTick tick;
   DeviceState& device = tick.device;
   device.tick = in.get<std::uint64_t>();
@@ -129,6 +130,8 @@ RecordedTick tick_of(Reader& in, std::size_t expected) {
   device.mode = in.get<std::uint16_t>();
   device.buttons = in.get<std::uint16_t>();
   tick.sequence = in.get<std::uint64_t>();
+  if (version > 1)
+    tick.torque = in.vector();
   return tick;
 }
 
@@ -158,7 +161,7 @@ void set_clients(Recording& recording, const std::vector<RecordedClient>& client
       recording.ticks[client.tick].device.client = client.reading;
 }
 
-SolveRecord solve_of(Reader& in, const std::vector<SolveRecord>& before) {
+SolveRecord solve_of(Reader& in, std::uint32_t version, const std::vector<SolveRecord>& before) {
   SolveRecord solve;
   solve.event.sequence = in.get<std::uint64_t>();
   solve.event.pose_tick = in.get<std::uint64_t>();
@@ -178,6 +181,8 @@ SolveRecord solve_of(Reader& in, const std::vector<SolveRecord>& before) {
   solve.nodes = in.get<std::int32_t>();
   solve.topology = in.get<std::uint64_t>();
   solve.force = in.vector();
+  if (version > 1)
+    solve.torque = in.vector();
   return solve;
 }
 
@@ -259,6 +264,7 @@ void RecordingWriter::add(const TickRecord& tick) {
   put(ticks_, device.mode);
   put(ticks_, device.buttons);
   put(ticks_, tick.sequence);
+  put(ticks_, tick.torque);
   if (const ClientReading& client = device.client; client.period > 1 || client.share < 1) {
     put(clients_, device.tick);
     put(clients_, client.position);
@@ -281,6 +287,7 @@ void RecordingWriter::add(const SolveRecord& solve) {
   put(solves_, static_cast<std::int32_t>(solve.nodes));
   put(solves_, solve.topology);
   put(solves_, solve.force);
+  put(solves_, solve.torque);
   ++solve_count_;
 }
 
@@ -309,11 +316,13 @@ Recording read_recording(const std::filesystem::path& file) {
   if (!bytes.starts_with(signature))
     refuse(0, "not a recording of a haptic session");
   Reader start(std::string_view(bytes).substr(signature.size()), file, signature.size());
-  if (const auto version = start.get<std::uint32_t>(); version != recording_version)
-    refuse(signature.size(),
-           fmt::format("a recording of format {}; this program reads {}", version, recording_version));
-  static_cast<void>(start.get<std::uint32_t>());
   Recording recording;
+  recording.version = start.get<std::uint32_t>();
+  if (recording.version < 1 || recording.version > recording_version)
+    refuse(signature.size(),
+           fmt::format("a recording of format {}; this program reads 1 to {}", recording.version, recording_version));
+  static_cast<void>(start.get<std::uint32_t>());
+  const std::size_t torque = recording.version > 1 ? 0 : torque_size; // that is not there
   std::vector<RecordedClient> clients;
   bool named = false;
   for (std::size_t at = signature.size() + 8; at < bytes.size();) {
@@ -339,10 +348,10 @@ Recording read_recording(const std::filesystem::path& file) {
       recording.header = header_of(in);
     else if (kind == end_lot)
       check_end(in, recording);
-    while (kind == tick_lot && in.left() >= tick_size)
-      recording.ticks.push_back(tick_of(in, recording.ticks.size()));
-    while (kind == solve_lot && in.left() >= solve_size)
-      recording.solves.push_back(solve_of(in, recording.solves));
+    while (kind == tick_lot && in.left() >= tick_size - torque)
+      recording.ticks.push_back(tick_of(in, recording.version, recording.ticks.size()));
+    while (kind == solve_lot && in.left() >= solve_size - torque)
+      recording.solves.push_back(solve_of(in, recording.version, recording.solves));
     while (kind == client_lot && in.left() >= client_size)
       clients.push_back(client_of(in));
     if (in.left() != 0)

@@ -10,7 +10,8 @@
 
 namespace spherecut::app {
 
-inline constexpr std::uint32_t recording_version = 1;
+/// Written. Read are all from 1 on; torques came with 2.
+inline constexpr std::uint32_t recording_version = 2;
 
 /// What a recording is of.
 struct RecordingHeader {
@@ -49,18 +50,20 @@ class RecordingWriter {
 /// A tick as recorded.
 struct RecordedTick {
   DeviceState device;
-  Vector3 force = Vector3::Zero(); // N, on the hand
-  std::uint64_t sequence = 0;      // of the snapshot in use
+  Vector3 force = Vector3::Zero();  // N, on the hand
+  Vector3 torque = Vector3::Zero(); // N m, on the hand; zero in version 1
+  std::uint64_t sequence = 0;       // of the snapshot in use
 };
 
 struct Recording {
+  std::uint32_t version = recording_version; // of the format
   RecordingHeader header;
   std::vector<RecordedTick> ticks;
-  std::vector<SolveRecord> solves; // event, failed, resprinkled, cut_triangles, nodes, topology, force
+  std::vector<SolveRecord> solves; // event, failed, resprinkled, cut_triangles, nodes, topology, force, torque
   bool finished = false;           // false: the session was killed; everything up to its last lot is here
 };
 
-/// Throws InputError, naming the place, when the file is not a recording, of another version, cut off within a lot,
+/// Throws InputError, naming the place, when the file is not a recording, of a newer version, cut off within a lot,
 /// damaged or incomplete.
 Recording read_recording(const std::filesystem::path& file);
 

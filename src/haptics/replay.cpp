@@ -18,9 +18,10 @@ bool same_bits(const Vector3& a, const Vector3& b) {
   return true;
 }
 
-bool same_solve(const SolveRecord& a, const SolveRecord& b) {
+bool same_solve(const SolveRecord& a, const SolveRecord& b, bool torques) {
   return a.failed == b.failed && a.resprinkled == b.resprinkled && a.cut_triangles == b.cut_triangles &&
-         a.nodes == b.nodes && a.topology == b.topology && same_bits(a.force, b.force);
+         a.nodes == b.nodes && a.topology == b.topology && same_bits(a.force, b.force) &&
+         (!torques || same_bits(a.torque, b.torque));
 }
 
 } // namespace
@@ -28,10 +29,12 @@ bool same_solve(const SolveRecord& a, const SolveRecord& b) {
 std::string text_of(const ReplayReport& r) {
   std::string text = fmt::format("replay of {} ticks and {} solves: ", r.ticks, r.solves);
   if (r.same())
-    text += "forces and topology are the same, bit by bit";
+    text += r.torques ? "forces, torques and topology are the same, bit by bit"
+                      : "forces and topology are the same, bit by bit; this recording has no torques";
   if (r.differing_tick)
-    text += fmt::format("the force first differs at tick {}, in {} ticks altogether, by up to {:.3g} N",
-                        *r.differing_tick, r.differing_ticks, r.largest);
+    text += fmt::format("force or torque first differ at tick {}, in {} ticks altogether, by up to {:.3g} N and {:.3g} "
+                        "N m",
+                        *r.differing_tick, r.differing_ticks, r.largest, r.largest_torque);
   if (r.differing_solve)
     text += fmt::format("{}solve {} is the first that differs", r.differing_tick ? "; " : "", *r.differing_solve);
   if (!r.same_build)
@@ -67,20 +70,24 @@ ReplayReport replay(const Recording& recording, HapticSimulation& simulation, Lo
   records = run_virtual(session.scenario().haptics, simulation, device, events, recording.ticks.size(), options);
   ReplayReport report;
   report.ticks = records.ticks.size();
+  report.torques = recording.version > 1;
   report.solves = std::min(records.solves.size(), events.size());
   report.same_build = recording.header.build == build_identity();
   report.same_processor = recording.header.processor == processor_name();
   for (std::size_t i = 0; i < report.ticks; ++i) {
     const TickRecord& now = records.ticks[i];
     const RecordedTick& then = recording.ticks[i];
-    if (same_bits(now.force, then.force) && now.sequence == then.sequence)
+    const bool turned = report.torques && !same_bits(now.torque, then.torque);
+    if (same_bits(now.force, then.force) && now.sequence == then.sequence && !turned)
       continue;
     report.differing_tick = report.differing_tick.value_or(i);
     ++report.differing_ticks;
     report.largest = std::max(report.largest, (now.force - then.force).norm());
+    if (report.torques)
+      report.largest_torque = std::max(report.largest_torque, (now.torque - then.torque).norm());
   }
   for (std::size_t i = 0; i < report.solves && !report.differing_solve; ++i)
-    if (!same_solve(records.solves[i], recording.solves[i]))
+    if (!same_solve(records.solves[i], recording.solves[i], report.torques))
       report.differing_solve = recording.solves[i].event.sequence;
   return report;
 }

@@ -176,9 +176,11 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   if (holds_blade()) {
     clear(snapshot);
     snapshot.pose.point = device.position;
+    snapshot.orientation = device.orientation;
     if (session_.blade() != nullptr) {
       snapshot.blade = session_.blade()->grip(model);
       snapshot.force = snapshot.blade.force;
+      snapshot.torque = snapshot.blade.torque;
     }
   }
   snapshot.pose_tick = device.tick;
@@ -235,6 +237,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     record.residual = simulation.result().residual;
     record.update = to_string(update_of(simulation.result()));
     record.blade_force = cut->blade.force;
+    record.blade_torque = cut->blade.torque;
     record.blade_edge = cut->blade.edge_force;
     record.blade_release = cut->blade.release;
     record.blade_contacts = cut->blade.contacts;

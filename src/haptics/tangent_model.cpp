@@ -120,9 +120,10 @@ bool TangentModel::solved(const ContactSnapshot& snapshot) noexcept {
   return false;
 }
 
-ModelForce TangentModel::at(const topology::ToolPose& pose, double time) noexcept {
+ModelForce TangentModel::at(const topology::ToolPose& pose, const Eigen::Quaterniond& orientation,
+                            double time) noexcept {
   if (blade_.pressing())
-    return blade_.at(pose.point, time);
+    return blade_.at(pose.point, orientation, time);
   if (snapshot_ == nullptr || snapshot_->count == 0)
     return {.stored = 0.0};
   return snapshot_->condition == solvers::ContactCondition::bonded ? follow(pose) : press(pose);
@@ -445,6 +446,7 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
       ++result.active;
       const Vector3 on_body = frictional ? Vector3(pressure * normal_[c] + along_[c]) : Vector3(pressure * normal_[c]);
       result.force -= on_body;
+      result.torque -= (condensed_->rest[c] + moved_[c] - pose.point).cross(on_body);
       stored += 0.5 * on_body.dot(moved_[c] - condensed_->base[c]);
     }
   }
@@ -536,6 +538,7 @@ ModelForce TangentModel::follow(const topology::ToolPose& pose) noexcept {
     const int c = chosen_[a];
     displacement_[c] = moved_[c];
     result.force -= bond_force_[c];
+    result.torque -= (condensed_->rest[c] + moved_[c] - pose.point).cross(bond_force_[c]);
     stored += 0.5 * bond_force_[c].dot(moved_[c] - condensed_->base[c]);
   }
   result.active = chosen_count_;

@@ -19,7 +19,7 @@ class TangentModel : public ForceModel {
  public:
   explicit TangentModel(const topology::ToolShape& tool);
   bool solved(const ContactSnapshot& snapshot) noexcept override;
-  ModelForce at(const topology::ToolPose& pose, double time) noexcept override;
+  ModelForce at(const topology::ToolPose& pose, const Eigen::Quaterniond& orientation, double time) noexcept override;
   void fetch() const noexcept override;
 
  private:

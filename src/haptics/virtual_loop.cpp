@@ -66,6 +66,8 @@ TickRecord record_of(const DeviceState& device, const TickResult& result, bool a
   record.force = result.force;
   record.tissue = result.tissue;
   record.model = result.model.force;
+  record.torque = result.torque;
+  record.tissue_torque = result.tissue_torque;
   record.energy = result.energy;
   record.depth = result.contact.depth;
   record.sinking = result.model.sinking;
@@ -92,6 +94,7 @@ SolveRecord record_of(const SolveEvent& event, const ContactSnapshot& snapshot) 
   record.topology = snapshot.topology;
   record.asymmetry = snapshot.condensed != nullptr ? snapshot.condensed->asymmetry : 0;
   record.force = snapshot.force;
+  record.torque = snapshot.torque;
   record.seconds = snapshot.solve_seconds;
   return record;
 }
@@ -142,7 +145,7 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
         cores[m]->arrive(*arrived);
       const TickResult result = cores[m]->tick(state);
       if (m == 0)
-        device.apply(result.force);
+        device.render(result.force, result.torque);
       records[m].ticks.push_back(record_of(state, result, arrives));
     }
     options.on_tick(records.front().ticks.back());
@@ -175,7 +178,7 @@ std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std:
       simulation.pass(ticks[k].device);
     simulation.solve(ticks[i].device, 0, snapshot);
     forces.push_back({ticks[i].device.tick, snapshot.force, simulation.result().resprinkled, snapshot.cut_triangles,
-                      simulation.result().active_nodes});
+                      simulation.result().active_nodes, snapshot.torque});
   }
   return forces;
 }

@@ -38,6 +38,7 @@ struct SolvedForce {
   Vector3 force = Vector3::Zero(); // N
   bool resprinkled = false;
   int cut_triangles = 0, active = 0;
+  Vector3 torque = Vector3::Zero(); // N m, likewise, about the tool's point
 };
 /// Ends early, with what it has, once `stop` (may be null) says so.
 std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std::vector<TickRecord>& ticks,

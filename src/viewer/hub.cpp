@@ -134,8 +134,9 @@ std::optional<CloseReason> Hub::message(int client, std::string_view text) {
   }
   server_->charge(client, cost_of(request));
   if (request.type == RequestType::hello) {
-    if (request.number != protocol_version)
-      return CloseReason{CloseCode::policy, fmt::format("version {} is spoken here", protocol_version)};
+    if (request.number < 1 || request.number > protocol_version)
+      return CloseReason{CloseCode::policy, fmt::format("versions 1 to {} are spoken here", protocol_version)};
+    from.version = request.number;
     greet(client, from);
   } else if (!from.greeted) {
     return CloseReason{CloseCode::policy, "hello comes first"};
@@ -156,7 +157,7 @@ void Hub::greet(int client, Client& from) {
   WelcomeLists list;
   list.scenarios = scenarios(list.scenarios_left_out);
   list.recordings = recordings(list.recordings_left_out);
-  send(client, welcome_text(client, list, options_.viewers, options_.speed));
+  send(client, welcome_text(client, from.version, list, options_.viewers, options_.speed));
   send(client, session_text(*session_, epoch_, target_.mode));
   send(client, holder_text(holder_));
   if (tear_.state != TearState::none)
@@ -468,7 +469,7 @@ void Hub::send_frame(int id, Client& client, const LiveTick& tick, bool picture)
   const ViewerFrame& frame = session_->frame();
   if (client.topology != frame.topology->number || client.epoch != epoch_) {
     client.topology = frame.topology->number;
-    server_->send_binary(id, encode_topology(*frame.topology, ++client.messages, epoch_));
+    server_->send_binary(id, encode_topology(*frame.topology, client.version, ++client.messages, epoch_));
   }
   client.epoch = epoch_;
   client.picture = frame.number;
@@ -476,6 +477,7 @@ void Hub::send_frame(int id, Client& client, const LiveTick& tick, bool picture)
   client.last_frame = Clock::now();
   --client.credit;
   FrameContext context;
+  context.version = client.version;
   context.message = ++client.messages;
   context.epoch = epoch_;
   context.state = state_bits(tick);

@@ -52,6 +52,7 @@ class Hub {
   struct Client {
     Clock::time_point since = Clock::now(), last_frame;
     bool greeted = false;
+    int version = 1; // of the protocol, that it speaks
     int credit = 0;
     std::uint32_t messages = 0, left_out = 0;
     std::uint32_t topology = 0, epoch = 0; // of what was sent last

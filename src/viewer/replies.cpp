@@ -73,7 +73,7 @@ std::size_t shorten(Json& list) {
 
 } // namespace
 
-std::string welcome_text(int client, WelcomeLists lists, int viewers, double speed) {
+std::string welcome_text(int client, int spoken, WelcomeLists lists, int viewers, double speed) {
   Json list = Json::array();
   for (const ScenarioEntry& entry : lists.scenarios)
     list.push_back({{"name", entry.name}, {"title", entry.title}});
@@ -83,7 +83,7 @@ std::string welcome_text(int client, WelcomeLists lists, int viewers, double spe
   lists.scenarios_left_out += shorten(list);
   lists.recordings_left_out += shorten(records);
   return dumped({{"type", "welcome"},
-                 {"version", protocol_version},
+                 {"version", spoken},
                  {"id", client},
                  {"server", fmt::format("spherecut {}", version())},
                  {"scenarios", list},

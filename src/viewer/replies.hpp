@@ -22,7 +22,8 @@ struct WelcomeLists {
 };
 
 /// Lists too long for a client to be sent at once lose their last entries, which count as left out.
-std::string welcome_text(int client, WelcomeLists lists, int viewers, double speed);
+/// `spoken`: version of the protocol, the client's.
+std::string welcome_text(int client, int spoken, WelcomeLists lists, int viewers, double speed);
 std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMode mode);
 /// 0: nobody.
 std::string holder_text(int holder);

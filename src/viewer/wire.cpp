@@ -53,9 +53,9 @@ class Writer {
       std::memcpy(bytes_.data() + at, static_cast<const void*>(values.data()), values.size() * sizeof(T));
   }
 
-  void header(std::uint8_t type, std::uint32_t message, std::uint32_t epoch) {
+  void header(std::uint8_t type, int version, std::uint32_t message, std::uint32_t epoch) {
     put(type);
-    put(static_cast<std::uint8_t>(protocol_version));
+    put(static_cast<std::uint8_t>(version));
     put(std::uint16_t{0}); // offset of the first section, and length: known later
     put(std::uint32_t{0});
     put(message);
@@ -129,6 +129,10 @@ void put_block(const ViewerFrame& frame, const LiveTick& tick, const FrameContex
                   frame.opening_volume, record.energy, frame.largest_displacement});
   out.put(context.left_out);
   out.put(std::uint32_t{0});
+  if (context.version < 2)
+    return;
+  out.put_vector(record.tissue_torque);
+  out.put_vector(record.torque);
 }
 
 void put_colours(std::uint32_t quantity, const std::vector<float>& values, Writer& out) {
@@ -200,10 +204,10 @@ void put_picture(const ViewerFrame& frame, const Overlays& overlays, int client,
 
 } // namespace
 
-std::string encode_topology(const ViewerTopology& topology, std::uint32_t message, std::uint32_t epoch) {
+std::string encode_topology(const ViewerTopology& topology, int version, std::uint32_t message, std::uint32_t epoch) {
   Writer out;
   out.reserve(64 + 13 * topology.vertices.size() + 15 * topology.triangles.size() + 8 * topology.lip_pairs.size() + 96);
-  out.header(topology_message, message, epoch);
+  out.header(topology_message, version, message, epoch);
   out.put(topology.number);
   out.put(static_cast<std::uint32_t>(topology.vertices.size()));
   out.put(static_cast<std::uint32_t>(topology.triangles.size()));
@@ -222,7 +226,7 @@ std::string encode_frame(const ViewerFrame& frame, const LiveTick& tick, const F
                          const Overlays& overlays, int client, bool with_vertices) {
   Writer out;
   out.reserve(512 + (with_vertices ? 16 * frame.vertices.size() + 20 * frame.node_list.size() : 0));
-  out.header(frame_message, context.message, context.epoch);
+  out.header(frame_message, context.version, context.message, context.epoch);
   put_block(frame, tick, context, out);
   out.end_block();
   if (with_vertices && frame.topology)

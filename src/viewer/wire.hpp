@@ -7,7 +7,7 @@
 
 namespace spherecut::app {
 
-inline constexpr int protocol_version = 1;
+inline constexpr int protocol_version = 2; // the newest; every one from 1 on is spoken
 
 /// Bits of a frame's state.
 enum : std::uint32_t {
@@ -30,6 +30,7 @@ struct LiveRates {
 
 /// What a frame tells besides picture and tick.
 struct FrameContext {
+  int version = protocol_version;       // of the client
   std::uint32_t message = 0, epoch = 0; // numbers in the header
   std::uint32_t state = 0;
   std::uint32_t number_in_solve = 0; // of the viewer's message
@@ -46,7 +47,8 @@ struct Overlays {
   std::optional<ViewerRequest::Slice> slice;
 };
 
-std::string encode_topology(const ViewerTopology& topology, std::uint32_t message, std::uint32_t epoch);
+/// `version`: of the client.
+std::string encode_topology(const ViewerTopology& topology, int version, std::uint32_t message, std::uint32_t epoch);
 
 /// With the vertices and what goes with them, or with the tool's numbers alone. `client`: key of its picks and slices.
 std::string encode_frame(const ViewerFrame& frame, const LiveTick& tick, const FrameContext& context,

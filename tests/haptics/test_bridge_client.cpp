@@ -40,10 +40,11 @@ class Bridge {
   void answer(std::uint64_t token, const double (&place)[3], double force) {
     Force packet;
     packet.magic = 0x42485053;
-    packet.version = 1;
+    packet.version = 2;
     packet.kind = 4;
     packet.token = token;
     packet.force[2] = force;
+    packet.torque[0] = 0.01 * force;
     for (int axis = 0; axis < 3; ++axis)
       packet.position[axis] = place[axis];
     REQUIRE(::sendto(socket_, &packet, sizeof packet, 0, reinterpret_cast<const sockaddr*>(&from_), sizeof from_) ==
@@ -104,6 +105,7 @@ TEST_CASE(
   CHECK(pose.kind == 1);
   bridge.answer(77, {0.1, 0.2, 0.3}, 2);
   CHECK(client.exchange(motion)[2] == 2);
+  CHECK(client.torque()[0] == Approx(0.02));
   REQUIRE(bridge.take(pose) == 88);
   CHECK(pose.kind == 2);
   CHECK(pose.token == 77);
@@ -121,6 +123,7 @@ TEST_CASE(
     client.exchange(motion);
   CHECK_FALSE(client.held());
   CHECK(client.exchange(motion)[2] == 0); // nobody has answered for a while
+  CHECK(client.torque()[0] == 0);
   while (bridge.take(pose) > 16) {
   }
   REQUIRE(bridge.take(pose) == 16);

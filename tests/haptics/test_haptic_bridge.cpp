@@ -48,9 +48,13 @@ class Client {
     const std::size_t size = write_packet(request, bytes);
     send(std::span<const std::byte>(bytes.data(), size));
   }
-  void hello() const { send(BridgeRequest{}); }
+  void hello() const {
+    BridgeRequest request;
+    request.version = version;
+    send(request);
+  }
   void pose(std::uint64_t sequence, const Vector3& position) const {
-    send({BridgePacket::pose, token, sequence, position, Eigen::Quaterniond::Identity(), 1, 2});
+    send({BridgePacket::pose, token, sequence, position, Eigen::Quaterniond::Identity(), 1, 2, version});
   }
   /// Takes all that has come; false: nothing.
   bool listen() {
@@ -59,6 +63,8 @@ class Client {
     for (ssize_t size = 0; (size = ::recv(socket_, bytes.data(), bytes.size(), MSG_DONTWAIT)) >= 0; any = true)
       if (!read_packet(std::span<const std::byte>(bytes.data(), static_cast<std::size_t>(size)), reply))
         FAIL("not a packet");
+      else
+        bytes_of_last = static_cast<std::size_t>(size);
     token = reply.token;
     return any;
   }
@@ -71,6 +77,8 @@ class Client {
   }
   std::uint64_t token = 0;
   BridgeReply reply;
+  std::uint16_t version = 1;
+  std::size_t bytes_of_last = 0; // packet
 
  private:
   int socket_;
@@ -83,9 +91,10 @@ BridgeSettings any_port(double timeout = 0.02) {
 const PathPose waiting{0, {0.01, 0.02, 0.03}, Eigen::Quaterniond::Identity()};
 
 /// One tick of a loop that answers every device with the same force. Loopback delivers before send() returns.
-DeviceState tick(BridgeDevice& device, std::uint64_t number, const Vector3& force = {0, 0, 1}) {
+DeviceState tick(BridgeDevice& device, std::uint64_t number, const Vector3& force = {0, 0, 1},
+                 const Vector3& torque = {0.1, 0.2, 0.3}) {
   const DeviceState state = device.read(number);
-  device.apply(force);
+  device.render(force, torque);
   return state;
 }
 
@@ -219,6 +228,58 @@ TEST_CASE("The first client holds the tool until it falls silent or says goodbye
   CHECK(counters.others == 3);
   CHECK(counters.poses == 3);
   CHECK(counters.garbage == 0);
+}
+
+TEST_CASE("A client gets the version that it speaks: the first as it was, the second with the torque") {
+  const BridgeReply reply{3, 5, 7, {1, 2, 3}, {4, 5, 6}, 0.5, {0.1, 0.2, 0.3}, 1};
+  std::array<std::byte, bridge_wrench> old{}, now{};
+  REQUIRE(write_packet(reply, old) == 88);
+  BridgeReply second = reply;
+  second.version = 2;
+  REQUIRE(write_packet(second, now) == 112);
+  CHECK(std::to_integer<int>(old[4]) == 1);
+  CHECK(std::to_integer<int>(now[4]) == 2);
+  now[4] = old[4];
+  CHECK(std::equal(old.begin(), old.begin() + 88, now.begin())); // the rest as it was
+  std::array<double, 3> torque{};
+  std::memcpy(torque.data(), now.data() + 88, sizeof torque);
+  CHECK(torque == std::array<double, 3>{0.1, 0.2, 0.3});
+  BridgeReply in;
+  now[4] = std::byte{2};
+  REQUIRE(read_packet(now, in));
+  CHECK(in.torque == reply.torque);
+  CHECK_FALSE(read_packet(std::span<const std::byte>(now.data(), 88), in)); // of the other version's size
+  now[4] = std::byte{1};
+  CHECK_FALSE(read_packet(now, in));
+  for (const int version : {0, 3})
+    for (const std::size_t size : {bridge_head, bridge_body}) {
+      Bytes request{};
+      write_packet(BridgeRequest{size == bridge_head ? BridgePacket::hello : BridgePacket::pose}, request);
+      request[4] = static_cast<std::byte>(version);
+      BridgeRequest read;
+      CHECK_FALSE(read_packet(std::span<const std::byte>(request.data(), size), read));
+    }
+
+  for (const std::uint16_t version : {std::uint16_t{1}, std::uint16_t{2}}) {
+    BridgeDevice device(any_port(), waiting, 1000);
+    Client client(device.port());
+    client.version = version;
+    client.hello();
+    tick(device, 0);
+    REQUIRE(client.listen());
+    CHECK(client.bytes_of_last == (version == 1 ? 88 : 112));
+    CHECK(client.reply.torque.isZero(0)); // nobody holds the tool
+    client.pose(1, {0, 0, 0.04});
+    tick(device, 1, {0, 0, 2}, {0, 0.25, 0});
+    REQUIRE(client.listen());
+    CHECK(client.reply.version == version);
+    CHECK(client.reply.force == Vector3(0, 0, 2));
+    CHECK(client.reply.torque == Vector3(0, version == 1 ? 0 : 0.25, 0));
+    client.version = 3 - version; // of the session is the version of its first pose
+    client.pose(2, {0, 0, 0.05});
+    CHECK(tick(device, 2).position.z() == 0.04);
+    CHECK(device.counters().garbage == 1);
+  }
 }
 
 TEST_CASE("A hello is answered once, with one packet, until its token comes back from where it was sent") {

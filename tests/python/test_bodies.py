@@ -96,6 +96,14 @@ def test_a_press_balances():
         state = sc.press(patch, ball, pose, previous=state)
     assert state.converged and state.force[2] > 0.05
     assert state.nodal_forces.sum(axis=0) == pytest.approx(-state.force, abs=1e-12)
+    places = patch.rest + state.displacement
+    levers = places - np.asarray(pose.point)
+    assert state.torque == pytest.approx(-np.cross(levers, state.nodal_forces).sum(axis=0), abs=1e-12)
+    other = np.array([0.01, -0.02, 0.05])
+    moved = state.torque + np.cross(np.asarray(pose.point) - other, state.force)
+    assert state.torque_about(other) == pytest.approx(moved, abs=1e-12) and np.linalg.norm(moved) > 1e-4
+    with pytest.raises(sc.InputError, match="point"):
+        state.torque_about([0, 0])
     assert np.all(state.nodal_forces[~state.active] == 0)
     gaps = ball.distance(pose, patch.rest + state.displacement)
     assert gaps.min() > -1e-8 and np.abs(gaps[state.active]).max() < 1e-8

@@ -17,6 +17,7 @@ using solvers::Method;
 using solvers::press;
 using tests::held_box;
 using tests::options_for;
+using tests::place;
 using tests::pressed_block;
 using tests::PressedBlock;
 using tests::top_nodes;
@@ -34,10 +35,6 @@ Vector3 reaction(const PressedBlock& on, const ContactState& state) {
   for (const Vector3& force : on.body->constraint_forces(solvers::deform(on.patch, state)))
     total += force;
   return total;
-}
-
-Vector3 place(const ContactPatch& patch, const ContactState& state, std::size_t c) {
-  return patch.rest[c] + state.displacement.segment<3>(3 * static_cast<Eigen::Index>(c));
 }
 
 } // namespace

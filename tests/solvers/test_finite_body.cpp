@@ -184,6 +184,9 @@ TEST_CASE("A ball pressed into a block bears what the base bears and stays outsi
     const Vector3 base = face_force(body, equilibrium.constraint_forces(), 2, 0);
     CHECK((base - status.tool_force).norm() < 0.01 * status.tool_force.norm());
     CHECK(std::abs(status.tool_force.x()) < 0.1 * before);
+    // Without friction the ball has no torque about its centre.
+    const Vector3 arm = ball.radius * loading.tool->axis;
+    CHECK((status.tool_torque - arm.cross(status.tool_force)).norm() < 1e-6 * ball.radius * before);
   }
   FiniteLoading away;
   away.tool = topology::ToolPose{{0.5, 0.5, 1.2}, Vector3::UnitZ()};

@@ -4,6 +4,7 @@
 #include "src/haptics/haptic_tick.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
+#include "tests/src/device_poses.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -17,6 +18,7 @@ using namespace spherecut::app;
 using spherecut::tests::cut_block;
 using spherecut::tests::replaced;
 using spherecut::tests::TemporaryFolder;
+using spherecut::tests::unturned;
 
 namespace {
 
@@ -53,21 +55,21 @@ ContactSnapshot edge_of(double stiffness) {
 TEST_CASE("A blade's edge sticks with its stiffness, cuts on at the force that is due, and does not pull") {
   BladeModel model;
   CHECK(model.solved(edge_of(1000)));
-  const ModelForce found = model.at({0, 0, 0}, 0); // by a solve: the force goes on from none
+  const ModelForce found = model.at({0, 0, 0}, unturned, 0); // by a solve: the force goes on from none
   CHECK(found.force.norm() == 0);
   CHECK(*found.stored == 0);
-  CHECK(model.at({0, 0, 0}, 0.5 * BladeModel::onset).force.z() == Approx(0.55));
-  CHECK(model.at({0, 0, 0}, 1).force.z() == Approx(1.1));
-  CHECK(model.at({0, 0, -1e-4}, 1).force.z() == Approx(1.2)); // 0.1 N stiffer
-  CHECK(model.at({0, 0, -1e-3}, 1).force.z() == Approx(1.3)); // due
-  CHECK(model.at({5e-3, 0, -1e-3}, 1).force.z() == Approx(1.3));
-  const double back = model.at({0, 0, -1e-3 + 1e-4}, 1).force.z();
+  CHECK(model.at({0, 0, 0}, unturned, 0.5 * BladeModel::onset).force.z() == Approx(0.55));
+  CHECK(model.at({0, 0, 0}, unturned, 1).force.z() == Approx(1.1));
+  CHECK(model.at({0, 0, -1e-4}, unturned, 1).force.z() == Approx(1.2)); // 0.1 N stiffer
+  CHECK(model.at({0, 0, -1e-3}, unturned, 1).force.z() == Approx(1.3)); // due
+  CHECK(model.at({5e-3, 0, -1e-3}, unturned, 1).force.z() == Approx(1.3));
+  const double back = model.at({0, 0, -1e-3 + 1e-4}, unturned, 1).force.z();
   CHECK(back < 1.3); // the drag begins to turn over
-  CHECK(model.at({0, 0, 2e-3}, 1).force.z() == Approx(-0.1));
-  CHECK(*model.at({0, 0, 2e-3}, 1).stored >= 0);
+  CHECK(model.at({0, 0, 2e-3}, unturned, 1).force.z() == Approx(-0.1));
+  CHECK(*model.at({0, 0, 2e-3}, unturned, 1).stored >= 0);
   ContactSnapshot free;
   CHECK(model.solved(free)); // it has come out
-  CHECK(model.at({0, 0, 0}, 1).force.norm() == 0);
+  CHECK(model.at({0, 0, 0}, unturned, 1).force.norm() == 0);
   CHECK_FALSE(model.solved(free));
 }
 
@@ -82,10 +84,10 @@ TEST_CASE("While the edge sticks, its force between solves is that of a solve") 
   CHECK(snapshot.count == 0);
   BladeModel model;
   REQUIRE(model.solved(snapshot));
-  CHECK(model.at({0.004, 0, 0.0290}, 0).force.norm() == 0);
-  CHECK(model.at({0.004, 0, 0.0290}, 1).force == snapshot.force);
+  CHECK(model.at({0.004, 0, 0.0290}, unturned, 0).force.norm() == 0);
+  CHECK(model.at({0.004, 0, 0.0290}, unturned, 1).force == snapshot.force);
   for (const double z : {0.0288, 0.0284, 0.0292}) {
-    const ModelForce between = model.at({0.004, 0, z}, 1);
+    const ModelForce between = model.at({0.004, 0, z}, unturned, 1);
     ContactSnapshot there;
     simulation.solve(at_height(tick++, z), 0, there);
     CHECK(there.force.z() > 0);

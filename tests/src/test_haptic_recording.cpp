@@ -63,6 +63,7 @@ void write_made_up(const std::filesystem::path& file, std::uint64_t ticks, bool 
       solve.event = {t / 10 + 1, t, SolveEvent::never, static_cast<int>(t / 10 % 3), t / 10 % 2 == 1, t / 10 % 5 == 1};
       solve.topology = 7 * t;
       solve.force = {0, 0.1, static_cast<double>(t)};
+      solve.torque = {-0.5, static_cast<double>(t), 3};
       writer.add(solve);
     }
     TickRecord tick;
@@ -74,12 +75,45 @@ void write_made_up(const std::filesystem::path& file, std::uint64_t ticks, bool 
                    2,
                    9};
     tick.force = {1, 2, static_cast<double>(t)};
+    tick.torque = {4, static_cast<double>(t), 5};
     tick.sequence = t < 3 ? 0 : (t - 3) / 10 + 1;
     writer.add(tick);
   }
   writer.flush();
   if (finish)
     writer.finish();
+}
+
+/// A recording of version 2 as version 1 had it: without the last 24 bytes of every tick (136) and solve (88).
+std::string in_version_1(const std::string& bytes) {
+  const auto word = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    return value;
+  };
+  const auto append = [](std::string& to, const auto& value) {
+    to.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  std::string old = bytes.substr(0, 8);
+  append(old, std::uint32_t{1});
+  append(old, std::uint32_t{0});
+  for (std::size_t at = 16; at < bytes.size();) {
+    const std::uint32_t kind = word(at), size = word(at + 4);
+    const std::string payload = bytes.substr(at + 16, size);
+    const std::size_t entry = kind == 2 ? 136 : kind == 3 ? 88 : size;
+    std::string kept;
+    for (std::size_t k = 0; k < size; k += entry)
+      kept += payload.substr(k, entry == size && kind != 2 && kind != 3 ? entry : entry - 24);
+    std::uint64_t sum = 0xcbf29ce484222325U; // FNV-1a
+    for (const char byte : kept)
+      sum = (sum ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
+    append(old, kind);
+    append(old, static_cast<std::uint32_t>(kept.size()));
+    append(old, sum);
+    old += kept;
+    at += 16 + size;
+  }
+  return old;
 }
 
 } // namespace
@@ -135,6 +169,9 @@ TEST_CASE("A recording keeps every value, and a session that was killed all that
   const RecordedTick& tick = recording.ticks[345];
   CHECK(tick.device.position == Vector3(1e-3, 2e-3, 1e-5 * 345));
   CHECK(tick.force == Vector3(1, 2, 345));
+  CHECK(tick.torque == Vector3(4, 345, 5));
+  CHECK(recording.solves[34].torque == Vector3(-0.5, 340, 3));
+  CHECK(recording.version == 2);
   CHECK(tick.device.connected);
   CHECK_FALSE(recording.ticks[5].device.connected);
   CHECK(tick.device.mode == 2);
@@ -146,6 +183,55 @@ TEST_CASE("A recording keeps every value, and a session that was killed all that
   CHECK(recording.solves[35].event.swaps);
   CHECK_FALSE(recording.solves[35].event.aside);
   CHECK(recording.solves[36].event.aside);
+}
+
+TEST_CASE("A recording of the first version is read without its torques, and replayed by its forces") {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "a.recording", old = folder.path() / "old.recording";
+  write_made_up(file, 700, true);
+  write_file(old, in_version_1(read_file(file)));
+  const Recording now = read_recording(file), then = read_recording(old);
+  CHECK(then.version == 1);
+  CHECK(then.finished);
+  CHECK(then.header.scenario_text == "text");
+  REQUIRE(then.ticks.size() == now.ticks.size());
+  REQUIRE(then.solves.size() == now.solves.size());
+  for (std::size_t i = 0; i < now.ticks.size(); ++i) {
+    CHECK(then.ticks[i].force == now.ticks[i].force);
+    CHECK(then.ticks[i].device.position == now.ticks[i].device.position);
+    CHECK(then.ticks[i].sequence == now.ticks[i].sequence);
+    CHECK(then.ticks[i].torque.isZero(0));
+  }
+  CHECK(then.solves[34].force == now.solves[34].force);
+  CHECK(then.solves[34].torque.isZero(0));
+
+  const Scenario scenario = read_scenario(write_file(folder.path() / "s.toml", small_scenario));
+  const auto real = folder.path() / "b.recording";
+  const LoopRecords records = record(scenario, real, 0.5);
+  double turning = 0;
+  for (const TickRecord& tick : records.ticks)
+    turning = std::max(turning, tick.torque.norm());
+  CHECK(turning > 0);
+  for (const bool first_version : {true, false}) {
+    if (first_version)
+      write_file(old, in_version_1(read_file(real)));
+    Recording recording = read_recording(first_version ? old : real);
+    HapticSimulation simulation(recorded_scenario(recording));
+    LoopRecords again;
+    const ReplayReport report = replay(recording, simulation, again);
+    CHECK(report.same());
+    CHECK(report.torques == !first_version);
+    CHECK((text_of(report).find("no torques") != std::string::npos) == first_version);
+    if (first_version)
+      continue;
+    recording.ticks[450].torque.z() += 1e-12; // the comparison can tell
+    HapticSimulation other(recorded_scenario(recording));
+    const ReplayReport off = replay(recording, other, again);
+    REQUIRE(off.differing_tick);
+    CHECK(*off.differing_tick == 450);
+    CHECK(off.largest == 0);
+    CHECK(off.largest_torque == Approx(1e-12));
+  }
 }
 
 TEST_CASE("A recording moves a device and stays where it ends") {

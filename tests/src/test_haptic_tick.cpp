@@ -2,6 +2,7 @@
 #include "src/haptics/haptic_tick.hpp"
 #include "src/haptics/virtual_loop.hpp"
 
+#include "tests/src/device_poses.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/support/allocation_counter.hpp"
@@ -13,25 +14,18 @@
 
 using namespace spherecut;
 using namespace spherecut::app;
+using spherecut::tests::around;
+using spherecut::tests::device_at;
 using spherecut::tests::replaced;
 using spherecut::tests::scenario_of;
 using spherecut::tests::small_scenario;
+using spherecut::tests::unturned;
 
 namespace {
 
 Scenario small(const std::string& method, const std::string& condition = "frictionless") {
   return scenario_of(small_scenario + "[method]\nname = \"" + method + "\"\n[contact]\ncondition = \"" + condition +
                      "\"\n");
-}
-
-DeviceState device_at(std::uint64_t tick, const Vector3& position) {
-  return {tick, 1e-3 * static_cast<double>(tick), position, Eigen::Quaterniond::Identity(), true};
-}
-
-/// Down to 2 mm, 4 mm sideways, and up again, all within contact from tick 60 on: a closed loop of 400 ticks.
-Vector3 around(std::uint64_t tick) {
-  const double angle = 2 * std::numbers::pi * static_cast<double>(tick) / 400;
-  return {0.002 * std::sin(angle), 0.001 * std::sin(2 * angle), 0.0292 - 0.001 * std::cos(angle)};
 }
 
 /// A snapshot of one ball on one candidate whose compliance is a plain spring of `stiffness` N/m.
@@ -68,7 +62,7 @@ TEST_CASE("Between solves the tangent model gives the force that a solve would g
   int rounds = 0;
   for (std::uint64_t tick = 1; tick <= 400; ++tick) {
     const DeviceState device = device_at(tick, around(tick));
-    const ModelForce force = model->at(tool_pose(simulation.tool(), device), device.time);
+    const ModelForce force = model->at(tool_pose(simulation.tool(), device), device.orientation, device.time);
     rounds += force.rounds;
     CHECK(force.converged);
     if (tick % 20 != 0)
@@ -107,7 +101,7 @@ TEST_CASE("With friction the tangent model gives the force that solves give alon
   Vector3 last_force = first.force;
   for (std::uint64_t tick = 1; tick <= 800; ++tick) {
     const DeviceState device = device_at(tick, around(tick));
-    const ModelForce force = model->at(tool_pose(simulation.tool(), device), device.time);
+    const ModelForce force = model->at(tool_pose(simulation.tool(), device), device.orientation, device.time);
     if (tick > 400) // the second time around the contact has come to a cycle
       work -= 0.5 * (force.force + last_force).dot(device.position - last_place);
     last_place = device.position;
@@ -136,7 +130,7 @@ TEST_CASE("The tangent model follows onset and loss of contact") {
   REQUIRE(clear_of_it.count > 0);
   const auto model = make_force_model(ForceModelKind::tangent, simulation.tool());
   model->solved(clear_of_it);
-  const auto force = [&](double depth) { return model->at({height(depth), Vector3::UnitZ()}, 0).force; };
+  const auto force = [&](double depth) { return model->at({height(depth), Vector3::UnitZ()}, unturned, 0).force; };
   CHECK(force(-1e-4).norm() == 0);
   ContactSnapshot deep;
   simulation.solve(device_at(1, height(1e-3)), 0, deep);
@@ -159,7 +153,7 @@ TEST_CASE("A bonded contact goes with the tool and catches what it overtakes") {
   model->solved(first);
   ModelForce force;
   for (int i = 1; i <= 30; ++i)
-    force = model->at({start + Vector3(4e-5 * i, 0, -4e-5 * i), Vector3::UnitZ()}, 0);
+    force = model->at({start + Vector3(4e-5 * i, 0, -4e-5 * i), Vector3::UnitZ()}, unturned, 0);
   ContactSnapshot last;
   for (std::uint64_t i = 1; i <= 30; ++i)
     simulation.solve(device_at(i, start + Vector3(4e-5, 0, -4e-5) * static_cast<double>(i)), 0, last);
@@ -206,7 +200,7 @@ TEST_CASE("Around a closed loop at constant contact the tangent model gives no e
   double exchanged = 0;
   Vector3 before = Vector3::Zero();
   for (int i = 0; i <= 800; ++i) { // twice around; the first round settles the active set
-    const ModelForce force = model->at({around(static_cast<std::uint64_t>(i)), Vector3::UnitZ()}, 0);
+    const ModelForce force = model->at({around(static_cast<std::uint64_t>(i)), Vector3::UnitZ()}, unturned, 0);
     if (i > 400) {
       const double part =
           -0.5 *
@@ -229,14 +223,14 @@ TEST_CASE("The linear model goes on along the line through the last two solves, 
   second.force = {0, 0, 1.5};
   const auto linear = make_force_model(ForceModelKind::linear_in_time, punch);
   const auto hold = make_force_model(ForceModelKind::hold, punch);
-  CHECK(linear->at({}, 0).force.norm() == 0);
+  CHECK(linear->at({}, unturned, 0).force.norm() == 0);
   linear->solved(first);
-  CHECK(linear->at({}, 0.018).force.z() == Approx(1));
+  CHECK(linear->at({}, unturned, 0.018).force.z() == Approx(1));
   linear->solved(second);
-  CHECK(linear->at({}, 0.026).force.z() == Approx(1.8));
-  CHECK(linear->at({}, 10).force.z() == Approx(1.5 + 3 * 0.5)); // three intervals at most
+  CHECK(linear->at({}, unturned, 0.026).force.z() == Approx(1.8));
+  CHECK(linear->at({}, unturned, 10).force.z() == Approx(1.5 + 3 * 0.5)); // three intervals at most
   hold->solved(second);
-  CHECK(hold->at({}, 10).force.z() == Approx(1.5));
+  CHECK(hold->at({}, unturned, 10).force.z() == Approx(1.5));
   CHECK_THROWS_AS(force_model_from_string("cubic"), InputError);
 }
 

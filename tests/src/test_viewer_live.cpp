@@ -110,8 +110,8 @@ class Served {
 /// What a page knows, read from the bytes as docs/viewer_protocol.md has them.
 class Viewer {
  public:
-  explicit Viewer(int port) : socket_(port) {
-    say({{"type", "hello"}, {"version", 1}});
+  explicit Viewer(int port, int version = 2) : version_(version), socket_(port) {
+    say({{"type", "hello"}, {"version", version}});
     say({{"type", "credit"}, {"frames", 2}});
   }
   void say(const Json& message) { socket_.send(message.dump()); }
@@ -180,7 +180,7 @@ class Viewer {
     }
     std::uint32_t length = 0;
     std::memcpy(&length, message.bytes.data() + 4, 4);
-    sound = sound && length == message.bytes.size() && message.bytes[1] == 1;
+    sound = sound && length == message.bytes.size() && message.bytes[1] == version_;
     if (message.bytes[0] == 1) {
       topology = message.bytes;
       ++topologies;
@@ -194,6 +194,7 @@ class Viewer {
     }
     say({{"type", "credit"}, {"frames", 1}});
   }
+  int version_; // of the protocol
   WebSocketClient socket_;
 };
 
@@ -368,8 +369,9 @@ position = [0, 0, 0.034]
 TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
   const Served served;
   Viewer first(served.port());
-  Viewer second(served.port());
+  Viewer second(served.port(), 1); // as viewers were before there were torques
   REQUIRE(first.until([&] { return first.pictures > 0 && !first.welcome.is_null(); }));
+  CHECK(first.welcome["version"] == 2);
   CHECK(first.session["modes"] == Json({"probe", "blade"}));
   CHECK(first.welcome["scenarios"].size() == 2);
   CHECK(first.topologies == 1);
@@ -385,6 +387,11 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
     CHECK((first.value<std::uint32_t>(44) & 1U) == 1);
     REQUIRE(first.until([&] { return first.vector(76).z() - first.vector(64).z() > 1e-5; }));
     REQUIRE(second.until([&] { return force_of(second) > 0.02; })); // who watches sees the same
+    CHECK(second.welcome["version"] == 1);
+    CHECK(second.value<std::uint16_t>(2) == 248);
+    CHECK(first.value<std::uint16_t>(2) == 272);
+    const Vector3 arm = 0.01 * first.vector(104); // of the ball's centre, on whose line the force acts
+    CHECK((first.vector(248) - arm.cross(first.vector(116))).norm() < 1e-3 * arm.norm() * force_of(first));
     second.say({{"type", "pose"}, {"n", 1}, {"position", {0, 0, 0.2}}});
     second.say({{"type", "take"}});
     REQUIRE(second.until([&] { return second.errors.size() == 2; }));

@@ -41,12 +41,13 @@ inline app::LoopRecords run_twice(const app::Scenario& scenario, const std::vect
     CHECK(a.residual == b.residual);
     CHECK(a.update == b.update);
     CHECK(a.force == b.force);
+    CHECK(a.torque == b.torque);
   }
   REQUIRE(first.ticks.size() == ticks);
   REQUIRE(second.ticks.size() == ticks);
   bool same = true;
   for (std::size_t i = 0; i < first.ticks.size(); ++i)
-    same = same && first.ticks[i].force == second.ticks[i].force;
+    same = same && first.ticks[i].force == second.ticks[i].force && first.ticks[i].torque == second.ticks[i].torque;
   CHECK(same);
   return first;
 }

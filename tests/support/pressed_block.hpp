@@ -26,4 +26,9 @@ inline const PressedBlock& pressed_block(solvers::Method method) {
   return method == solvers::Method::collocation ? collocation : galerkin;
 }
 
+/// Where a candidate of the patch is in the state, m.
+inline Vector3 place(const solvers::ContactPatch& patch, const solvers::ContactState& state, std::size_t c) {
+  return patch.rest[c] + state.displacement.segment<3>(3 * static_cast<Eigen::Index>(c));
+}
+
 } // namespace spherecut::tests

@@ -292,6 +292,7 @@ export class Page {
     const frame = this.frame;
     if (!frame) return;
     write(byId('force'), Math.hypot(...frame.force).toFixed(3));
+    write(byId('torque'), withUnit(Math.hypot(...frame.torque), 'N m'));
     write(byId('depth'), (1000 * Math.max(frame.depth, 0)).toFixed(1));
     const lag = Math.hypot(...frame.hand.map((x, d) => x - (frame.tip[d] ?? x)));
     write(byId('lag'), (1000 * lag).toFixed(1));

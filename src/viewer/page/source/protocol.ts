@@ -1,7 +1,7 @@
-// Messages between `spherecut serve` and this page: docs/viewer_protocol.md, version 1. Lengths m, forces N, stresses Pa,
-// times s. Binary messages are little-endian; decoding makes views into the message wherever it can.
+// Messages between `spherecut serve` and this page: docs/viewer_protocol.md, version 2. Lengths m, forces N, torques
+// N m, stresses Pa, times s. Binary messages are little-endian; decoding makes views into the message wherever it can.
 
-export const protocolVersion = 1;
+export const protocolVersion = 2;
 
 export type Mode = 'probe' | 'blade' | 'grasper';
 export const modes: readonly Mode[] = ['probe', 'blade', 'grasper'];
@@ -223,6 +223,8 @@ export interface Frame extends Header {
   axis: Vec3;
   force: Vec3; // of the tissue on the tool
   handForce: Vec3;
+  torque: Vec3; // of the tissue on the tool, about its reference point
+  handTorque: Vec3;
   contact: Vec3;
   normal: Vec3;
   depth: number; // m below the surface at rest; negative: clearance
@@ -268,7 +270,7 @@ export const stageNames = [
 
 const headerBytes = 16;
 const topologyBytes = 32;
-const frameBytes = 248;
+const frameBytes = 272;
 
 /** Decodes one binary message; null: of a type this page does not know. Throws ProtocolError. */
 export function decodeBinary(data: ArrayBuffer): Topology | Frame | null {
@@ -403,6 +405,8 @@ function decodeFrame(data: ArrayBuffer, view: DataView, found: Map<number, Secti
     axis: vec(104),
     force: vec(116),
     handForce: vec(128),
+    torque: vec(248),
+    handTorque: vec(260),
     contact: vec(140),
     normal: vec(152),
     depth: f32(164),

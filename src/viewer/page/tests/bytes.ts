@@ -43,7 +43,7 @@ export function message(
   const bytes = new Uint8Array(length);
   bytes.set(
     pack([
-      ...u8(type, header.version ?? 1),
+      ...u8(type, header.version ?? 2),
       ...u16(first),
       ...u32(length, header.number ?? 1, header.epoch ?? 1),
     ]),
@@ -73,8 +73,9 @@ export function frameBlock(values: {
   tip?: number[];
   force?: number[];
   rest?: Cell[]; // from byte 128 on
+  torque?: number[]; // on the tool, then on the hand
 }): Uint8Array {
-  const block = new Uint8Array(248 - 16);
+  const block = new Uint8Array(272 - 16);
   block.set(
     pack([
       ...f64(values.time ?? 0, values.tickTime ?? 0),
@@ -86,5 +87,6 @@ export function frameBlock(values: {
     ]),
   );
   if (values.rest) block.set(pack(values.rest), 128 - 16);
+  if (values.torque) block.set(pack(f32(...values.torque)), 248 - 16);
   return block;
 }

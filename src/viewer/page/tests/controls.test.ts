@@ -63,6 +63,13 @@ test('A press shows an arrow at the tip, the spring to the hand, the readout in 
     const { frame } = globalThis.spherecut!;
     return Math.abs(Number(document.getElementById('force')!.textContent) - Math.hypot(...frame!.force)) < 6e-4;
   });
+  await until(tab, 'the readout below it is the torque', () => {
+    const { frame } = globalThis.spherecut!;
+    const [, number, prefix] = /^([\d.]+) ([munµ]?)N m$/.exec(document.getElementById('torque')!.textContent ?? '') ?? [];
+    const scale = { '': 1, m: 1e-3, µ: 1e-6, n: 1e-9 }[prefix ?? ''] ?? NaN;
+    const torque = Math.hypot(...frame!.torque);
+    return Math.abs(Number(number) * scale - torque) <= 0.006 * torque + 1e-12;
+  });
   await tab.waitForTimeout(600);
   assert.ok((await see(tab)).chart > before.chart + 20, 'the chart does not rise');
   // The spring is as long as the force divided by its stiffness, and can be switched off.

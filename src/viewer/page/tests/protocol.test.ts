@@ -125,8 +125,16 @@ test('The sections of a frame are read, in any order, unknown ones skipped', () 
   assert.deepEqual([...(frame.stages ?? [])], [1, 2, 3, 4, 5, 6, 7, 8]);
 });
 
+test('Force and torque are read where the page of the protocol has them', () => {
+  const frame = decodeBinary(message(2, frameBlock({ force: [1, 2, 3], torque: [4, 5, 6, 7, 8, 9] }), []));
+  assert.ok(frame?.kind === 'frame');
+  assert.deepEqual(frame.force, [1, 2, 3]);
+  assert.deepEqual(frame.torque, [4, 5, 6]);
+  assert.deepEqual(frame.handTorque, [7, 8, 9]);
+});
+
 test('A fixed block that has grown is read all the same', () => {
-  const grown = new Uint8Array(248 - 16 + 12);
+  const grown = new Uint8Array(272 - 16 + 12);
   grown.set(frameBlock({ solve: 9, vertices: 1 }));
   const frame = decodeBinary(message(2, grown, [{ kind: 16, data: pack(f32(1, 2, 3)) }]));
   assert.ok(frame?.kind === 'frame');
@@ -136,7 +144,9 @@ test('A fixed block that has grown is read all the same', () => {
 
 test('Messages that do not keep to the protocol are refused in words', () => {
   refuses(new ArrayBuffer(15), /shorter than its header/);
-  refuses(message(2, frameBlock({}), [], { version: 2 }), /version 2/);
+  refuses(message(2, frameBlock({}), [], { version: 1 }), /version 1/);
+  refuses(message(2, frameBlock({}), [], { version: 3 }), /version 3/);
+  refuses(message(2, frameBlock({}).slice(0, 248 - 16), []), /first section/);
   refuses(message(1, tetrahedronBlock, tetrahedron).slice(0, -4), /says that it has/);
   refuses(message(2, new Uint8Array(64), []), /first section/);
   refuses(message(2, frameBlock({ mode: 3 }), []), /mode 3/);
@@ -150,7 +160,7 @@ test('Messages that do not keep to the protocol are refused in words', () => {
   refuses(message(2, frameBlock({}), [{ kind: 19, data: pack(u32(1, 1, 1)) }]), /section 19/);
   refuses(message(2, frameBlock({}), [{ kind: 20, data: pack(u32(9)) }]), /section 20/);
   const past = new Uint8Array(message(2, frameBlock({}), [{ kind: 50, data: pack(u32(1)) }]));
-  past.set(pack(u32(5)), 248 + 4);
+  past.set(pack(u32(5)), 272 + 4);
   refuses(past.buffer, /past the end/);
   assert.equal(decodeBinary(message(3, new Uint8Array(0), [])), null);
 });
