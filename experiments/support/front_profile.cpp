@@ -41,13 +41,12 @@ FrontProfile front_profile(const solvers::Discretisation& body, const solvers::F
   for (const solvers::FrontState& state : solvers::front_states(
            body, field, [](const Vector3&) { return 1.0; }, spacing)) {
     const FrontPlace place = exact(state.frame);
+    profile.frames.push_back(state.frame);
     profile.angle.push_back(place.angle);
     profile.exact.push_back(place.exact);
     profile.integral.push_back(state.intensities);
     profile.correlation.push_back(solvers::displacement_correlation(body, field, state.frame));
-    profile.by_integral += state.by_integral ? 1 : 0;
   }
-  profile.by_integral /= static_cast<double>(profile.angle.size());
   return profile;
 }
 

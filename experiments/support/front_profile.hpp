@@ -19,9 +19,9 @@ struct FrontPlace {
 };
 
 struct FrontProfile {
+  std::vector<topology::FrontFrame> frames;
   std::vector<double> angle;                                      // rad
   std::vector<solvers::Intensities> exact, integral, correlation; // Pa sqrt(m)
-  double by_integral = 0;                                         // share of the places that have an integral
   [[nodiscard]] double largest() const;                           // of the exact intensities
   /// Largest error along the front of the given modes over `scale`: by the integral, as a tear takes it, or by the
   /// jump.
