@@ -63,7 +63,7 @@ std::vector<Check> run_precut_ellipse(const ExperimentContext& context) {
     body.problem.material = material;
     hold_whole_surface(body.problem, [&](const Vector3& x) {
       return ellipse_jump_displacement(
-          material, crack, a, b, [&](double, double) { return opening; }, x, 20, 48);
+          material, crack, a, b, [&](double, double) -> const Vector3& { return opening; }, x, 20, 48);
     });
     body.problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -pressure * n; };
     const int nodes = body.problem.nodes.size();

@@ -58,7 +58,7 @@ std::vector<ShearCase> shear_cases(const solvers::Material& material) {
            }},
           {"shear",
            [=](const Vector3& x) { return loaded_penny_displacement(material, crack, penny_radius, along, x); },
-           [=](const Vector3&) { return along; },
+           [=](const Vector3&) -> const Matrix3& { return along; },
            [=](double w) { return penny_intensities(material, penny_radius, 0, shear, w); }}};
 }
 
