@@ -202,7 +202,7 @@ Intensities each_sample(const Discretisation& body, const FrontFrame& front, con
   const double h = spacing_at(body, front.point);
   const double inner = options.inner * h, outer = options.outer * h, half_length = options.half_length * h;
   const Tube tube(front, curvature_of(incision, front, h));
-  if (tube.curvature() * outer <= -0.9)
+  if (std::abs(tube.curvature()) * outer >= 0.9) // sections would meet at the centre of curvature
     throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
                                  front.point.x(), front.point.y(), front.point.z()));
   const auto fade = [&](double r) { // of the shift across the tube, with its derivative

@@ -56,30 +56,63 @@ Vector3 penny_displacement(const solvers::Material& material, const CutFrame& fr
 // A unit force along k at x makes, at the distance R from it (R counted from the force),
 //   sigma_ij = -[3 R_i R_j R_k / R^3 + (1 - 2 nu)(delta_ik R_j + delta_jk R_i - delta_ij R_k)/R] / (8 pi (1 - nu) R^2);
 // by reciprocity u_k(x) is the work of these stresses on the jump of the faces.
-Vector3 loaded_penny_displacement(const solvers::Material& material, const CutFrame& frame, double radius,
-                                  const Matrix3& stress, const Vector3& x) {
-  constexpr int rings = 16, sectors = 24;
-  const double nu = material.poisson_ratio, mu = material.shear_modulus();
-  const Vector3 n = frame.normal, load = stress * n;
-  const Vector3 across = load.dot(n) * n, along = load - across;
-  // Jump of the faces at the centre over the radius.
-  const Vector3 jump = 4 * (1 - nu) / (pi * mu) * across + 8 * (1 - nu) / (pi * mu * (2 - nu)) * along;
+Vector3 ellipse_jump_displacement(const solvers::Material& material, const CutFrame& frame, double a, double b,
+                                  const std::function<Vector3(double x, double y)>& shape, const Vector3& x, int rings,
+                                  int sectors) {
+  const double nu = material.poisson_ratio;
+  const Vector3 n = frame.normal;
   Vector3 u = Vector3::Zero();
-  double volume = 0; // of the ellipsoid under a unit jump: the rule is scaled to have it right
-  for (int a = 0; a < rings; ++a)
-    for (int b = 0; b < sectors; ++b) {
-      // r = radius sin t: jump sqrt(radius^2 - r^2) r dr is smooth in t.
-      const double t = 0.5 * pi * (a + 0.5) / rings, w = 2 * pi * (b + 0.5) / sectors;
-      const double r = radius * std::sin(t), depth = radius * std::cos(t);
+  double volume = 0; // of the half ellipsoid over the unit disc: the rule is scaled to have it right
+  for (int i = 0; i < rings; ++i)
+    for (int j = 0; j < sectors; ++j) {
+      // r = sin t: sqrt(1 - r^2) r dr is smooth in t.
+      const double t = 0.5 * pi * (i + 0.5) / rings, w = 2 * pi * (j + 0.5) / sectors;
+      const double r = std::sin(t), depth = std::cos(t);
       const double area = r * depth * (0.5 * pi / rings) * (2 * pi / sectors);
       volume += area * depth;
-      const Vector3 to = frame.origin + r * (std::cos(w) * frame.ahead + std::sin(w) * frame.tangent) - x;
+      const double along = a * r * std::cos(w), across = b * r * std::sin(w);
+      const Vector3 to = frame.origin + along * frame.ahead + across * frame.tangent - x;
       const double distance = to.norm();
-      const Vector3 e = to / distance, d = depth * jump;
+      const Vector3 e = to / distance, d = depth * shape(along, across);
       u += area / (8 * pi * (1 - nu) * distance * distance) *
            (3 * e.dot(d) * e.dot(n) * e + (1 - 2 * nu) * (d * e.dot(n) + n * e.dot(d) - e * d.dot(n)));
     }
-  return -2 * pi / 3 * radius * radius * radius / volume * u;
+  return -2 * pi / 3 / volume * a * b * u;
+}
+
+Vector3 loaded_penny_displacement(const solvers::Material& material, const CutFrame& frame, double radius,
+                                  const Matrix3& stress, const Vector3& x) {
+  const double nu = material.poisson_ratio, mu = material.shear_modulus();
+  const Vector3 n = frame.normal, load = stress * n;
+  const Vector3 across = load.dot(n) * n, along = load - across;
+  const Vector3 jump = // of the faces at the centre
+      radius * (4 * (1 - nu) / (pi * mu) * across + 8 * (1 - nu) / (pi * mu * (2 - nu)) * along);
+  return ellipse_jump_displacement(
+      material, frame, radius, radius, [&jump](double, double) { return jump; }, x, 16, 24);
+}
+
+double ellipse_opening(const solvers::Material& material, double a, double b, double pressure) {
+  const double nu = material.poisson_ratio, modulus = std::sqrt(1 - b * b / (a * a));
+  return 4 * (1 - nu * nu) * pressure * b / (material.young_modulus * std::comp_ellint_2(modulus));
+}
+
+double ellipse_intensity(double a, double b, double pressure, double t) {
+  const double ratio = b / a, c = ratio * std::cos(t), s = std::sin(t);
+  return pressure * std::sqrt(pi * b) * std::pow(s * s + c * c, 0.25) /
+         std::comp_ellint_2(std::sqrt(1 - ratio * ratio));
+}
+
+double torsion_turn(const solvers::Material& material, double radius, double shear, double r) {
+  return 8 * shear * std::sqrt(std::max(0.0, radius * radius - r * r)) / (3 * pi * material.shear_modulus() * radius);
+}
+
+double torsion_intensity(double radius, double shear) {
+  return 4 * shear * std::sqrt(radius / pi) / 3;
+}
+
+solvers::Intensities lens_intensities(double sphere, double tension) {
+  const double k = 2 * tension * std::sqrt(sphere * std::sqrt(0.5) / pi);
+  return {0.877 * k, -0.235 * k, 0};
 }
 
 double penny_opening(const solvers::Material& material, double radius, double pressure, double r) {
@@ -93,13 +126,18 @@ double penny_opening_volume(const solvers::Material& material, double radius, do
   return 16 * (1 - nu * nu) * pressure * radius * radius * radius / (3 * material.young_modulus);
 }
 
-// The + face slides over the - face along the shear, which lies along frame.ahead for tension tilted towards it.
-solvers::Intensities tilted_penny_intensities(const solvers::Material& material, double radius, double tension,
-                                              double tilt, double w) {
+// The + face slides over the - face along the shear.
+solvers::Intensities penny_intensities(const solvers::Material& material, double radius, double normal, double shear,
+                                       double w) {
   const double nu = material.poisson_ratio, root = std::sqrt(radius / pi);
-  const double normal = tension * std::cos(tilt) * std::cos(tilt), shear = tension * std::sin(tilt) * std::cos(tilt);
   return {2 * normal * root, 4 * shear * std::cos(w) * root / (2 - nu),
           -4 * (1 - nu) * shear * std::sin(w) * root / (2 - nu)};
+}
+
+solvers::Intensities tilted_penny_intensities(const solvers::Material& material, double radius, double tension,
+                                              double tilt, double w) {
+  return penny_intensities(material, radius, tension * std::cos(tilt) * std::cos(tilt),
+                           tension * std::sin(tilt) * std::cos(tilt), w);
 }
 
 double edge_notched_strip_intensity(double tension, double crack, double width) {

@@ -3,6 +3,8 @@
 
 #include "solvers/stress_intensity.hpp"
 
+#include <functional>
+
 namespace spherecut::experiments {
 
 /// Axes of a plane cut: the front runs along `tangent` = normal x ahead through `origin`, or around it.
@@ -37,6 +39,36 @@ double penny_opening_volume(const solvers::Material& material, double radius, do
 Vector3 loaded_penny_displacement(const solvers::Material& material, const CutFrame& frame, double radius,
                                   const Matrix3& stress, const Vector3& x);
 
+/// Field of an infinite body in which the faces of the ellipse (x/a)^2 + (y/b)^2 < 1 (x along frame.ahead, y along
+/// frame.tangent) are apart by u+ - u- = sqrt(1 - (x/a)^2 - (y/b)^2) shape(x, y), m, by the formula for dislocation
+/// loops [Volterra 1907]; the faces carry what that asks for. The rule has `rings` by `sectors` points: x is to be
+/// further off the crack than they are apart.
+Vector3 ellipse_jump_displacement(const solvers::Material& material, const CutFrame& frame, double a, double b,
+                                  const std::function<Vector3(double x, double y)>& shape, const Vector3& x, int rings,
+                                  int sectors);
+
+/// Elliptical crack with the semi-axes a along frame.ahead and b <= a along frame.tangent, faces under pressure p: the
+/// opening u+ - u- at its centre, 4 (1 - nu^2) p b / (E E(k)), k^2 = 1 - (b/a)^2, m [Green and Sneddon 1950].
+double ellipse_opening(const solvers::Material& material, double a, double b, double pressure);
+/// K_I at the front point (a cos t, b sin t), p sqrt(pi b) (sin^2 t + (b/a)^2 cos^2 t)^(1/4) / E(k) [Irwin 1962].
+double ellipse_intensity(double a, double b, double pressure, double t);
+
+/// Penny crack whose faces carry what remote torsion tau r / a about its axis leaves on them: they turn against each
+/// other by 8 tau sqrt(a^2 - r^2) / (3 pi mu a) rad at the distance r; K_III = 4 tau sqrt(a / pi) / 3 all along
+/// [Tada, Paris and Irwin; code_aster V3.04.134].
+double torsion_turn(const solvers::Material& material, double radius, double shear, double r);
+double torsion_intensity(double radius, double shear);
+
+/// K_I and K_II in print of a spherical cap of radius R and half angle 45 degrees under hydrostatic tension p at nu =
+/// 0.22: 0.877 and 0.235 times 2 p sqrt(R sin 45 / pi) [Martynenko and Ulitko 1979; code_aster V3.04.155], the second
+/// negative with the + side outside, away from the sphere's centre. lens_by_elements() differs by 1.4 and 4 %.
+solvers::Intensities lens_intensities(double sphere, double tension);
+
+/// Intensities of the penny crack under the remote stresses s_n along its normal and the shear along frame.ahead, at
+/// the front point in the direction w (rad) from frame.ahead; the tangent there is normal x outward [Kassir and Sih
+/// 1966].
+solvers::Intensities penny_intensities(const solvers::Material& material, double radius, double normal, double shear,
+                                       double w);
 /// Intensities of the penny crack under remote tension s whose direction is tilted by `tilt` (rad) from the normal
 /// towards `frame.ahead`, at the front point in the direction w (rad) from frame.ahead; the tangent there is normal x
 /// outward. K_I = 2 s_n sqrt(a/pi), K_II and K_III of the shear s sin cos [Kassir and Sih 1966].

@@ -5,15 +5,11 @@
 // at
 //            the nodes. For the tilted tension K_I, K_II, K_III along the front; errors over the largest of them.
 // Command:   spherecut experiment run precut_penny --out DIR
-#include "experiments/analytic/cracks.hpp"
 #include "experiments/registered.hpp"
-#include "experiments/support/cut_body.hpp"
-#include "experiments/support/precut_series.hpp"
+#include "experiments/support/penny_body.hpp"
 #include "experiments/support/statistics.hpp"
 
 #include "src/figure.hpp"
-#include "topology/cut_sheets.hpp"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -24,23 +20,8 @@ namespace spherecut::experiments {
 
 namespace {
 
-constexpr double pi = std::numbers::pi, radius = 1, tilt = 35 * pi / 180;
-const Vector3 half_size(2, 2, 2); // m
-const CutFrame crack = tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
-
-CutBody penny_body(int nodes, std::uint64_t seed, double nu, const PrecutMethod& method) {
-  CutBodyCase cut;
-  cut.domain = topology::make_box_domain(-half_size, half_size, 0.5);
-  cut.sheets = {topology::make_disc_sheet(crack.origin, crack.normal, radius, 0.1)};
-  cut.slope = 0.25 * std::cbrt(2400.0 / nodes); // one field of spacings, scaled: steeper ones cost accuracy
-  cut.nodes = nodes;
-  cut.seed = seed;
-  cut.method = method.method;
-  cut.sight = method.sight;
-  CutBody body = cut_body(cut);
-  body.problem.material = {1, nu, 0};
-  return body;
-}
+constexpr double pi = std::numbers::pi, radius = penny_radius, tilt = 35 * pi / 180;
+const CutFrame& crack = penny_frame();
 
 struct PennyErrors {
   double volume = 0, displacement = 0, k_correlation = 0, k_interaction = 0; // relative

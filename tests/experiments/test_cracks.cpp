@@ -1,6 +1,8 @@
 // The exact crack fields against the equations they solve.
 #include "experiments/analytic/cracks.hpp"
+#include "experiments/reference/lens.hpp"
 #include "tests/support/finite_differences.hpp"
+#include "topology/errors.hpp"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
@@ -103,4 +105,74 @@ TEST_CASE(
   CHECK(std::abs(beside[2] / ahead[1]) == Approx(1 - material.poisson_ratio));
   CHECK(edge_notched_strip_intensity(3, 1e-4, 1) ==
         Approx(1.1215 * 3 * std::sqrt(std::numbers::pi * 1e-4)).epsilon(2e-3));
+}
+
+namespace {
+
+/// Stress on the ellipse's upper face, from two heights over it at which the rule is fine enough.
+Matrix3 stress_over(double a, double b, const std::function<Vector3(double, double)>& shape, double x, double y) {
+  const auto u = [&](const Vector3& at) {
+    return ellipse_jump_displacement(material, frame, a, b, shape, at, 150, 300);
+  };
+  const auto at = [&](double height) {
+    return stress(material,
+                  gradient(u, frame.origin + x * frame.ahead + y * frame.tangent + height * frame.normal, 2e-3));
+  };
+  return 2 * at(0.03) - at(0.06);
+}
+
+} // namespace
+
+TEST_CASE("The elliptical crack carries its pressure, is a penny when round, and has the intensity of its opening") {
+  const double a = 1, b = 0.4, p = 0.7;
+  const Vector3 opening = ellipse_opening(material, a, b, p) * frame.normal;
+  for (const auto& [x, y] : {std::pair(0.1, 0.05), std::pair(0.5, -0.1)}) {
+    const Matrix3 sigma = stress_over(
+        a, b, [&](double, double) { return opening; }, x, y);
+    CHECK(frame.normal.dot(sigma * frame.normal) == Approx(-p).epsilon(0.03));
+    CHECK(std::abs(frame.ahead.dot(sigma * frame.normal)) < 0.03 * p);
+  }
+  CHECK(ellipse_opening(material, 0.9, 0.9, p) == Approx(penny_opening(material, 0.9, p, 0)));
+  CHECK(ellipse_intensity(0.9, 0.9, p, 0.3) == Approx(2 * p * std::sqrt(0.9 / std::numbers::pi)));
+  CHECK(ellipse_intensity(25, 6, 1, std::numbers::pi / 2) / ellipse_intensity(25, 6, 1, 0) ==
+        Approx(std::sqrt(25.0 / 6)));
+  CHECK(ellipse_intensity(25, 6, 1, std::numbers::pi / 2) == Approx(4.0680).epsilon(1e-3)); // in print, MPa sqrt(mm)
+  // At the ends of both axes the jump at the distance s is 8 (1 - nu^2) K sqrt(s / (2 pi)) / E.
+  const double nu = material.poisson_ratio, s = 1e-6;
+  for (const auto& [axis, t] : {std::pair(a, 0.0), std::pair(b, std::numbers::pi / 2)})
+    CHECK(ellipse_opening(material, a, b, p) * std::sqrt(1 - std::pow(1 - s / axis, 2)) ==
+          Approx(8 * (1 - nu * nu) * ellipse_intensity(a, b, p, t) * std::sqrt(s / (2 * std::numbers::pi)) /
+                 material.young_modulus)
+              .epsilon(1e-5));
+}
+
+TEST_CASE("The penny in torsion carries tau r / a around its axis and has the intensity of its turn") {
+  const double a = 1.2, tau = 0.6, turn = torsion_turn(material, a, tau, 0);
+  const auto shape = [&](double x, double y) -> Vector3 { return turn * (x * frame.tangent - y * frame.ahead); };
+  for (const auto& [x, y] : {std::pair(0.5, 0.0), std::pair(-0.3, 0.6)}) {
+    const Matrix3 sigma = stress_over(a, a, shape, x, y);
+    const Vector3 pull = sigma * frame.normal, wanted = -tau / a * (x * frame.tangent - y * frame.ahead);
+    CHECK((pull - wanted).norm() < 0.03 * wanted.norm());
+  }
+  const double s = 1e-6;
+  CHECK(torsion_turn(material, a, tau, a - s) * (a - s) ==
+        Approx(4 * torsion_intensity(a, tau) * std::sqrt(s / (2 * std::numbers::pi)) / material.shear_modulus())
+            .epsilon(1e-5));
+}
+
+TEST_CASE("The cap's intensities by elements: the disc's when flat, settled, and a few per cent from those in print") {
+  const solvers::Material cap{1, 0.22, 0};
+  const double disc = 2 / std::sqrt(std::numbers::pi);
+  const solvers::Intensities flat = lens_by_elements(cap, 0.01, 20);
+  CHECK(flat[0] == Approx(disc).epsilon(2e-3));
+  CHECK(std::abs(flat[1]) < 0.005 * disc);
+  const double half = std::numbers::pi / 4;
+  const solvers::Intensities coarse = lens_by_elements(cap, half, 20, 12), fine = lens_by_elements(cap, half, 20, 24);
+  CHECK((coarse - fine).norm() < 2e-3 * fine.norm());
+  CHECK((lens_by_elements(cap, half, 5) - fine).norm() < 1e-2 * fine.norm()); // held walls at five rim radii
+  const solvers::Intensities printed = lens_intensities(std::numbers::sqrt2, 1);
+  CHECK(fine[0] / printed[0] == Approx(1.014).epsilon(2e-3));
+  CHECK(fine[1] / printed[1] == Approx(1.040).epsilon(4e-3));
+  CHECK_THROWS_AS(lens_by_elements(cap, 0, 20), InputError);
+  CHECK_THROWS_AS(lens_by_elements(cap, half, 1), InputError);
 }

@@ -100,6 +100,18 @@ TEST_CASE("Quick penny crack: opening volume, displacement and intensities") {
   require_quick_run_passes("precut_penny");
 }
 
+TEST_CASE("Quick penny crack in torsion and in shear: K_II and K_III along the front") {
+  require_quick_run_passes("precut_torsion");
+}
+
+TEST_CASE("Quick elliptical crack: K_I along the front") {
+  require_quick_run_passes("precut_ellipse");
+}
+
+TEST_CASE("Quick spherical cap crack: K_I and K_II along the front") {
+  require_quick_run_passes("precut_lens");
+}
+
 TEST_CASE("Quick edge-notched strip: intensity") {
   require_quick_run_passes("precut_edge");
 }
