@@ -1,5 +1,7 @@
 #include "topology/surface_parting.hpp"
 
+#include "topology/triangle_corners.hpp"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -34,10 +36,6 @@ std::vector<TriangleSide> sides_of(const SurfaceMesh& mesh) {
     return std::tie(p.low, p.high, p.triangle) < std::tie(q.low, q.high, q.triangle);
   });
   return sides;
-}
-
-int corner_at(const Triangle& triangle, int vertex) {
-  return static_cast<int>(std::find(triangle.begin(), triangle.end(), vertex) - triangle.begin());
 }
 
 /// Two faces that belong together at an edge.

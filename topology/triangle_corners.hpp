@@ -12,6 +12,11 @@ inline bool has_corner(const Triangle& t, int point) {
   return t[0] == point || t[1] == point || t[2] == point;
 }
 
+/// Where the point is among the corners; 3 when it is none.
+inline int corner_at(const Triangle& t, int point) {
+  return static_cast<int>(std::find(t.begin(), t.end(), point) - t.begin());
+}
+
 /// The corner that is neither u nor v; -1 when there is none.
 inline int third_corner(const Triangle& t, int u, int v) {
   for (const int point : t)

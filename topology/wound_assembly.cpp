@@ -15,10 +15,6 @@ namespace spherecut::topology {
 
 namespace {
 
-int corner_at(const Triangle& t, int point) {
-  return t[0] == point ? 0 : t[1] == point ? 1 : 2;
-}
-
 double angle_between(const Vector3& a, const Vector3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
