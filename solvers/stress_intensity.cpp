@@ -172,6 +172,8 @@ double curvature_of(const topology::Incision& incision, const FrontFrame& front,
   return length > 0.5 * h ? (after->ahead - before->ahead).dot(front.tangent) / length : 0;
 }
 
+constexpr double widest_turn = 0.9; // of the radius of curvature of the front: the tube's outer radius
+
 struct GaussRule {
   std::array<double, 2> place{-0.5773502691896257, 0.5773502691896257};
 };
@@ -200,9 +202,13 @@ Intensities each_sample(const Discretisation& body, const FrontFrame& front, con
   const Problem& problem = body.problem();
   const Material& material = problem.material;
   const double h = spacing_at(body, front.point);
-  const double inner = options.inner * h, outer = options.outer * h, half_length = options.half_length * h;
   const Tube tube(front, curvature_of(incision, front, h));
-  if (std::abs(tube.curvature()) * outer >= 0.9) // sections would meet at the centre of curvature
+  // Sections meet at the centre of curvature. Behind a front that turns round it the tube is narrowed, for they would
+  // count twice there, the second time negative.
+  const double narrowed = std::min(1.0, widest_turn / (std::max(0.0, tube.curvature()) * options.outer * h));
+  const double inner = narrowed * options.inner * h, outer = narrowed * options.outer * h;
+  const double half_length = options.half_length * h;
+  if (tube.curvature() * outer <= -widest_turn)
     throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
                                  front.point.x(), front.point.y(), front.point.z()));
   const auto fade = [&](double r) { // of the shift across the tube, with its derivative

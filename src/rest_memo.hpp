@@ -1,3 +1,4 @@
+// Places of the tissue, carried back to where they were at rest, kept for one state of a body.
 #pragma once
 #include "solvers/discretisation.hpp"
 #include "topology/incision.hpp"

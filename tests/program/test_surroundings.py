@@ -198,9 +198,9 @@ class Crafted:
     def bytes(self):
         lots = {
             "h": lot(1, text("build") + text("processor") + text(self.name) + text(self.scenario) + struct.pack("<QQd", self.seed, self.organ, self.rate)),
-            "s": lot(3, b"".join(struct.pack("<QQiIiiQ3d", *solve) for solve in self.solves)) if self.solves else b"",
+            "s": lot(3, b"".join(struct.pack("<QQiIiiQ6d", *solve, 0, 0, 0) for solve in self.solves)) if self.solves else b"",
             "c": lot(5, b"".join(struct.pack("<Q5dQ", *client) for client in self.clients)) if self.clients else b"",
-            "t": lot(2, b"".join(struct.pack("<Q11dIHHQ", *tick) for tick in self.ticks)) if self.ticks else b"",
+            "t": lot(2, b"".join(struct.pack("<Q11dIHHQ3d", *tick, 0, 0, 0) for tick in self.ticks)) if self.ticks else b"",
         }
         end = self.end or (len(self.ticks), len(self.solves), 0)
         return b"SPHCREC\n" + struct.pack("<II", self.version, 0) + b"".join(lots[k] for k in self.order) + self.more + lot(4, struct.pack("<3Q", *end))

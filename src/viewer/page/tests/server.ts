@@ -68,11 +68,12 @@ export const coarserFlap = (text: string): string => withValues(text, { fine_spa
 export function recordedForces(bytes: Buffer): { time: number; force: [number, number, number] }[] {
   const ticks: { time: number; force: [number, number, number] }[] = [];
   if (bytes.subarray(0, 8).toString('latin1') !== 'SPHCREC\n') throw new Error('not a recording');
+  const tickBytes = 136;
   for (let at = 16; at + 16 <= bytes.length; ) {
     const kind = bytes.readUInt32LE(at);
     const size = bytes.readUInt32LE(at + 4);
     const data = bytes.subarray(at + 16, at + 16 + size);
-    for (let tick = 0; kind === 2 && tick + 112 <= size; tick += 112) {
+    for (let tick = 0; kind === 2 && tick + tickBytes <= size; tick += tickBytes) {
       const number = (offset: number): number => data.readDoubleLE(tick + offset);
       ticks.push({ time: number(8), force: [number(72), number(80), number(88)] });
     }
