@@ -15,7 +15,7 @@ void require_run(const Scenario& scenario);
 struct FiniteStep {
   Vector3 force = Vector3::Zero();  // N, of the body on the tool
   Vector3 torque = Vector3::Zero(); // N m, of the same about the tool's point
-  double contact_radius = 0;       // m, as ContactState::contact_radius
+  double contact_radius = 0;        // m, as ContactState::contact_radius
   int active_nodes = 0, iterations = 0;
   double residual = 0; // norm of the unbalanced forces over that of the acting ones
   double least_jacobian = 1;

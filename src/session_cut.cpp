@@ -120,7 +120,7 @@ Vector3 Session::find_rest(const Vector3& x, const BodyModel& model) const {
         return on->point;
     return rest.position;
   } catch (const NumericalError&) {
-    const Vector3 guess = x - displacement(x);
+    Vector3 guess = x - displacement(x);
     if (model.incision != nullptr)
       if (const auto on = model.incision->closest(guess, gap_reach * fine))
         return on->point;

@@ -1,7 +1,6 @@
 // Attaches a device to `spherecut haptics` with device = "bridge" (docs/haptic_bridge.md): sends its pose, gets the
-// force and its torque about the tool's point. Replace read_device() and drive_device() by the calls of your hardware, or
-// begin with one of examples/devices.
-// As it stands, the device sways by 2 mm.
+// force and its torque about the tool's point. Replace read_device() and drive_device() by the calls of your hardware,
+// or begin with one of examples/devices. As it stands, the device sways by 2 mm.
 //
 //     haptic_bridge_client [PORT [SECONDS]]
 #include "bridge_client.hpp"

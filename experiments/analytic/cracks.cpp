@@ -88,7 +88,7 @@ Vector3 loaded_penny_displacement(const solvers::Material& material, const CutFr
   const Vector3 jump = // of the faces at the centre
       radius * (4 * (1 - nu) / (pi * mu) * across + 8 * (1 - nu) / (pi * mu * (2 - nu)) * along);
   return ellipse_jump_displacement(
-      material, frame, radius, radius, [&jump](double, double) { return jump; }, x, 16, 24);
+      material, frame, radius, radius, [&jump](double, double) -> const Vector3& { return jump; }, x, 16, 24);
 }
 
 double ellipse_opening(const solvers::Material& material, double a, double b, double pressure) {
