@@ -68,6 +68,7 @@ HOW = [
     (rf"{S} sweep examples/studies/press_spacing\.toml --out out/\w+(?: --slurm)?", "run_study"),
     (rf"{S} sweep STUDY\.toml --out FOLDER -- .*", "run_study"),
     (r"PYTHONPATH=build/release/python python3 examples/studies/threads\.py", "run_short", {"examples/studies/threads.py": "examples/studies/threads.py 300"}),
+    (r"PYTHONPATH=build/release/python python3 examples/studies/environment_rate\.py", "run_short", {"environment_rate.py": "environment_rate.py 20"}),
     (r"python3 -m spherecut\.sweep", "elsewhere", "tests/python/test_sweep.py", "spherecut.sweep"),
     (r"python3 examples/studies/scaling\.py examples/studies/press_spacing\.toml", "run_short", {"examples/studies/press_spacing.toml": "--help"}),
     (r"git clone ADDRESS \w+ && cd \w+", "clone"),
