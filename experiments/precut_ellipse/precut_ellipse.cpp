@@ -9,8 +9,8 @@
 // Command:   spherecut experiment run precut_ellipse --out DIR
 #include "experiments/analytic/cracks.hpp"
 #include "experiments/registered.hpp"
-#include "experiments/support/cut_body.hpp"
 #include "experiments/support/front_profile.hpp"
+#include "experiments/support/pressed_crack.hpp"
 #include "experiments/support/statistics.hpp"
 
 #include "topology/cut_sheets.hpp"
@@ -46,28 +46,24 @@ std::vector<Check> run_precut_ellipse(const ExperimentContext& context) {
   const PrecutMethod method = precut_methods(true).front();
   const solvers::Material material{1, 0.3, 0};
   const Vector3 opening = ellipse_opening(material, a, b, pressure) * crack.normal;
+  PressedCrack pressed;
+  pressed.domain = topology::make_box_domain({-1.5, -0.8, -0.9}, {1.5, 0.8, 0.9}, 0.3);
+  pressed.sheet = ellipse_sheet(0.05);
+  pressed.fine = spacing;
+  pressed.coarse = 10;
+  pressed.material = material;
+  pressed.pressure = pressure;
+  pressed.at_surface = [&](const Vector3& x) {
+    return ellipse_jump_displacement(
+        material, crack, a, b, [&](double, double) -> const Vector3& { return opening; }, x, 20, 48);
+  };
   std::vector<Check> checks;
   app::Table table = front_table();
   ErrorSeries errors;
   for (int seed = 1; seed <= seeds; ++seed) {
-    CutBodyCase cut;
-    cut.domain = topology::make_box_domain({-1.5, -0.8, -0.9}, {1.5, 0.8, 0.9}, 0.3);
-    cut.sheets = {ellipse_sheet(0.05)};
-    cut.fine = spacing;
-    cut.coarse = 10;
-    cut.slope = 0.3;
-    cut.seed = static_cast<std::uint64_t>(seed);
-    cut.method = method.method;
-    cut.sight = method.sight;
-    CutBody body = cut_body(cut);
-    body.problem.material = material;
-    hold_whole_surface(body.problem, [&](const Vector3& x) {
-      return ellipse_jump_displacement(
-          material, crack, a, b, [&](double, double) -> const Vector3& { return opening; }, x, 20, 48);
-    });
-    body.problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -pressure * n; };
-    const int nodes = body.problem.nodes.size();
-    const auto discretisation = solvers::discretise(std::move(body.problem), method.options());
+    solvers::Problem problem = pressed_crack(pressed, seed, method);
+    const int nodes = problem.nodes.size();
+    const auto discretisation = solvers::discretise(std::move(problem), method.options());
     const FrontProfile profile = front_profile(*discretisation, discretisation->solve(), 4.19 / 64.01,
                                                [](const topology::FrontFrame& front) -> FrontPlace {
                                                  const Vector3 at = crack.local(front.point);

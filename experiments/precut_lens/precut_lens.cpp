@@ -8,8 +8,8 @@
 #include "experiments/analytic/cracks.hpp"
 #include "experiments/reference/lens.hpp"
 #include "experiments/registered.hpp"
-#include "experiments/support/cut_body.hpp"
 #include "experiments/support/front_profile.hpp"
+#include "experiments/support/pressed_crack.hpp"
 #include "experiments/support/statistics.hpp"
 
 #include "topology/cut_sheets.hpp"
@@ -45,26 +45,22 @@ std::vector<Check> run_precut_lens(const ExperimentContext& context) {
   const solvers::Material material{1, 0.22, 0};
   const solvers::Intensities exact = pressure * lens_by_elements(material, half_angle, 20);
   const solvers::Intensities printed = lens_intensities(sphere, pressure);
+  const Vector3 corner(half_size, half_size, half_size);
+  PressedCrack pressed;
+  pressed.domain = topology::make_box_domain(-corner, corner, 1);
+  pressed.sheet = cap_sheet(spacing / 3);
+  pressed.fine = spacing;
+  pressed.coarse = 15;
+  pressed.material = material;
+  pressed.pressure = pressure;
+  pressed.at_surface = [](const Vector3&) -> Vector3 { return Vector3::Zero(); };
   std::vector<Check> checks;
   app::Table table = front_table();
   ErrorSeries errors;
   for (int seed = 1; seed <= seeds; ++seed) {
-    CutBodyCase cut;
-    const Vector3 corner(half_size, half_size, half_size);
-    cut.domain = topology::make_box_domain(-corner, corner, 1);
-    cut.sheets = {cap_sheet(spacing / 3)};
-    cut.fine = spacing;
-    cut.coarse = 15;
-    cut.slope = 0.3;
-    cut.seed = static_cast<std::uint64_t>(seed);
-    cut.method = method.method;
-    cut.sight = method.sight;
-    CutBody body = cut_body(cut);
-    body.problem.material = material;
-    hold_whole_surface(body.problem, [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
-    body.problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -pressure * n; };
-    const int nodes = body.problem.nodes.size();
-    const auto discretisation = solvers::discretise(std::move(body.problem), method.options());
+    solvers::Problem problem = pressed_crack(pressed, seed, method);
+    const int nodes = problem.nodes.size();
+    const auto discretisation = solvers::discretise(std::move(problem), method.options());
     const FrontProfile profile = front_profile(*discretisation, discretisation->solve(), 2 * pi / 16.01,
                                                [&](const topology::FrontFrame& front) -> FrontPlace {
                                                  const Vector3 at = crack.local(front.point);
