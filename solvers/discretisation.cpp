@@ -1,7 +1,6 @@
 #include "solvers/discretisation.hpp"
 
 #include "solvers/elastic_body.hpp"
-#include "solvers/published.hpp"
 #include "topology/errors.hpp"
 
 #include <cmath>
@@ -117,24 +116,6 @@ double Discretisation::sphere_radius(int) const {
 
 double Discretisation::load_work(const Field&) const {
   throw InputError(fmt::format("method {} has no forces in newtons that could do work", to_string(method())));
-}
-
-std::unique_ptr<Discretisation> discretise(Problem problem, const DiscretisationOptions& options) {
-  if (!(options.support_radius >= 0) || !std::isfinite(options.support_radius))
-    throw InputError(fmt::format("a support radius of {:g} spacings; allowed: above 0, or 0 for the method's own",
-                                 options.support_radius));
-  if (options.quadrature < 1 || !(options.cell_size > 0) || !std::isfinite(options.cell_size))
-    throw InputError(fmt::format("background cells of {:g} spacings with {} points a direction; allowed: both above 0",
-                                 options.cell_size, options.quadrature));
-  switch (options.method) {
-  case Method::collocation:
-    return make_collocation(std::move(problem), options);
-  case Method::galerkin:
-    return make_galerkin(std::move(problem), options);
-  case Method::published:
-    return make_published(std::move(problem), options);
-  }
-  throw InputError(fmt::format("method {} does not exist", static_cast<int>(options.method)));
 }
 
 } // namespace spherecut::solvers

@@ -8,7 +8,6 @@
 // the rows of K add up to zero and all forces balance to rounding.
 #include "solvers/galerkin.hpp"
 
-#include "solvers/appended/appended_body.hpp"
 #include "solvers/background_cells.hpp"
 #include "solvers/cell_shapes.hpp"
 #include "solvers/cut_sight.hpp"
@@ -485,13 +484,6 @@ std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const Discret
 
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
   require_domain(problem);
-  if (options.sight == SightRule::appended && (problem.incision != nullptr || options.cut_ahead)) {
-    if (problem.opaque != nullptr && problem.opaque != problem.incision)
-      throw InputError("the rule 'appended' on a body with narrow gaps of its own surface: its spheres see through "
-                       "them; take 'enriched'");
-    std::shared_ptr<const UncutBody> uncut;
-    return make_appended(std::move(problem), options, uncut);
-  }
   return std::make_unique<Galerkin>(std::move(problem), options);
 }
 
