@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Formatting, clang-tidy, shell syntax and types of the page over all tracked sources; the pages by scripts/lint_docs.py.
+# Formatting, clang-tidy, shell syntax and types of the page over all tracked sources; the pages by scripts/lint_docs.py;
+# functions that nobody calls by scripts/unused_functions.py.
 # Usage: scripts/lint.sh BUILD_FOLDER [--deep]
 # --deep runs clang's path-sensitive analyzer on every unit, which doubles the time; without it, it looks only where a
 # .clang-tidy asks for it.
@@ -34,6 +35,7 @@ printf '%s\0' "${sources[@]}" | xargs -0 -P "$jobs" -n 40 clang-format-14 --dry-
 printf 'lint: %d sources formatted, %d shell scripts parsed\n' "${#sources[@]}" "${#shells[@]}"
 
 scripts/lint_docs.py || status=1
+scripts/unused_functions.py --only-dead || status=1
 
 page=src/viewer/page
 if [ -e $page/node_modules/typescript/bin/tsc ]; then

@@ -242,21 +242,6 @@ GrowingCut::GrowingCut(Problem problem, GrowthOptions options)
 
 GrowingCut::~GrowingCut() = default;
 
-GrowthReport GrowingCut::condense_anew(topology::SurfaceMesh way) {
-  const Stopwatch watch;
-  auto fresh = std::make_unique<State>(state_->problem, state_->options);
-  fresh->options.way = std::move(way);
-  fresh->removed = state_->removed;
-  fresh->condense_all();
-  state_ = std::move(fresh);
-  GrowthReport report;
-  report.condensed_anew = true;
-  report.reason = "asked for";
-  report.window_nodes = state_->window->slots() / 3 - state_->options.room;
-  report.total_seconds = watch.seconds();
-  return report;
-}
-
 /// What an increment would change, before any cell is evaluated. Throws InputError where it names nodes that are not
 /// there.
 GrowingCut::State::Increment

@@ -70,9 +70,6 @@ class GrowingCut {
   /// this one costs what of that it changes, no more than the whole window. Throws as grow() does.
   double prepare(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision);
 
-  /// Condenses anew about another predicted way (in the background of a real-time loop, from a copy of problem()).
-  GrowthReport condense_anew(topology::SurfaceMesh way);
-
   /// The problem as it stands; removed nodes are still in its arrays.
   [[nodiscard]] const Problem& problem() const;
   /// Per node: 1 when it has been removed.

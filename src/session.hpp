@@ -203,7 +203,6 @@ class Session {
   void find_gaps();
   void watch_blade_way();
   [[nodiscard]] std::vector<std::array<Vector3, 2>> fine_segments(const topology::Incision& incision) const;
-  void make_precuts();
   [[nodiscard]] topology::SurfaceContact find_contact(const topology::ToolPose& pose) const;
   [[nodiscard]] topology::SurfaceContact centre_of(const topology::SurfaceContact& contact,
                                                    const topology::ToolPose& pose) const;

@@ -87,7 +87,6 @@ class HapticTick {
 
   /// Of a device that answers at every tick, and of a client that does not.
   [[nodiscard]] const PassivityControl& passivity() const { return passivity_; }
-  [[nodiscard]] const ClientPassivity& client_passivity() const { return client_; }
 
  private:
   enum class Origin { none, tool, grasper, blade }; // of the force
