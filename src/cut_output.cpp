@@ -9,14 +9,6 @@
 namespace spherecut::app {
 namespace {
 
-std::string csv_quoted(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  std::string out = "\"";
-  for (const char c : text)
-    out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
-
 std::vector<double> doubles(std::size_t count, const std::function<double(std::size_t)>& value) {
   std::vector<double> values(count);
   for (std::size_t i = 0; i < count; ++i)
@@ -26,34 +18,51 @@ std::vector<double> doubles(std::size_t count, const std::function<double(std::s
 
 } // namespace
 
-std::string_view cut_columns() {
-  return "time_s,triangles,refused,sheets,area_m2,front_m,pieces,unheld,volumes_m3,opening_m,opening_volume_m3,lip_"
-         "pairs,"
-         "closed_pairs,lips_converged,nodes,kept_nodes,surface_hash,topology_s,level_sets_s,visibility_s,sprinkling_s,"
-         "assembly_s,solve_s,update,update_reason,blade_force_x_N,blade_force_y_N,"
-         "blade_force_z_N,edge_force_N,advance_m,release_J_m2,work_J,surface_J,crushing_J,friction_J,excess_J,stored_J,"
-         "reason,blade_torque_x_Nm,blade_torque_y_Nm,blade_torque_z_Nm\n";
-}
-
 std::string hash_text(std::uint64_t hash) {
   return fmt::format("{:016x}", hash);
 }
 
-std::string cut_row(double time, const CutReport& r) {
-  std::string volumes;
-  for (const double volume : r.volumes)
-    volumes += fmt::format("{}{:.12g}", volumes.empty() ? "" : ";", volume);
-  return fmt::format(
-      "{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{:.9g},{:.9g},{},{},{},{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},"
-      "{:.4g},{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:."
-      "9g},{:.9g}\n",
-      time, r.triangles, r.refused ? 1 : 0, r.sheets, r.area, r.front_length, r.pieces, r.unheld, volumes, r.opening,
-      r.opening_volume, r.lip_pairs, r.closed_pairs, r.lips_converged ? 1 : 0, r.nodes, r.kept_nodes,
-      hash_text(r.surface_hash), r.seconds.topology, r.seconds.level_sets, r.seconds.visibility, r.seconds.sprinkling,
-      r.seconds.assembly, r.seconds.solve, to_string(r.update), csv_quoted(r.update_reason), r.blade.force.x(),
-      r.blade.force.y(), r.blade.force.z(), r.blade.edge_force, r.blade.advance, r.blade.release, r.blade.ledger.work,
-      r.blade.ledger.surface, r.blade.ledger.crushing, r.blade.ledger.friction, r.blade.ledger.excess,
-      r.blade.ledger.stored, csv_quoted(r.reason), r.blade.torque.x(), r.blade.torque.y(), r.blade.torque.z());
+std::span<const Column<CutRow>> cut_columns() {
+  static constexpr Column<CutRow> columns[] = {
+      {"time_s", "{:.9g}", [](const CutRow& r) -> Cell { return r.time; }},
+      {"triangles", "", [](const CutRow& r) -> Cell { return count(r.report.triangles); }},
+      {"refused", "", [](const CutRow& r) -> Cell { return r.report.refused; }},
+      {"sheets", "", [](const CutRow& r) -> Cell { return count(r.report.sheets); }},
+      {"area_m2", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.area; }},
+      {"front_m", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.front_length; }},
+      {"pieces", "", [](const CutRow& r) -> Cell { return count(r.report.pieces); }},
+      {"unheld", "", [](const CutRow& r) -> Cell { return count(r.report.unheld); }},
+      {"volumes_m3", "{:.12g}", [](const CutRow& r) -> Cell { return r.report.volumes; }},
+      {"opening_m", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.opening; }},
+      {"opening_volume_m3", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.opening_volume; }},
+      {"lip_pairs", "", [](const CutRow& r) -> Cell { return count(r.report.lip_pairs); }},
+      {"closed_pairs", "", [](const CutRow& r) -> Cell { return count(r.report.closed_pairs); }},
+      {"lips_converged", "", [](const CutRow& r) -> Cell { return r.report.lips_converged; }},
+      {"nodes", "", [](const CutRow& r) -> Cell { return count(r.report.nodes); }},
+      {"kept_nodes", "", [](const CutRow& r) -> Cell { return count(r.report.kept_nodes); }},
+      {"surface_hash", "", [](const CutRow& r) -> Cell { return hash_text(r.report.surface_hash); }},
+      {"topology_s", "{:.4g}", [](const CutRow& r) -> Cell { return r.report.seconds.topology; }},
+      {"level_sets_s", "{:.4g}", [](const CutRow& r) -> Cell { return r.report.seconds.level_sets; }},
+      {"visibility_s", "{:.4g}", [](const CutRow& r) -> Cell { return r.report.seconds.visibility; }},
+      {"sprinkling_s", "{:.4g}", [](const CutRow& r) -> Cell { return r.report.seconds.sprinkling; }},
+      {"assembly_s", "{:.4g}", [](const CutRow& r) -> Cell { return r.report.seconds.assembly; }},
+      {"solve_s", "{:.4g}", [](const CutRow& r) -> Cell { return r.report.seconds.solve; }},
+      {"update", "", [](const CutRow& r) -> Cell { return std::string(to_string(r.report.update)); }},
+      {"update_reason", "quoted", [](const CutRow& r) -> Cell { return r.report.update_reason; }},
+      {"blade_force_*_N", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.force; }},
+      {"edge_force_N", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.edge_force; }},
+      {"advance_m", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.advance; }},
+      {"release_J_m2", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.release; }},
+      {"work_J", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.ledger.work; }},
+      {"surface_J", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.ledger.surface; }},
+      {"crushing_J", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.ledger.crushing; }},
+      {"friction_J", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.ledger.friction; }},
+      {"excess_J", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.ledger.excess; }},
+      {"stored_J", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.ledger.stored; }},
+      {"reason", "quoted", [](const CutRow& r) -> Cell { return r.report.reason; }},
+      {"blade_torque_*_Nm", "{:.9g}", [](const CutRow& r) -> Cell { return r.report.blade.torque; }},
+  };
+  return columns;
 }
 
 void write_wound(const std::filesystem::path& file, const Session& session) {

@@ -1,17 +1,18 @@
 // How a cut is written: rows of cuts.csv, frames of wound and incision, figures.
 #pragma once
 
+#include "src/columns.hpp"
 #include "src/figure.hpp"
 #include "src/session.hpp"
 
-#include <string_view>
-
 namespace spherecut::app {
 
-/// First line of cuts.csv, with its end of line.
-std::string_view cut_columns();
-/// One row of it; `report` of a step at `time` s.
-std::string cut_row(double time, const CutReport& report);
+/// What a row of cuts.csv tells of: a step at `time`, s.
+struct CutRow {
+  double time;
+  const CutReport& report;
+};
+std::span<const Column<CutRow>> cut_columns();
 
 /// "0123456789abcdef"
 std::string hash_text(std::uint64_t hash);

@@ -87,8 +87,10 @@ LawSettings material_law(const Section& material, Offences& offences) {
     spec.law = ogden(material);
   else if (name == "holzapfel_gasser_ogden")
     spec.law = holzapfel(material, settings, offences);
-  else
+  else if (name == "linear")
     spec.law = solvers::LinearLaw{shear_modulus(material)};
+  else
+    throw InputError(fmt::format("material.law = \"{}\": the program has no such law", name));
   spec.bulk_modulus =
       solvers::bulk_modulus_of(solvers::small_strain_moduli(spec).shear_modulus, material.number("poisson_ratio"));
   for (const Section& term : material.tables("prony"))

@@ -14,24 +14,36 @@
 namespace spherecut::app {
 namespace {
 
-constexpr std::string_view force_columns = // followed by least_jacobian where the law is not linear
-    "time_s,tool_x_m,tool_y_m,tool_z_m,axis_x,axis_y,axis_z,force_x_N,force_y_N,force_z_N,force_N,contact_x_m,"
-    "contact_y_m,contact_z_m,depth_m,contact_radius_m,active_nodes,candidate_nodes,nodes,iterations,converged,residual,"
-    "penetration_m,rotation_deg,resprinkled,force_jump,seconds,normal_x_N,normal_y_N,normal_z_N,normal_N,"
-    "tangential_x_N,tangential_y_N,tangential_z_N,tangential_N,torque_x_Nm,torque_y_Nm,torque_z_Nm,torque_Nm";
-
-std::string force_row(const StepResult& s, bool is_nonlinear) {
-  const auto vector = [](const Vector3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z()); };
-  const Vector3 normal = s.force - s.tangential;
-  return fmt::format("{:.9g},{},{},{},{:.9g},{},{:.9g},{:.9g},{},{},{},{},{},{:.3e},{:.3e},{:.4g},{},{:.4g},{:.4g},"
-                     "{},{:.9g},{},{:.9g},{},{:.9g}{}\n",
-                     s.time, vector(s.pose.point), vector(s.pose.axis), vector(s.force), s.force.norm(),
-                     vector(s.contact.point), s.contact.depth, s.contact_radius, s.active_nodes, s.candidates, s.nodes,
-                     s.iterations, s.converged ? 1 : 0, s.residual, s.largest_penetration, s.rotation_degrees,
-                     s.resprinkled ? 1 : 0, s.force_jump, s.seconds, vector(normal), normal.norm(),
-                     vector(s.tangential), s.tangential.norm(), vector(s.torque), s.torque.norm(),
-                     is_nonlinear ? fmt::format(",{:.6g}", s.least_jacobian) : "");
-}
+using ForceColumn = Column<StepResult>;
+constexpr ForceColumn force_table[] = {
+    {"time_s", "{:.9g}", [](const StepResult& s) -> Cell { return s.time; }},
+    {"tool_*_m", "{:.9g}", [](const StepResult& s) -> Cell { return s.pose.point; }},
+    {"axis_*", "{:.9g}", [](const StepResult& s) -> Cell { return s.pose.axis; }},
+    {"force_*_N", "{:.9g}", [](const StepResult& s) -> Cell { return s.force; }},
+    {"force_N", "{:.9g}", [](const StepResult& s) -> Cell { return s.force.norm(); }},
+    {"contact_*_m", "{:.9g}", [](const StepResult& s) -> Cell { return s.contact.point; }},
+    {"depth_m", "{:.9g}", [](const StepResult& s) -> Cell { return s.contact.depth; }},
+    {"contact_radius_m", "{:.9g}", [](const StepResult& s) -> Cell { return s.contact_radius; }},
+    {"active_nodes", "", [](const StepResult& s) -> Cell { return count(s.active_nodes); }},
+    {"candidate_nodes", "", [](const StepResult& s) -> Cell { return count(s.candidates); }},
+    {"nodes", "", [](const StepResult& s) -> Cell { return count(s.nodes); }},
+    {"iterations", "", [](const StepResult& s) -> Cell { return count(s.iterations); }},
+    {"converged", "", [](const StepResult& s) -> Cell { return s.converged; }},
+    {"residual", "{:.3e}", [](const StepResult& s) -> Cell { return s.residual; }},
+    {"penetration_m", "{:.3e}", [](const StepResult& s) -> Cell { return s.largest_penetration; }},
+    {"rotation_deg", "{:.4g}", [](const StepResult& s) -> Cell { return s.rotation_degrees; }},
+    {"resprinkled", "", [](const StepResult& s) -> Cell { return s.resprinkled; }},
+    {"force_jump", "{:.4g}", [](const StepResult& s) -> Cell { return s.force_jump; }},
+    {"seconds", "{:.4g}", [](const StepResult& s) -> Cell { return s.seconds; }},
+    {"normal_*_N", "{:.9g}", [](const StepResult& s) -> Cell { return Vector3(s.force - s.tangential); }},
+    {"normal_N", "{:.9g}", [](const StepResult& s) -> Cell { return (s.force - s.tangential).norm(); }},
+    {"tangential_*_N", "{:.9g}", [](const StepResult& s) -> Cell { return s.tangential; }},
+    {"tangential_N", "{:.9g}", [](const StepResult& s) -> Cell { return s.tangential.norm(); }},
+    {"torque_*_Nm", "{:.9g}", [](const StepResult& s) -> Cell { return s.torque; }},
+    {"torque_Nm", "{:.9g}", [](const StepResult& s) -> Cell { return s.torque.norm(); }},
+    // Of a law that is not linear.
+    {"least_jacobian", "{:.6g}", [](const StepResult& s) -> Cell { return s.least_jacobian; }},
+};
 
 struct SampledField {
   std::vector<Vector3> displacement; // m
@@ -87,6 +99,11 @@ constexpr double open_account = 0.25; // of what a run's tears have spent; a fif
 
 } // namespace
 
+std::span<const Column<StepResult>> force_columns(bool is_nonlinear) {
+  const std::span<const ForceColumn> all(force_table);
+  return is_nonlinear ? all : all.first(all.size() - 1);
+}
+
 int median(std::vector<int> values) {
   if (values.empty())
     return 0;
@@ -104,12 +121,11 @@ RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : fol
     rows_[name] = 0;
   };
   if (session.scenario().tool)
-    open(forces_, "forces.csv",
-         fmt::format("{}{}\n", force_columns, is_nonlinear(session.scenario().law) ? ",least_jacobian" : ""));
+    open(forces_, "forces.csv", header_line(force_columns(is_nonlinear(session.scenario().law))));
   if (session.cuts())
-    open(cuts_, "cuts.csv", cut_columns());
+    open(cuts_, "cuts.csv", header_line(cut_columns()));
   if (session.tears())
-    open(tears_, "tears.csv", tear_columns());
+    open(tears_, "tears.csv", header_line(tear_columns()));
 }
 
 void RunOutput::add_row(OutputFile& file, const std::string& name, const std::string& row) {
@@ -119,9 +135,9 @@ void RunOutput::add_row(OutputFile& file, const std::string& name, const std::st
 
 void RunOutput::add(const Session& session, const StepResult& step) {
   if (forces_)
-    add_row(*forces_, "forces.csv", force_row(step, is_nonlinear(session.scenario().law)));
+    add_row(*forces_, "forces.csv", csv_line(force_columns(is_nonlinear(session.scenario().law)), step));
   if (step.cut) {
-    add_row(*cuts_, "cuts.csv", cut_row(step.time, *step.cut));
+    add_row(*cuts_, "cuts.csv", csv_line(cut_columns(), CutRow{step.time, *step.cut}));
     const int before = findings_.steps == 0 ? 1 : findings_.cut.pieces;
     if (step.cut->pieces != before)
       check_pieces(session, step.time);
@@ -132,7 +148,7 @@ void RunOutput::add(const Session& session, const StepResult& step) {
     findings_.refused_cuts += step.cut->refused ? 1 : 0;
   }
   if (step.tear) {
-    add_row(*tears_, "tears.csv", tear_rows(*step.tear));
+    add_row(*tears_, "tears.csv", tear_lines(*step.tear));
     findings_.tear = *step.tear;
     findings_.tear_increments += static_cast<int>(step.tear->increments.size()) - 1;
     for (const TearIncrement& increment : step.tear->increments)

@@ -58,6 +58,9 @@ struct RunFindings {
   std::vector<PieceCheck> piece_checks;
 };
 
+/// The columns of forces.csv; those of a law that is not linear have one more.
+std::span<const Column<StepResult>> force_columns(bool is_nonlinear);
+
 /// Middle of the values, the upper one of two; 0 of none.
 int median(std::vector<int> values);
 

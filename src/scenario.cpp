@@ -107,6 +107,8 @@ topology::ToolShape tool_shape(const Section& section, Offences& offences) {
     return topology::SphereTip{section.number("radius")};
   if (shape == "flat_punch")
     return topology::FlatPunch{section.number("radius"), section.number("length")};
+  if (shape != "laparoscope")
+    throw InputError(fmt::format("tool.shape = \"{}\": the program has no such tool", shape));
   const topology::Laparoscope tool{section.number("tip_radius"), section.number("shaft_radius"),
                                    section.number("shaft_length"), section.vector("port")};
   if (tool.shaft_radius > tool.tip_radius)
@@ -214,7 +216,11 @@ HeldDevice held_device(const std::string& name) {
     return HeldDevice::recording;
   if (name == "haply")
     return HeldDevice::haply;
-  return name == "bridge" ? HeldDevice::bridge : HeldDevice::hand;
+  if (name == "bridge")
+    return HeldDevice::bridge;
+  if (name == "hand")
+    return HeldDevice::hand;
+  throw InputError(fmt::format("haptics.device = \"{}\": the program has no such device", name));
 }
 
 HaplySettings haply(const Section& section, Offences& offences) {

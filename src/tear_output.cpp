@@ -4,39 +4,58 @@
 
 namespace spherecut::app {
 
-std::string_view tear_columns() {
-  return "time_s,increment,front_x_m,front_y_m,front_z_m,most_x_m,most_y_m,most_z_m,K_I_Pa_m05,K_II_Pa_m05,K_III_Pa_"
-         "m05,G_J_m2,toughness_J_m2,advance_m,triangles,area_m2,front_m,tool_J,loads_J,elastic_J,surface_J,dissipation_"
-         "J,imbalance_J,force_N,nodes,kept_nodes,intensities_s,topology_s,level_sets_s,visibility_s,sprinkling_s,"
-         "assembly_s,solve_s,update,update_reason,unstable,severed,reason\n";
+std::span<const Column<TearRow>> tear_columns() {
+  static constexpr Column<TearRow> columns[] = {
+      {"time_s", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.time; }},
+      {"increment", "", [](const TearRow& r) -> Cell { return count(r.increment.number); }},
+      {"front_*_m", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.front; }},
+      {"most_*_m", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.most; }},
+      {"K_I_Pa_m05", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.intensities[0]; }},
+      {"K_II_Pa_m05", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.intensities[1]; }},
+      {"K_III_Pa_m05", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.intensities[2]; }},
+      {"G_J_m2", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.release; }},
+      {"toughness_J_m2", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.toughness; }},
+      {"advance_m", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.advance; }},
+      {"triangles", "", [](const TearRow& r) -> Cell { return count(r.increment.triangles); }},
+      {"area_m2", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.area; }},
+      {"front_m", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.front_length; }},
+      {"tool_J", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.ledger.tool; }},
+      {"loads_J", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.ledger.loads; }},
+      {"elastic_J", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.ledger.elastic; }},
+      {"surface_J", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.ledger.surface; }},
+      {"dissipation_J", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.ledger.dissipation; }},
+      {"imbalance_J", "{:.3g}", [](const TearRow& r) -> Cell { return r.increment.ledger.imbalance(); }},
+      {"force_N", "{:.9g}", [](const TearRow& r) -> Cell { return r.increment.force; }},
+      {"nodes", "", [](const TearRow& r) -> Cell { return count(r.increment.body.nodes); }},
+      {"kept_nodes", "", [](const TearRow& r) -> Cell { return count(r.increment.body.kept_nodes); }},
+      {"intensities_s", "{:.4g}", [](const TearRow& r) -> Cell { return r.increment.intensity_seconds; }},
+      {"topology_s", "{:.4g}", [](const TearRow& r) -> Cell { return r.increment.body.seconds.topology; }},
+      {"level_sets_s", "{:.4g}", [](const TearRow& r) -> Cell { return r.increment.body.seconds.level_sets; }},
+      {"visibility_s", "{:.4g}", [](const TearRow& r) -> Cell { return r.increment.body.seconds.visibility; }},
+      {"sprinkling_s", "{:.4g}", [](const TearRow& r) -> Cell { return r.increment.body.seconds.sprinkling; }},
+      {"assembly_s", "{:.4g}", [](const TearRow& r) -> Cell { return r.increment.body.seconds.assembly; }},
+      {"solve_s", "{:.4g}", [](const TearRow& r) -> Cell { return r.increment.body.seconds.solve; }},
+      {"update", "", [](const TearRow& r) -> Cell { return std::string(to_string(r.increment.body.update)); }},
+      {"update_reason", "quoted", [](const TearRow& r) -> Cell { return r.increment.body.update_reason; }},
+      {"unstable", "", [](const TearRow& r) -> Cell { return r.last && r.report.unstable; }},
+      {"severed", "", [](const TearRow& r) -> Cell { return r.last && r.report.severed; }},
+      {"reason", "quoted", [](const TearRow& r) -> Cell { return r.last ? r.report.reason : std::string(); }},
+  };
+  return columns;
 }
 
-std::string tear_rows(const TearReport& report) {
-  std::string rows;
-  for (std::size_t k = 0; k < report.increments.size(); ++k) {
-    const TearIncrement& r = report.increments[k];
-    const bool last = k + 1 == report.increments.size();
-    const auto quoted = [](std::string text) {
-      for (char& c : text)
-        if (c == '"' || c == '\n')
-          c = ' ';
-      return '"' + text + '"';
-    };
-    const BodyUpdate& body = r.body;
-    const RebuildSeconds& seconds = body.seconds;
-    const auto vector = [](const Vector3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v.x(), v.y(), v.z()); };
-    const EnergyLedger& e = r.ledger;
-    rows +=
-        fmt::format("{:.9g},{},{},{},{},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},"
-                    "{:.3g},{:.9g},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{},{},{},{},{}\n",
-                    r.time, r.number, vector(r.front), vector(r.most), vector(r.intensities), r.release, r.toughness,
-                    r.advance, r.triangles, r.area, r.front_length, e.tool, e.loads, e.elastic, e.surface,
-                    e.dissipation, e.imbalance(), r.force, body.nodes, body.kept_nodes, r.intensity_seconds,
-                    seconds.topology, seconds.level_sets, seconds.visibility, seconds.sprinkling, seconds.assembly,
-                    seconds.solve, to_string(body.update), quoted(body.update_reason), last && report.unstable ? 1 : 0,
-                    last && report.severed ? 1 : 0, quoted(last ? report.reason : ""));
-  }
+std::vector<TearRow> tear_rows(const TearReport& report) {
+  std::vector<TearRow> rows;
+  for (const TearIncrement& increment : report.increments)
+    rows.push_back({report, increment, &increment == &report.increments.back()});
   return rows;
+}
+
+std::string tear_lines(const TearReport& report) {
+  std::string lines;
+  for (const TearRow& row : tear_rows(report))
+    lines += csv_line(tear_columns(), row);
+  return lines;
 }
 
 std::vector<std::pair<std::string, Figure>> tear_figures(const std::vector<double>& times,

@@ -1,17 +1,22 @@
 // How a tear is written: rows of tears.csv, figures.
 #pragma once
 
+#include "src/columns.hpp"
 #include "src/figure.hpp"
 #include "src/tear_report.hpp"
 
-#include <string_view>
-
 namespace spherecut::app {
 
-/// First line of tears.csv, with its end of line.
-std::string_view tear_columns();
-/// Rows of it, one an increment; `report` of a step at `time` s.
-std::string tear_rows(const TearReport& report);
+/// What a row of tears.csv tells of: an increment of a step. The last one also has what the step ended with.
+struct TearRow {
+  const TearReport& report;
+  const TearIncrement& increment;
+  bool last;
+};
+std::span<const Column<TearRow>> tear_columns();
+std::vector<TearRow> tear_rows(const TearReport& report);
+/// As lines of tears.csv.
+std::string tear_lines(const TearReport& report);
 
 /// Energies and torn area over time; `times` and `reports` one a step.
 std::vector<std::pair<std::string, Figure>> tear_figures(const std::vector<double>& times,

@@ -1,6 +1,7 @@
 #include "topology/tool.hpp"
 
 #include "topology/errors.hpp"
+#include "topology/overloaded.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +10,6 @@
 
 namespace spherecut::topology {
 namespace {
-
-template <class... Visitors>
-struct Overloaded : Visitors... {
-  using Visitors::operator()...;
-};
-template <class... Visitors>
-Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
 /// Some unit vector perpendicular to the axis, always the same one for the same axis.
 Vector3 perpendicular(const Vector3& axis) {

@@ -33,7 +33,7 @@ app::StepResult lift(const app::Scenario& scenario, const ExperimentContext& con
   std::vector<double> times;
   std::vector<app::TearReport> reports;
   app::StepResult last;
-  std::string increments(app::tear_columns());
+  std::string increments = app::header_line(app::tear_columns());
   for (const app::StepSample& sample : session.steps()) {
     last = session.step(sample);
     const app::EnergyLedger& e = last.tear->ledger;
@@ -46,7 +46,7 @@ app::StepResult lift(const app::Scenario& scenario, const ExperimentContext& con
     pull.y.push_back(last.force.norm());
     times.push_back(last.time);
     reports.push_back(*last.tear);
-    increments += app::tear_rows(*last.tear);
+    increments += app::tear_lines(*last.tear);
     context.say(fmt::format("t = {:.2f} s: {:.3g} N, {:.3g} cm2 torn in {} increments: {}", last.time,
                             last.force.norm(), 1e4 * last.tear->area, last.tear->increments.size() - 1,
                             last.tear->reason));

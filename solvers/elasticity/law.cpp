@@ -96,22 +96,33 @@ class ModelLaw final : public Law {
   std::size_t index_; // in LawSpec::law
 };
 
+/// Calls `visit` with the type of the model that the law has.
+template <class Visit, class... Model>
+void with_model(const LawSpec& spec, const Visit& visit, ModelList<Model...> /*models*/) {
+  static_assert(sizeof...(Model) == std::variant_size_v<decltype(LawSpec::law)>, "a law without a model");
+  std::size_t index = 0;
+  const auto visit_one = [&]<class One>() {
+    if (index++ == spec.law.index())
+      visit.template operator()<One>();
+  };
+  (visit_one.template operator()<Model>(), ...);
+}
+
 } // namespace
+
+const char* law_name(const LawSpec& spec) {
+  const char* name = "";
+  with_model(
+      spec, [&]<class Model>() { name = Model::name; }, Models{});
+  return name;
+}
 
 std::unique_ptr<Law> make_law_unchecked(const LawSpec& spec) {
   const LawConstants constants = law_constants(spec);
-  switch (spec.law.index()) {
-  case 0:
-    return std::make_unique<ModelLaw<LinearModel>>(spec, constants);
-  case 1:
-    return std::make_unique<ModelLaw<NeoHookeanModel>>(spec, constants);
-  case 2:
-    return std::make_unique<ModelLaw<YeohModel>>(spec, constants);
-  case 3:
-    return std::make_unique<ModelLaw<OgdenModel>>(spec, constants);
-  default:
-    return std::make_unique<ModelLaw<HolzapfelModel>>(spec, constants);
-  }
+  std::unique_ptr<Law> law;
+  with_model(
+      spec, [&]<class Model>() { law = std::make_unique<ModelLaw<Model>>(spec, constants); }, Models{});
+  return law;
 }
 
 std::unique_ptr<Law> make_law(const LawSpec& spec) {

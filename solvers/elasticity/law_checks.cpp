@@ -293,11 +293,6 @@ FibreFrame law_fibres(const LawSpec& spec) {
   return frame;
 }
 
-const char* law_name(const LawSpec& spec) {
-  static constexpr const char* names[] = {"linear", "neo_hookean", "yeoh", "ogden", "holzapfel_gasser_ogden"};
-  return names[spec.law.index()];
-}
-
 void check_prony_terms(std::span<const PronyTerm> terms) {
   if (terms.size() > most_terms)
     throw InputError(fmt::format("Prony series: it has {} terms; up to {} are possible", terms.size(), most_terms));

@@ -75,9 +75,11 @@ void evaluate_model(const Batch& batch) {
   }
 }
 
+template <class... Model>
+constexpr Kernel kernel_of_models(const char* name, ModelList<Model...> /*models*/) {
+  static_assert(sizeof...(Model) == sizeof(Kernel::evaluate) / sizeof(Evaluate), "a law without a kernel");
+  return {name, width, {evaluate_model<Model>...}};
+}
 constexpr Kernel kernel_of(const char* name) {
-  return {name,
-          width,
-          {evaluate_model<LinearModel>, evaluate_model<NeoHookeanModel>, evaluate_model<YeohModel>,
-           evaluate_model<OgdenModel>, evaluate_model<HolzapfelModel>}};
+  return kernel_of_models(name, Models{});
 }

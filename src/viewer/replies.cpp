@@ -1,6 +1,7 @@
 #include "src/viewer/replies.hpp"
 
 #include "src/version.hpp"
+#include "topology/overloaded.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -33,17 +34,21 @@ Json array_of(const Vector3& x) {
 Json tool_of(const Scenario& scenario) {
   if (!scenario.tool)
     return nullptr;
-  const topology::ToolShape& shape = scenario.tool->shape;
-  if (const auto* ball = std::get_if<topology::SphereTip>(&shape))
-    return {{"shape", "sphere"}, {"radius", ball->radius}};
-  if (const auto* punch = std::get_if<topology::FlatPunch>(&shape))
-    return {{"shape", "punch"}, {"radius", punch->radius}, {"length", punch->length}};
-  const auto& instrument = std::get<topology::Laparoscope>(shape);
-  return {{"shape", "laparoscope"},
-          {"radius", instrument.tip_radius},
-          {"shaft_radius", instrument.shaft_radius},
-          {"shaft_length", instrument.shaft_length},
-          {"port", array_of(instrument.port)}};
+  return std::visit(
+      topology::Overloaded{[](const topology::SphereTip& ball) -> Json {
+                             return {{"shape", "sphere"}, {"radius", ball.radius}};
+                           },
+                           [](const topology::FlatPunch& punch) -> Json {
+                             return {{"shape", "punch"}, {"radius", punch.radius}, {"length", punch.length}};
+                           },
+                           [](const topology::Laparoscope& instrument) -> Json {
+                             return {{"shape", "laparoscope"},
+                                     {"radius", instrument.tip_radius},
+                                     {"shaft_radius", instrument.shaft_radius},
+                                     {"shaft_length", instrument.shaft_length},
+                                     {"port", array_of(instrument.port)}};
+                           }},
+      scenario.tool->shape);
 }
 
 Json blade_of(const Scenario& scenario) {
