@@ -20,7 +20,7 @@ constexpr double station_crowding = 0.6; // between new pairs of rings and rims
 constexpr double grown_crowding = 0.75;  // of such pairs against those placed before the cut grew
 constexpr double single_crowding = 0.7;  // of the ring ahead
 constexpr double taken_crowding = 0.4;   // of pairs against seeds
-constexpr double facing = 0.5;           // of lip nodes of different sheets that see each other
+constexpr double lips_facing = 0.5;      // of lip nodes of different sheets that see each other
 constexpr double step_crowding = 0.87;   // as between other nodes: see node_filler.cpp
 constexpr double strip_crowding = 0.88;
 constexpr double step_length = 0.93;
@@ -117,7 +117,7 @@ class Chooser {
   [[nodiscard]] bool faces_another(const Vector3& x, double h, int sheet) const {
     bool found = false;
     if (incision_.sheets().size() > 1)
-      lips_.for_each_within(x, h, facing * h, [&](int j, double) {
+      lips_.for_each_within(x, h, lips_facing * h, [&](int j, double) {
         found |= lip_places_[j].second != sheet && !incision_.blocks(x, lip_places_[j].first);
       });
     return found;

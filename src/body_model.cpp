@@ -26,7 +26,6 @@ constexpr double long_advance = 0.2, largest_share_of_long = 0.2;
 constexpr int largest_followed_balance = 1200;
 constexpr double crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a fixed region is kept
 constexpr double crowded_by_seed = 0.7;  // likewise, to a node that must be where it is
-constexpr double near_banks = 0.25;      // spacings: banks that come so near to each other are looked at together
 constexpr int most_bank_rounds = 6;      // in which banks that have come to each other are held apart
 constexpr double rim = 1e-2; // of its spacing: a lip node so near to the surface stands on the rim of its wound
 

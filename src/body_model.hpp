@@ -21,6 +21,9 @@ class UncutBody;
 
 namespace spherecut::app {
 
+/// Spacings: banks of the surface that come so near to each other are looked at together.
+inline constexpr double near_banks = 0.25;
+
 /// Whether a cut of this scenario's body only appends unknowns (cut.sight = "appended").
 bool cut_appends(const Scenario& scenario);
 

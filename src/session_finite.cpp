@@ -11,7 +11,6 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double near_banks = 0.25;         // spacings: banks so near to each other are looked at
 constexpr double most_between_shares = 0.1; // of the fine spacing: what may lie in the tool between middles of shares
 
 } // namespace

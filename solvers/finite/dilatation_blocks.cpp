@@ -9,7 +9,7 @@ namespace spherecut::solvers {
 
 namespace {
 
-struct Block {
+struct MeanBlock {
   Vector3 eye = Vector3::Zero(); // a point of it
   Vector3 moment = Vector3::Zero();
   double volume = 0, full = 0; // m3: of its points, and of its boxes
@@ -38,7 +38,7 @@ DilatationBlocks dilatation_blocks(const topology::Domain& domain, const Backgro
                                    const PointTable& points, const topology::Incision* incision, double least_part) {
   const BoundingBox bounds = domain.bounds();
   const auto hides = [&](const Vector3& a, const Vector3& b) { return incision != nullptr && incision->blocks(a, b); };
-  std::vector<Block> blocks;
+  std::vector<MeanBlock> blocks;
   std::map<std::array<int, 6>, std::vector<int>> parts; // of every place: the blocks there
   std::vector<int> block_of_cell(cells.start.size() - 1, -1);
   for (const BackgroundBox& box : cells.boxes) {
@@ -50,7 +50,7 @@ DilatationBlocks dilatation_blocks(const topology::Domain& domain, const Backgro
         found = here.insert(here.end(), static_cast<int>(blocks.size()));
         blocks.push_back({.eye = eye});
       }
-      Block& block = blocks[*found];
+      MeanBlock& block = blocks[*found];
       block_of_cell[cell] = *found;
       block.full += 8 * box.half.prod() / (box.last_cell - box.first_cell);
       block.size = std::max(block.size, 2 * box.half.maxCoeff());

@@ -13,7 +13,7 @@ namespace {
 constexpr double least_predicted_jacobian = 0.05; // predictions are shortened while they squeeze more
 constexpr int most_trials = 12;                   // of one line search
 constexpr double wanted_decrease = 1e-4;          // of what the slope promises
-constexpr double rounding = 1e-13;                // of an energy
+constexpr double energy_rounding = 1e-13;         // of an energy
 constexpr double most_extrapolated = 4;           // last steps that are gone once more
 constexpr int most_contact_rounds = 20;           // updates of the forces of contact in a step
 constexpr int most_newton_iterations = 30;        // of one round
@@ -376,7 +376,7 @@ bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, 
         continue;
       }
       const double rise = next.energy - now.energy;
-      accepted = rise <= wanted_decrease * length * slope + rounding * std::abs(now.energy) ||
+      accepted = rise <= wanted_decrease * length * slope + energy_rounding * std::abs(now.energy) ||
                  next.residual.norm() < 0.9 * norm;
       if (!accepted) {
         const double curvature = rise - length * slope;

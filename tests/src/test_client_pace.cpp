@@ -40,13 +40,13 @@ std::vector<PathPose> strokes(double seconds) {
   return path;
 }
 
-struct Outcome {
+struct ClientOutcome {
   double lowest = 0, peak = 0, late_peak = 0; // J; N, in all and in the last second
   double step = 0, exact_step = 0;            // N, from tick to tick: of the force, of the wall under the true hand
   double measured = 0;
 };
 
-Outcome press_as_client(const SlowClientSettings& client, double stiffness, bool controlled, double seconds = 8) {
+ClientOutcome press_as_client(const SlowClientSettings& client, double stiffness, bool controlled, double seconds = 8) {
   HapticSettings settings;
   settings.passivity = controlled;
   settings.limits.slew = 1e5;
@@ -61,7 +61,7 @@ Outcome press_as_client(const SlowClientSettings& client, double stiffness, bool
   light.damping = 5;
   light.resolution = settings.limits.resolution;
   SlowClient device(strokes(seconds), light, client, settings.rate);
-  Outcome outcome;
+  ClientOutcome outcome;
   double before = 0, exact_before = 0;
   const auto ticks = static_cast<std::uint64_t>(seconds * settings.rate);
   for (std::uint64_t tick = 0; tick < ticks; ++tick) {
@@ -89,7 +89,7 @@ TEST_CASE("A client of any rate, with jitter, loss and reordering, gets no energ
         SlowClientSettings client;
         client.rate = rate;
         client.seed = seed;
-        const Outcome outcome = press_as_client(client, stiffness, true);
+        const ClientOutcome outcome = press_as_client(client, stiffness, true);
         INFO(rate << " poses a second, " << stiffness << " N/m, seed " << seed << ": lowest " << 1e3 * outcome.lowest
                   << " mJ, steps " << 1e3 * outcome.step << " mN, exact " << 1e3 * outcome.exact_step << " mN, peak "
                   << outcome.peak << " N, in the last second " << outcome.late_peak << " N");
@@ -113,7 +113,7 @@ TEST_CASE("Below 50 poses a second the force fades, and the reason is told") {
   SlowClientSettings client;
   client.rate = 40;
   client.jitter = 0;
-  const Outcome outcome = press_as_client(client, 500, true, 4);
+  const ClientOutcome outcome = press_as_client(client, 500, true, 4);
   CHECK(outcome.late_peak == 0);
   CHECK(outcome.measured == Approx(40).epsilon(0.05));
   CHECK_THAT(pace_text({PaceKind::too_slow, 40}),

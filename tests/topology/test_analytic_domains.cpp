@@ -17,12 +17,12 @@ using spherecut::tests::random_point;
 
 namespace {
 
-struct Case {
+struct DomainCase {
   std::string name;
   std::shared_ptr<const Domain> domain;
 };
 
-std::vector<Case> cases() {
+std::vector<DomainCase> domain_cases() {
   Matrix3 axes;
   axes << 2.0 / 3, -2.0 / 3, 1.0 / 3, 2.0 / 3, 1.0 / 3, -2.0 / 3, 1.0 / 3, 2.0 / 3, 2.0 / 3;
   return {{"box", make_box_domain(Vector3(-0.03, 0.01, -0.02), Vector3(0.05, 0.06, 0.04), 0.004)},
@@ -34,7 +34,7 @@ std::vector<Case> cases() {
 } // namespace
 
 TEST_CASE("Analytic domains agree in distance and sign with their own fine tessellation", "[domain]") {
-  for (const auto& [name, domain] : cases()) {
+  for (const auto& [name, domain] : domain_cases()) {
     INFO(name);
     std::mt19937 random(7);
     for (int i = 0; i < 60; ++i) {
@@ -50,7 +50,7 @@ TEST_CASE("Analytic domains agree in distance and sign with their own fine tesse
 }
 
 TEST_CASE("Analytic domains: closest point, distance, normal and gradient are one consistent field", "[domain]") {
-  for (const auto& [name, domain] : cases()) {
+  for (const auto& [name, domain] : domain_cases()) {
     INFO(name);
     std::mt19937 random(11);
     for (int i = 0; i < 500; ++i) {
@@ -80,7 +80,7 @@ TEST_CASE("Analytic domains: closest point, distance, normal and gradient are on
 }
 
 TEST_CASE("Analytic domains are the intersection of their planes and curved part", "[domain]") {
-  for (const auto& [name, domain] : cases()) {
+  for (const auto& [name, domain] : domain_cases()) {
     INFO(name);
     std::mt19937 random(13);
     for (int i = 0; i < 500; ++i) {
@@ -105,13 +105,13 @@ TEST_CASE("Analytic domains are the intersection of their planes and curved part
       }
     }
   }
-  CHECK(cases()[0].domain->planes().size() == 6);
-  CHECK(cases()[1].domain->planes().size() == 1);
-  CHECK(cases()[2].domain->planes().size() == 2);
+  CHECK(domain_cases()[0].domain->planes().size() == 6);
+  CHECK(domain_cases()[1].domain->planes().size() == 1);
+  CHECK(domain_cases()[2].domain->planes().size() == 2);
 }
 
 TEST_CASE("Analytic domains carry a closed tessellation whose vertices lie on the surface", "[domain]") {
-  for (const auto& [name, domain] : cases()) {
+  for (const auto& [name, domain] : domain_cases()) {
     INFO(name);
     tests::require_closed_sphere(domain->surface());
     for (const Vector3& v : domain->surface().vertices)
@@ -121,7 +121,7 @@ TEST_CASE("Analytic domains carry a closed tessellation whose vertices lie on th
 }
 
 TEST_CASE("Analytic domains give finite normals at centres, corners, rims and on the surface", "[domain]") {
-  for (const auto& [name, domain] : cases()) {
+  for (const auto& [name, domain] : domain_cases()) {
     INFO(name);
     std::vector<Vector3> awkward = domain->surface().vertices;
     awkward.push_back(Vector3::Zero());

@@ -10,19 +10,19 @@ using namespace spherecut::topology;
 
 namespace {
 
-using Random = std::mt19937_64;
+using BoxRandom = std::mt19937_64;
 using Corners = std::array<Vector3, 3>;
 
-double uniform(Random& random, double from, double to) {
+double uniform(BoxRandom& random, double from, double to) {
   return std::uniform_real_distribution<double>(from, to)(random);
 }
 
-Vector3 within_one(Random& random) {
+Vector3 within_one(BoxRandom& random) {
   return Vector3::NullaryExpr([&] { return uniform(random, -1, 1); });
 }
 
 /// Strips `width` wide across a bent sheet of about one by one, turned anyhow and somewhere.
-std::vector<Corners> strips(Random& random, double width, int count) {
+std::vector<Corners> strips(BoxRandom& random, double width, int count) {
   const Eigen::Quaterniond turn = Eigen::Quaterniond::UnitRandom();
   const Vector3 place = 2 * within_one(random);
   const auto at = [&](int i, double t) -> Vector3 {
@@ -37,7 +37,7 @@ std::vector<Corners> strips(Random& random, double width, int count) {
 }
 
 /// A point of a triangle, often of its border.
-Vector3 point_of(const Corners& p, Random& random) {
+Vector3 point_of(const Corners& p, BoxRandom& random) {
   double u = uniform(random, 0, 1), v = uniform(random, 0, 1 - u);
   if (random() % 3 == 0)
     u = 0;
@@ -57,7 +57,7 @@ bool visits_between(const BoxTree& tree, int wanted, const Vector3& centre, cons
 } // namespace
 
 TEST_CASE("A segment visits every triangle that it comes to, however narrow and however it ends there", "[box_tree]") {
-  Random random(5);
+  BoxRandom random(5);
   for (int scene = 0; scene < 40; ++scene) {
     const double width = std::pow(10, uniform(random, -5, -1));
     const std::vector<Corners> triangles = strips(random, width, 100);
@@ -77,7 +77,7 @@ TEST_CASE("A segment visits every triangle that it comes to, however narrow and 
 }
 
 TEST_CASE("Triangles within the margin of a segment are visited, and few of those farther off", "[box_tree]") {
-  Random random(6);
+  BoxRandom random(6);
   int far_visits = 0, far = 0;
   for (int scene = 0; scene < 20; ++scene) {
     constexpr double margin = 1e-3;
