@@ -22,8 +22,8 @@ using topology::FrontFrame;
 namespace {
 
 constexpr int plain_size = 4, enriched_size = 8;
-constexpr int enriched_spare = 2;        // nodes beyond the basis functions that an enriched support must have
-constexpr double sheet_clearance = 1e-6; // in units of the smallest radius: nearer to the sheet a point lies on it
+constexpr int enriched_spare = 2;     // nodes beyond the basis functions that an enriched support must have
+constexpr double on_the_sheet = 1e-6; // in units of the smallest radius: nearer to the sheet a point lies on it
 // Least product of the three principal spreads of a support (squares of lengths) over that of a ball. On the rim of a
 // wound in a thin wedge of tissue a point may see lip nodes of one plane alone and, around the front, their partners
 // 2e-4 spacings below. That tells nothing across the plane, but scaled to a unit diagonal the moment matrix does not
@@ -199,7 +199,7 @@ bool CutSight::enriches(const Vector3& x) const {
 }
 
 Vector3 CutSight::off_the_sheet(const Vector3& x) const {
-  const double clearance = sheet_clearance * smallest_radius_;
+  const double clearance = on_the_sheet * smallest_radius_;
   if (sight_.incision->near(x, 0.1 * clearance))
     if (const auto face = sight_.incision->closest(x, 0.1 * clearance))
       return face->point + clearance * face->normal;
@@ -219,7 +219,7 @@ void CutSight::look(std::span<const QuadraturePoint> points, std::span<const int
   view.hidden.assign(nodes.size(), 0);
   view.points.assign(points.size(), {});
   view.altered = view.on_sheet = 0;
-  if (const double off = 0.1 * sheet_clearance * smallest_radius_; incision.near(centre, half.norm() + off))
+  if (const double off = 0.1 * on_the_sheet * smallest_radius_; incision.near(centre, half.norm() + off))
     for (std::size_t q = 0; q < points.size(); ++q)
       if (off_the_sheet(points[q].position) != points[q].position)
         view.on_sheet |= std::uint32_t{1} << q;
