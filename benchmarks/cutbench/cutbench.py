@@ -72,6 +72,14 @@ def vector(formulas, case, point):
     return [evaluate(formula, names) for formula in formulas]
 
 
+def moduli_of(case):
+    """Young's modulus, Pa, and Poisson's ratio of the law."""
+    law, names = case["law"], names_of(case)
+    if law["name"] != "linear":
+        raise BadInput(f"case '{case['name']}': law.name: '{law['name']}'; allowed: linear")
+    return evaluate(law["young_modulus"], names), evaluate(law["poisson_ratio"], names)
+
+
 def relieved_stress(case, point):
     """3 x 3, Pa: what the cut takes away there; a face with the normal n out of the tissue bears the traction -stress n."""
     stress = [[0.0] * 3 for _ in range(3)]

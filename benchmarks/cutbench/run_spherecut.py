@@ -11,8 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from cutbench import BadInput, chosen_cases, error_of, relieved_stress, run_main, vector, write_result
-from cutbench import CASES
+from cutbench import CASES, BadInput, chosen_cases, error_of, moduli_of, relieved_stress, run_main, vector, write_result
 
 import spherecut as sc
 
@@ -124,7 +123,7 @@ def compute(case, seed, coarser):
     lips = {}
     if "relieves" in case:
         lips["lip_traction"] = lambda x, normal: -np.array(relieved_stress(case, x)) @ normal
-    material = sc.Material(case["parameters"]["E"], case["parameters"]["nu"])
+    material = sc.Material(*moduli_of(case))
     cut_body = sc.Body(domain, nodes, material, held_of(case, fine), traction=traction_of(case), incision=incision, **lips)
     field = cut_body.solve()
     values = {}

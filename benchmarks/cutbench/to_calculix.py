@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from cutbench import BadInput, case_names, chosen_cases, error_of, read_case, run_main, write_result
+from cutbench import BadInput, case_names, chosen_cases, error_of, moduli_of, read_case, run_main, write_result
 from grid import case_forces, face_shapes, given_displacements, make_grid
 
 ELEMENT = "C3D20"
@@ -48,8 +48,8 @@ def input_text(case, grid):
         if quantity["kind"] in ("reaction", "tool_force"):
             members = grid.face_nodes["tool" if quantity["kind"] == "tool_force" else quantity["where"]]
             lines += [f"*NSET, NSET={quantity['name'].upper()}", *lists(members)]
-    law = case["parameters"]
-    lines += ["*MATERIAL, NAME=TISSUE", "*ELASTIC", f"{law['E']:.12g}, {law['nu']:.12g}", "*SOLID SECTION, ELSET=TISSUE, MATERIAL=TISSUE", "*STEP", "*STATIC"]
+    modulus, ratio = moduli_of(case)
+    lines += ["*MATERIAL, NAME=TISSUE", "*ELASTIC", f"{modulus:.12g}, {ratio:.12g}", "*SOLID SECTION, ELSET=TISSUE, MATERIAL=TISSUE", "*STEP", "*STATIC"]
     lines.append("*BOUNDARY")
     lines += [f"{node + 1}, {axis + 1}, {axis + 1}, {value:.12g}" for (node, axis), value in sorted(given.items())]
     loaded = [(k, axis) for k, axis in zip(*np.nonzero(forces))]
@@ -126,11 +126,11 @@ def ahead_at(cut, point):
 
 def intensities(case, opening, point):
     """By displacement correlation: K of the jump at seven distances behind the front, carried on to the front by a line."""
-    cut, law = case["cut"], case["parameters"]
+    cut, (modulus, ratio) = case["cut"], moduli_of(case)
     size = min(cut.get("half_axes") or [cut.get("radius") or 0.5 * cut["lengths"][0]])
     ahead, normal = ahead_at(cut, point), np.array(cut["normal"], float)
     frame = np.array([normal, ahead, np.cross(normal, ahead)])
-    factors = np.array([law["E"] / (8 * (1 - law["nu"] ** 2))] * 2 + [law["E"] / (8 * (1 + law["nu"]))])
+    factors = np.array([modulus / (8 * (1 - ratio**2))] * 2 + [modulus / (8 * (1 + ratio))])
     distances = size * np.linspace(0.1, 0.4, 7)
     found = [factors * np.sqrt(2 * np.pi / r) * (frame @ opening(np.array(point) - r * ahead)) for r in distances]
     return np.polyfit(distances, np.array(found), 1)[1]

@@ -12,7 +12,7 @@ import xml.etree.ElementTree as xml
 from pathlib import Path
 
 import numpy as np
-from cutbench import BadInput, case_names, chosen_cases, read_case, run_main
+from cutbench import BadInput, case_names, chosen_cases, moduli_of, read_case, run_main
 from grid import case_forces, given_displacements, make_grid
 from to_calculix import can_hold
 
@@ -27,6 +27,7 @@ def numbers(values):
 def scene(case, grid):
     """Supports fix nodes where they stand: those that are moved stand there from the start, their places at rest aside."""
     given, forces = given_displacements(case, grid), case_forces(case, grid, 1)
+    modulus, ratio = moduli_of(case)
     start = grid.nodes.copy()
     held = {}
     for (node, axis), value in given.items():
@@ -41,8 +42,7 @@ def scene(case, grid):
     xml.SubElement(body, "SparseLDLSolver", template="CompressedRowSparseMatrixMat3x3d")
     xml.SubElement(body, "MeshTopology", name="mesh", position=numbers(grid.nodes), hexahedra=numbers(grid.elements))
     xml.SubElement(body, "MechanicalObject", name="state", template="Vec3d", position=numbers(start), rest_position=numbers(grid.nodes))
-    xml.SubElement(body, "HexahedronFEMForceField", method="small", youngModulus=f"{case['parameters']['E']:.12g}",
-                   poissonRatio=f"{case['parameters']['nu']:.12g}")
+    xml.SubElement(body, "HexahedronFEMForceField", method="small", youngModulus=f"{modulus:.12g}", poissonRatio=f"{ratio:.12g}")
     for axes in sorted({tuple(axes) for axes in held.values()}):
         members = [node for node in sorted(held) if tuple(held[node]) == axes]
         if axes == (1, 1, 1):

@@ -23,8 +23,9 @@ import grid  # noqa: E402
 ROUND = ["penny_tension", "penny_shear", "penny_torsion", "ellipse_tension"]
 
 
-def run(script, *arguments, folder=FOLDER):
-    return subprocess.run([sys.executable, folder / script, *map(str, arguments)], capture_output=True, text=True)
+def run(script, *arguments, folder=FOLDER, path=None):
+    environment = os.environ | ({"PATH": str(path)} if path is not None else {})
+    return subprocess.run([sys.executable, folder / script, *map(str, arguments)], capture_output=True, text=True, env=environment)
 
 
 def exact_result():
@@ -239,6 +240,20 @@ def test_other_input_that_cannot_be_used_is_refused_and_nothing_is_lost(tmp_path
 def test_formulas_hold_nothing_but_arithmetic(formula):
     with pytest.raises(cutbench.BadInput):
         cutbench.evaluate(formula, {"a": 1.0})
+
+
+def test_calculix_that_is_not_there_or_fails_leaves_no_result(tmp_path):
+    result = tmp_path / "result.json"
+    arguments = ["--out", tmp_path / "out", "--run", "--result", result, "severed_bar"]
+    done = run("to_calculix.py", *arguments, path=tmp_path)
+    assert done.returncode == 77 and "ccx is not installed" in done.stderr and not (tmp_path / "out").exists()
+    false_one = tmp_path / "bin" / "ccx"
+    false_one.parent.mkdir()
+    false_one.write_text("#!/bin/sh\necho This is Version 0\n[ \"$1\" = -v ] || { echo ' *ERROR: no memory'; exit 201; }\n")
+    false_one.chmod(0o755)
+    done = run("to_calculix.py", *arguments, path=false_one.parent)
+    assert done.returncode == 3 and done.stderr.count("\n") == 1 and "severed_bar: ccx -i severed_bar ended with 201" in done.stderr
+    assert "no memory" in done.stderr and not result.exists()
 
 
 def test_scenes_of_sofa_are_cut_held_and_loaded(tmp_path):
