@@ -7,7 +7,6 @@ Every value is the median over the node sets.
 """
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np

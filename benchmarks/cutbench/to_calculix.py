@@ -147,7 +147,7 @@ def values_of(case, grid, text):
         elif quantity["kind"] == "reaction":
             found = [total_force(text, quantity["name"])["xyz".index(quantity["axis"])]]
         else:
-            found = [-total_force(text, quantity["name"])[2]] # of the tissue on the tool
+            found = [-total_force(text, quantity["name"])[2]]  # of the tissue on the tool
         values[quantity["name"]] = [float(value) for value in found]
     return values
 

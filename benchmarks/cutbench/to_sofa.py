@@ -16,8 +16,16 @@ from cutbench import BadInput, case_names, chosen_cases, moduli_of, read_case, r
 from grid import case_forces, given_displacements, make_grid
 from to_calculix import can_hold
 
-PLUGINS = ["Sofa.Component.Constraint.Projective", "Sofa.Component.LinearSolver.Direct", "Sofa.Component.MechanicalLoad", "Sofa.Component.ODESolver.Backward",
-           "Sofa.Component.Playback", "Sofa.Component.SolidMechanics.FEM.Elastic", "Sofa.Component.StateContainer", "Sofa.Component.Topology.Container.Constant"]
+PLUGINS = [
+    "Sofa.Component.Constraint.Projective",
+    "Sofa.Component.LinearSolver.Direct",
+    "Sofa.Component.MechanicalLoad",
+    "Sofa.Component.ODESolver.Backward",
+    "Sofa.Component.Playback",
+    "Sofa.Component.SolidMechanics.FEM.Elastic",
+    "Sofa.Component.StateContainer",
+    "Sofa.Component.Topology.Container.Constant",
+]
 
 
 def numbers(values):

@@ -35,7 +35,9 @@ void hold_faces(solvers::Problem& problem, const FiniteBlock& block) {
     for (int axis = 0; axis < 3; ++axis)
       for (const bool high : {false, true}) {
         const double off = nodes.positions[node][axis] - (high ? block.upper : block.lower)[axis];
-        for (int k = 0; k < 3 && std::abs(off) < 1e-6 * nodes.spacings[node]; ++k)
+        if (std::abs(off) > 1e-6 * nodes.spacings[node])
+          continue;
+        for (int k = 0; k < 3; ++k)
           along[k] = along[k] || held[2 * axis + (high ? 1 : 0)][k];
       }
     if (whole && along[0])

@@ -85,8 +85,12 @@ def test_formulas_have_the_limits_that_are_known():
     assert evaluated("straight_crack", "opening", [0, 0, 0], a=1e-4) == pytest.approx(4 * 0.91 * 100 * 1e-4 / 1e4, rel=1e-4)
     assert evaluated("edge_crack", "k_1", [0, 0, 0], b=1e-6) == pytest.approx(1.122 * 100 * np.sqrt(np.pi * 1e-6), rel=1e-3)
     # The opening just behind the front is that of its K.
-    for case, name, jump, point, way in [("penny_tension", "k_1", "opening", [0.01, 0, 0], [-1, 0, 0]), ("straight_crack", "k_1", "opening", [0.01, 0, 0], [-1, 0, 0]),
-                                         ("ellipse_tension", "k_1", "opening", [0, 0.0048, 0], [0, -1, 0]), ("penny_shear", "k_2", "sliding", [0.01, 0, 0], [-1, 0, 0])]:
+    for case, name, jump, point, way in [
+        ("penny_tension", "k_1", "opening", [0.01, 0, 0], [-1, 0, 0]),
+        ("straight_crack", "k_1", "opening", [0.01, 0, 0], [-1, 0, 0]),
+        ("ellipse_tension", "k_1", "opening", [0, 0.0048, 0], [0, -1, 0]),
+        ("penny_shear", "k_2", "sliding", [0.01, 0, 0], [-1, 0, 0]),
+    ]:
         r = 1e-9
         opening = evaluated(case, jump, np.array(point) + r * np.array(way))
         assert opening * 1e4 / (8 * 0.91) * np.sqrt(2 * np.pi / r) == pytest.approx(evaluated(case, name, point), rel=1e-4), case
