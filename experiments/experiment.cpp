@@ -1,5 +1,6 @@
 #include "experiments/experiment.hpp"
 
+#include "experiments/measured.hpp"
 #include "experiments/real_world/live_situations.hpp"
 #include "experiments/registered.hpp"
 #include "experiments/remeshing_ledger/run.hpp"
@@ -70,6 +71,8 @@ const std::vector<Experiment>& all_experiments() {
       {"finite_exact", "blocks stretched to twice and half their length and bent by 120 degrees", run_finite_exact},
       {"finite_locking", "a bonded block nearly incompressible is compressed by 30 % and does not lock",
        run_finite_locking},
+      {"truth_cube", "a silicone cube under plate and ball: fitted at the smallest compression, the others predicted",
+       run_truth_cube},
   };
   return experiments;
 }

@@ -28,7 +28,7 @@ SECTIONS = {
     "How-to": [],
     "Reference": ["docs/scenario", "docs/output", "reference/cpp", "reference/python", "docs/viewer_protocol", "docs/glossary"],
     "Theory": ["docs/theory", "docs/architecture", "docs/haptics_design", "docs/references"],
-    "Experiments": ["docs/experiments/README", "docs/performance", "docs/remeshing_ledger", "docs/remeshing_ledger_runs"],
+    "Experiments": ["docs/experiments/README", "docs/performance", "docs/remeshing_ledger", "docs/remeshing_ledger_runs", "docs/cutbench"],
     "The project": ["CONTRIBUTING", "docs/decisions", "SECURITY", "CHANGELOG"],
 }
 LINK = re.compile(r"(?<!!)(\[[^\]]*\])\(([^)\s]+)\)")

@@ -15,11 +15,8 @@ int face_of(const Vector3& normal) {
   return 2 * axis + (normal[axis] > 0 ? 1 : 0);
 }
 
-} // namespace
-
-solvers::Problem finite_block(const FiniteBlock& block) {
-  solvers::Problem problem;
-  problem.domain = topology::make_box_domain(block.lower, block.upper, block.spacing);
+/// Holds the faces of the block: its surface, and the nodes that lie on them.
+void hold_faces(solvers::Problem& problem, const FiniteBlock& block) {
   const HeldFaces held = block.held;
   const bool whole = std::all_of(held.begin(), held.end(), [](const auto& axes) {
     return axes == std::array{true, true, true} || axes == std::array{false, false, false};
@@ -30,6 +27,41 @@ solvers::Problem finite_block(const FiniteBlock& block) {
     problem.prescribed_region = [held](const Vector3&, const Vector3& normal, int axis) {
       return held[face_of(normal)][axis];
     };
+  const solvers::NodeCloud& nodes = problem.nodes;
+  for (int node = 0; node < nodes.size(); ++node) {
+    if (nodes.kinds[node] == solvers::NodeKind::interior)
+      continue;
+    std::array<bool, 3> along{};
+    for (int axis = 0; axis < 3; ++axis)
+      for (const bool high : {false, true}) {
+        const double off = nodes.positions[node][axis] - (high ? block.upper : block.lower)[axis];
+        if (std::abs(off) > 1e-6 * nodes.spacings[node])
+          continue;
+        for (int k = 0; k < 3; ++k)
+          along[k] = along[k] || held[2 * axis + (high ? 1 : 0)][k];
+      }
+    if (whole && along[0])
+      problem.prescribed.push_back({node, {true, true, true}, Vector3::Zero()});
+    else if (!whole)
+      for (int k = 0; k < 3; ++k)
+        if (along[k])
+          problem.prescribed.push_back({node, {k == 0, k == 1, k == 2}, Vector3::Zero()});
+  }
+}
+
+} // namespace
+
+solvers::Problem finite_block(const FiniteBlock& block) {
+  solvers::Problem problem;
+  problem.domain = topology::make_box_domain(block.lower, block.upper, block.spacing);
+  if (block.graded) {
+    solvers::SprinkleOptions options;
+    options.spacing = *block.graded;
+    options.random_seed = block.seed;
+    problem.nodes = solvers::sprinkle(*problem.domain, options).nodes;
+    hold_faces(problem, block);
+    return problem;
+  }
   const Vector3 extent = block.upper - block.lower;
   std::array<int, 3> divisions{};
   Vector3 step;
@@ -44,7 +76,6 @@ solvers::Problem finite_block(const FiniteBlock& block) {
       for (int c = 0; c <= divisions[2]; ++c) {
         const std::array<int, 3> index{a, b, c};
         Vector3 x, normal = Vector3::Zero();
-        std::array<bool, 3> along{};
         int faces = 0;
         for (int axis = 0; axis < 3; ++axis) {
           const double move = shift(random) * step[axis];
@@ -56,21 +87,13 @@ solvers::Problem finite_block(const FiniteBlock& block) {
             continue;
           normal[axis] = low ? -1 : 1;
           ++faces;
-          for (int k = 0; k < 3; ++k)
-            along[k] = along[k] || held[2 * axis + (high ? 1 : 0)][k];
         }
         const solvers::NodeKind kind = faces == 0   ? solvers::NodeKind::interior
                                        : faces == 1 ? solvers::NodeKind::surface
                                                     : solvers::NodeKind::edge;
-        const int node =
-            problem.nodes.add(x, block.spacing, kind, faces > 0 ? Vector3(normal.normalized()) : Vector3(normal));
-        if (whole && along[0])
-          problem.prescribed.push_back({node, {true, true, true}, Vector3::Zero()});
-        else if (!whole)
-          for (int k = 0; k < 3; ++k)
-            if (along[k])
-              problem.prescribed.push_back({node, {k == 0, k == 1, k == 2}, Vector3::Zero()});
+        problem.nodes.add(x, block.spacing, kind, faces > 0 ? Vector3(normal.normalized()) : Vector3(normal));
       }
+  hold_faces(problem, block);
   return problem;
 }
 

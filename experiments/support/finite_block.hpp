@@ -3,6 +3,8 @@
 
 #include "solvers/finite/equilibrium.hpp"
 
+#include <optional>
+
 namespace spherecut::experiments {
 
 /// Faces 2 axis (low) and 2 axis + 1 (high); held[face][axis]: whether the face is held along the axis.
@@ -14,10 +16,11 @@ struct FiniteBlock {
   double jitter = 0.25; // nodes are moved at random by up to so many spacings, on their face or edge
   std::uint64_t seed = 1;
   HeldFaces held{};
+  std::optional<solvers::SpacingField> graded{}; // nodes are sprinkled so, in place of the grid
 };
 
-/// Nodes on a grid of about the spacing. Entries are one per node and axis, or, where every face is held along all axes
-/// or none, one per node.
+/// Nodes on a grid of about the spacing, or sprinkled. Entries are one per node and axis, or, where every face is held
+/// along all axes or none, one per node.
 solvers::Problem finite_block(const FiniteBlock& block);
 
 /// Neo-Hookean law of a shear modulus, Pa, and a Poisson ratio.

@@ -71,6 +71,14 @@ HOW = [
     (r"PYTHONPATH=build/release/python python3 examples/studies/environment_rate\.py", "run_short", {"environment_rate.py": "environment_rate.py 20"}),
     (r"python3 -m spherecut\.sweep", "elsewhere", "tests/python/test_sweep.py", "spherecut.sweep"),
     (r"python3 examples/studies/scaling\.py examples/studies/press_spacing\.toml", "run_short", {"examples/studies/press_spacing.toml": "--help"}),
+    (r"python3 benchmarks/cutbench/derive\.py", "run"),
+    (r"python3 benchmarks/cutbench/score\.py benchmarks/cutbench/results/spherecut\.json benchmarks/cutbench/results/calculix\.json", "elsewhere",
+     "tests/cutbench/test_cutbench.py", '(FOLDER / "results").glob("*.json")'),
+    (r"PYTHONPATH=build/release/python python3 benchmarks/cutbench/run_spherecut\.py --out spherecut\.json", "elsewhere", "tests/cutbench/test_cutbench.py",
+     '"run_spherecut.py", "--coarse"'),
+    (r"python3 benchmarks/cutbench/to_calculix\.py --out calculix --run --result calculix\.json", "elsewhere", "tests/cutbench/calculix.sh",
+     "--run --result"),
+    (r"python3 benchmarks/cutbench/to_sofa\.py --out scenes", "run_short", {"scenes": "scenes severed_bar"}),
     (r"git clone ADDRESS \w+ && cd \w+", "clone"),
     (r"\./dev \w+.*", "dev"),
     (r"\.ci/run", "elsewhere", ".ci/run", "./dev test"),
@@ -223,7 +231,7 @@ def clone(text: str) -> None:
 
 def scratch_copy(folder: Path) -> Path:
     """What commands of a reader find in their clone, and the program on the PATH."""
-    for name in ["scenarios", "examples", "docs"]:
+    for name in ["scenarios", "examples", "docs", "benchmarks"]:
         shutil.copytree(SOURCE / name, folder / name, ignore=shutil.ignore_patterns("images", "__pycache__"))
     (folder / "build").mkdir()
     (folder / "build" / "release").symlink_to(BUILD)

@@ -199,3 +199,7 @@ TEST_CASE("Quick finite exact: stretched and bent blocks agree with the closed f
 TEST_CASE("Quick finite locking: a bonded block does not lock") {
   require_quick_run_passes("finite_locking");
 }
+
+TEST_CASE("Quick truth cube: plates that slip give the closed form, forces settle with the nodes") {
+  require_quick_run_passes("truth_cube");
+}
