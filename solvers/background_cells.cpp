@@ -1,13 +1,17 @@
 #include "solvers/background_cells.hpp"
 
+#include "solvers/box_memory.hpp"
 #include "solvers/split_box.hpp"
 #include "topology/errors.hpp"
 #include "topology/interruption.hpp"
 #include "topology/point_tree.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <fmt/format.h>
+#include <map>
 
 namespace spherecut::solvers {
 
@@ -31,20 +35,25 @@ double inside_fraction(double distance, const Vector3& normal, const Vector3& ha
 class BoxFiller {
  public:
   BoxFiller(const topology::Domain& domain, const BackgroundOptions& options, const topology::Incision* incision,
-            BackgroundCells& cells)
+            BackgroundCells& cells, std::shared_ptr<const BoxMemory::Boxes> known = nullptr)
       : domain_(domain), options_(options), incision_(incision),
-        has_walls_(incision != nullptr && incision->cut_sheets() < std::ssize(incision->sheets())), cells_(cells) {}
+        has_walls_(incision != nullptr && incision->cut_sheets() < std::ssize(incision->sheets())), cells_(cells),
+        known_(std::move(known)) {}
 
   /// `spacing`: of the nodes about the box; `distance`: signed distance of its centre to the surface.
   void fill(const Vector3& centre, const Vector3& half, double spacing, double distance) {
     BackgroundBox box{centre, half, spacing, static_cast<int>(cells_.start.size()) - 1, 0};
-    const bool inside = distance < -half.norm() || corners_inside(centre, half);
+    const bool is_deep = distance < -half.norm();
+    BoxMemory::Box* const at_surface = known_ != nullptr && !is_deep ? &remembered(centre, half) : nullptr;
+    const bool inside = is_deep || (at_surface != nullptr ? at_surface->inside : corners_inside(centre, half));
     if (has_walls_ && is_walled(centre, half))
       add_walled(centre, half);
     else if (incision_ != nullptr && may_be_split(centre, half))
       add_split(centre, half, inside);
     else if (inside)
       add_rule(centre, half);
+    else if (at_surface != nullptr)
+      add_remembered_cut(centre, half, *at_surface);
     else
       add_cut(centre, half);
     if (std::ssize(cells_.points) > cells_.start.back())
@@ -54,7 +63,30 @@ class BoxFiller {
       cells_.boxes.push_back(box);
   }
 
+  /// The boxes at the surface that were filled.
+  BoxMemory::Boxes take_boxes() { return std::move(boxes_); }
+
  private:
+  /// What is known of a box, or its beginning.
+  BoxMemory::Box& remembered(const Vector3& centre, const Vector3& half) {
+    const BoxMemory::Key key{centre.x(), centre.y(), centre.z(), half.x(), half.y(), half.z()};
+    const auto found = known_->find(key);
+    return boxes_
+        .emplace(key, found != known_->end() ? found->second : BoxMemory::Box{corners_inside(centre, half), false, {}})
+        .first->second;
+  }
+
+  void add_remembered_cut(const Vector3& centre, const Vector3& half, BoxMemory::Box& box) {
+    if (box.is_cut) {
+      cells_.points.insert(cells_.points.end(), box.points.begin(), box.points.end());
+      return;
+    }
+    const auto first = std::ssize(cells_.points);
+    add_cut(centre, half);
+    box.is_cut = true;
+    box.points.assign(cells_.points.begin() + first, cells_.points.end());
+  }
+
   bool corners_inside(const Vector3& centre, const Vector3& half) const {
     for (int k = 0; k < 8; ++k) {
       const Vector3 corner = centre + half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1));
@@ -395,6 +427,8 @@ class BoxFiller {
   const topology::Incision* incision_;
   bool has_walls_; // of narrow gaps
   BackgroundCells& cells_;
+  std::shared_ptr<const BoxMemory::Boxes> known_; // null: nothing is remembered
+  BoxMemory::Boxes boxes_;
   std::vector<Group> groups_;
   std::vector<BoxPart> material_;
   std::vector<int> found_;
@@ -403,9 +437,11 @@ class BoxFiller {
 class Octree {
  public:
   Octree(const topology::Domain& domain, const NodeCloud& nodes, const BackgroundOptions& options,
-         const topology::Incision* incision)
+         const topology::Incision* incision, std::shared_ptr<const BoxMemory::Boxes> known)
       : domain_(domain), nodes_(nodes), options_(options), tree_(nodes.positions),
-        filler_(domain, options, incision, cells_) {}
+        filler_(domain, options, incision, cells_, std::move(known)) {}
+
+  BoxMemory::Boxes take_boxes() { return filler_.take_boxes(); }
 
   BackgroundCells build() {
     // Roots as large as the coarsest spacing allows, fitted to the bounding box: a uniform cloud needs no division.
@@ -473,15 +509,64 @@ class Octree {
 
 } // namespace
 
-BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
-                                 const BackgroundOptions& options, const topology::Incision* incision) {
+namespace {
+
+void require_fit(const NodeCloud& nodes, const BackgroundOptions& options) {
   if (options.quadrature < 1 || options.quadrature > 3)
     throw InputError(fmt::format("quadrature rule {}; there are 1, 2 and 3", options.quadrature));
   if (!(options.cell_size > 0) || !std::isfinite(options.cell_size))
     throw InputError(fmt::format("background cells of {} node spacings: the size must be positive", options.cell_size));
   if (nodes.size() == 0)
     throw InputError("background cells need nodes: their spacings set the size");
-  return Octree(domain, nodes, options, incision).build();
+}
+
+} // namespace
+
+BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
+                                 const BackgroundOptions& options, const topology::Incision* incision) {
+  require_fit(nodes, options);
+  return Octree(domain, nodes, options, incision, nullptr).build();
+}
+
+BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
+                                 const BackgroundOptions& options, const topology::Incision* incision,
+                                 BoxMemory& memory) {
+  require_fit(nodes, options);
+  Octree octree(domain, nodes, options, incision, memory.known());
+  BackgroundCells cells = octree.build();
+  memory.keep(octree.take_boxes());
+  return cells;
+}
+
+std::size_t BoxMemory::Hash::operator()(const Key& key) const {
+  std::uint64_t hash = 0;
+  for (const double value : key) {
+    hash = (hash ^ std::bit_cast<std::uint64_t>(value)) * 0x9e3779b97f4a7c15U;
+    hash ^= hash >> 29U;
+  }
+  return hash;
+}
+
+std::shared_ptr<const BoxMemory::Boxes> BoxMemory::known() const {
+  const std::lock_guard lock(mutex_);
+  return boxes_;
+}
+
+void BoxMemory::keep(Boxes boxes) {
+  auto next = std::make_shared<const Boxes>(std::move(boxes));
+  const std::lock_guard lock(mutex_);
+  boxes_.swap(next);
+}
+
+std::shared_ptr<BoxMemory> BoxMemory::of(const std::shared_ptr<const topology::Domain>& domain) {
+  static std::mutex mutex;
+  static std::map<std::weak_ptr<const topology::Domain>, std::shared_ptr<BoxMemory>, std::owner_less<>> memories;
+  const std::lock_guard lock(mutex);
+  std::erase_if(memories, [](const auto& entry) { return entry.first.expired(); });
+  std::shared_ptr<BoxMemory>& memory = memories[domain];
+  if (memory == nullptr)
+    memory = std::make_shared<BoxMemory>();
+  return memory;
 }
 
 bool is_too_large(const BackgroundBox& box, const Vector3& x, double spacing, const BackgroundOptions& options) {

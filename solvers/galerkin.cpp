@@ -9,6 +9,7 @@
 #include "solvers/galerkin.hpp"
 
 #include "solvers/background_cells.hpp"
+#include "solvers/box_memory.hpp"
 #include "solvers/cell_shapes.hpp"
 #include "solvers/cut_sight.hpp"
 #include "solvers/elastic_body.hpp"
@@ -35,7 +36,8 @@ class Galerkin final : public ElasticBody {
       : ElasticBody(std::move(problem), Method::galerkin, galerkin_support_radius(problem, options), options.sight,
                     galerkin_lengths(problem.material)) {
     const Stopwatch assembly;
-    cells_ = background_cells(*problem_.domain, problem_.nodes, background_of(options), problem_.hiding().get());
+    cells_ = background_cells(*problem_.domain, problem_.nodes, background_of(options), problem_.hiding().get(),
+                              *BoxMemory::of(problem_.domain));
     hold_surface();
     assemble(options.unheld, !is_factored || !initial_stress(problem_).isZero(0));
     assemble_loads();

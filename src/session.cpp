@@ -220,8 +220,7 @@ topology::SurfaceContact Session::find_contact(const topology::ToolPose& pose) c
   const topology::ToolShape& shape = scenario_.tool->shape;
   if (scenario_.tool->grasp)
     return query_.first_touch(shape, pose);
-  const bool near = last_contact_ && last_contact_->depth > -topology::tip_radius(shape);
-  return near ? query_.walk(shape, pose, *last_contact_) : query_.first_touch(shape, pose);
+  return last_contact_ ? query_.walk(shape, pose, *last_contact_) : query_.first_touch(shape, pose);
 }
 
 // Where fine nodes belong: at the contact; under a flat punch, whose deepest point may be anywhere on its end, below

@@ -7,6 +7,7 @@
 #   tear             likewise: the grasper lifts a flap that tears
 #   pictures FOLDER  pictures of the page, JPEG below 150 kB, for docs/images
 #   measure          frame rate and latency at 20,000 triangles; exits 1 when they are not what was asked for
+#   measure stroke [KEY=VALUE ...]  a wavy stroke of the blade: lag of the wound, force, mouth, as a table
 #   soak SECONDS [SEED]  random pressing and cutting
 # Exits 77 (skipped) and says why when the page was not built or there is no browser.
 set -euo pipefail

@@ -1,6 +1,9 @@
 #include "solvers/background_cells.hpp"
 
+#include "solvers/box_memory.hpp"
+#include "topology/cut_sheets.hpp"
 #include "topology/errors.hpp"
+#include "topology/incision.hpp"
 #include "topology/organs.hpp"
 
 #include <Eigen/Geometry>
@@ -149,4 +152,88 @@ TEST_CASE("Background cells refuse rules and sizes that do not exist") {
   for (double size : {0.0, -1.0, std::nan("")})
     CHECK_THROWS_AS(background_cells(*domain, nodes, {size, 2}), InputError);
   CHECK_THROWS_AS(background_cells(*domain, NodeCloud{}, {1.0, 2}), InputError);
+}
+
+namespace {
+
+/// A domain that counts how often it is asked for a distance.
+class CountingDomain final : public topology::Domain {
+ public:
+  explicit CountingDomain(std::shared_ptr<const topology::Domain> domain) : domain_(std::move(domain)) {}
+  double signed_distance(const Vector3& x) const override {
+    ++asked;
+    return domain_->signed_distance(x);
+  }
+  double curved_distance(const Vector3& x) const override { return domain_->curved_distance(x); }
+  Vector3 curved_gradient(const Vector3& x) const override { return domain_->curved_gradient(x); }
+  Vector3 normal(const Vector3& x) const override { return domain_->normal(x); }
+  Vector3 closest_surface_point(const Vector3& x) const override { return domain_->closest_surface_point(x); }
+  const std::vector<Plane>& planes() const override { return domain_->planes(); }
+  const topology::SurfaceMesh& surface() const override { return domain_->surface(); }
+  BoundingBox bounds() const override { return domain_->bounds(); }
+
+  mutable int asked = 0;
+
+ private:
+  std::shared_ptr<const topology::Domain> domain_;
+};
+
+bool same(const BackgroundCells& a, const BackgroundCells& b) {
+  if (a.start != b.start || a.points.size() != b.points.size() || a.boxes.size() != b.boxes.size())
+    return false;
+  for (std::size_t k = 0; k < a.points.size(); ++k)
+    if (a.points[k].position != b.points[k].position || a.points[k].weight != b.points[k].weight)
+      return false;
+  return true;
+}
+
+} // namespace
+
+TEST_CASE("Remembered boxes are those that would be made, whatever body came before") {
+  const auto organ = topology::make_hemisphere_domain(1, 0.1);
+  const auto domain = std::make_shared<const CountingDomain>(organ);
+  const NodeCloud nodes = graded_grid({-1, -1, 0}, {1, 1, 1}, 0.3, 0.6),
+                  others = graded_grid({-1, -1, 0}, {1, 1, 1}, 0.3, 0.5);
+  const auto cut_to = [&](double depth) {
+    return std::make_shared<const topology::Incision>(
+        std::vector{
+            topology::make_rectangle_sheet({0.1, 0.03, 1.1 - depth / 2}, {0.1, 1, 0.05}, {0, -0.05, 1}, 1, depth, 0.1)},
+        organ, 1);
+  };
+  const auto shallow = cut_to(0.4), deep = cut_to(0.7);
+  solvers::BoxMemory memory;
+  const auto made = [&](const NodeCloud& of, const topology::Incision* incision, bool remembers, int& asked) {
+    const int before = domain->asked;
+    BackgroundCells cells =
+        remembers ? background_cells(*domain, of, {}, incision, memory) : background_cells(*domain, of, {}, incision);
+    asked = domain->asked - before;
+    return cells;
+  };
+  int with = 0, without = 0;
+  // A cut that comes, grows, is taken back, is not there; other nodes between; the same body twice.
+  const std::vector<std::pair<const NodeCloud*, const topology::Incision*>> bodies{
+      {&nodes, nullptr},       {&nodes, shallow.get()}, {&nodes, deep.get()}, {&others, deep.get()},
+      {&nodes, shallow.get()}, {&nodes, nullptr},       {&nodes, nullptr}};
+  for (const auto& [of, incision] : bodies) {
+    const BackgroundCells expected = made(*of, incision, false, without);
+    CHECK(same(made(*of, incision, true, with), expected));
+    CHECK(with <= without);
+  }
+  // All that is asked for again is one distance a box, to know which boxes lie at the surface.
+  CHECK(with < 0.2 * without);
+
+  // Options tell nothing of the boxes at the surface.
+  CHECK(same(background_cells(*domain, nodes, {1.0, 3}, nullptr, memory),
+             background_cells(*domain, nodes, {1.0, 3}, nullptr)));
+}
+
+TEST_CASE("A memory of boxes belongs to one domain and goes with it") {
+  auto one = topology::make_hemisphere_domain(1, 0.1);
+  const auto other = topology::make_hemisphere_domain(1, 0.1);
+  const std::shared_ptr<solvers::BoxMemory> of_one = solvers::BoxMemory::of(one);
+  CHECK(solvers::BoxMemory::of(one) == of_one);
+  CHECK(solvers::BoxMemory::of(other) != of_one);
+  one.reset();
+  static_cast<void>(solvers::BoxMemory::of(other)); // looks what has gone
+  CHECK(of_one.use_count() == 1);
 }

@@ -1,15 +1,20 @@
 // Rates and latencies of the live liver of 20,000 triangles, drawn by the processor: node measure.mjs BUILD_FOLDER SOURCE_FOLDER
 // A press that slides and a cut, first through the page alone, then with a second client that only reads the feed. Ends with
 // status 1 when the feed has fewer than 20 frames a second, or the hand is later than 250 ms (95 %) in the picture.
+// node measure.mjs BUILD_FOLDER SOURCE_FOLDER stroke [KEY=VALUE ...]: a wavy stroke of the blade as a user draws it, in five
+// seconds and, in a session begun anew, at 30 mm/s; as a table. Keys of the scenario take other values (fine_spacing=0.004).
+import { readFileSync } from 'node:fs';
+import { loadavg } from 'node:os';
 import { join } from 'node:path';
 import type { Page as Tab } from 'playwright-core';
 import { launch, openPage, until } from './browser';
 import { Feed } from './feed';
 import { above, chooseMode, hover, look, ready } from './hand';
 import { stageNames } from '../source/protocol';
-import { serve } from './server';
+import { serve, withValues } from './server';
+import { mouthOfWound, seenOfWound, watchWound } from './wound';
 
-const [build = '.', source = '.'] = process.argv.slice(2);
+const [build = '.', source = '.', kind = 'rates', ...values] = process.argv.slice(2);
 
 const leastFrames = 20; // a second
 const mostLatency = 0.25; // s
@@ -70,37 +75,127 @@ async function drag(tab: Tab, from: { x: number; y: number }, seconds: number, w
   }
 }
 
-for (const reads of [false, true]) {
-  const served = await serve(build, join(source, 'scenarios/liver_live.toml'));
+async function rates(): Promise<void> {
+  for (const reads of [false, true]) {
+    const served = await serve(build, join(source, 'scenarios/liver_live.toml'));
+    const browser = await launch();
+    const feed = reads ? new Feed(served.address) : null;
+    try {
+      const { tab } = await openPage(browser, served.address, { width: 1280, height: 720 });
+      await ready(tab);
+      await hover(tab, -0.03, -0.01);
+      const middle = await above(tab, -0.03, -0.01);
+      await tab.mouse.down();
+      await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
+      const name = reads ? ', with a client that only reads' : '';
+      await measured(tab, feed, `sliding under pressure${name}`, () =>
+        drag(tab, middle, 12, (time) => [25 * Math.sin(time / 0.7), 12 * Math.sin(1.7 * (time / 0.7))]),
+      );
+      await tab.mouse.up();
+      await chooseMode(tab, '2', 'blade');
+      await hover(tab, -0.06, 0.004);
+      const [start, end] = [await above(tab, -0.06, 0.004), await above(tab, 0.01, 0)];
+      await tab.mouse.move(start.x, start.y);
+      await tab.mouse.down();
+      await until(tab, 'the blade goes in', () => globalThis.spherecut!.frame!.depth > 0.004);
+      await measured(tab, feed, `cutting${name}`, () =>
+        drag(tab, start, 12, (time) => [((end.x - start.x) * time) / 12, ((end.y - start.y) * time) / 12]),
+      );
+      await tab.mouse.up();
+    } finally {
+      feed?.close();
+      await browser.close();
+      await served.stop();
+    }
+  }
+}
+
+/** Processor time of a process with all its threads, s. */
+function processorTime(pid: number): number {
+  const fields = readFileSync(`/proc/${pid}/stat`, 'latin1').replace(/^.*\) /, '').split(' ');
+  return (Number(fields[11]) + Number(fields[12])) / 100;
+}
+
+const sorted = (list: number[]): number[] => [...list].sort((a, b) => a - b);
+const quantile = (list: number[], q: number): number | null => sorted(list)[Math.min(list.length - 1, Math.floor(q * list.length))] ?? null;
+const newton = (force: number | null): string => (force === null ? '-' : `${force.toFixed(3)} N`);
+
+/** A wavy stroke of 55 mm over the liver, first in five seconds, then at 30 mm/s in a new session. */
+async function strokes(): Promise<void> {
+  const change = (text: string): string => withValues(text, Object.fromEntries(values.map((value) => value.split('=', 2) as [string, string])));
+  const begun = performance.now();
+  const served = await serve(build, join(source, 'scenarios/liver_live.toml'), change);
   const browser = await launch();
-  const feed = reads ? new Feed(served.address) : null;
+  const rows: string[][] = [];
   try {
     const { tab } = await openPage(browser, served.address, { width: 1280, height: 720 });
     await ready(tab);
-    await hover(tab, -0.03, -0.01);
-    const middle = await above(tab, -0.03, -0.01);
-    await tab.mouse.down();
-    await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
-    const name = reads ? ', with a client that only reads' : '';
-    await measured(tab, feed, `sliding under pressure${name}`, () =>
-      drag(tab, middle, 12, (time) => [25 * Math.sin(time / 0.7), 12 * Math.sin(1.7 * (time / 0.7))]),
-    );
-    await tab.mouse.up();
-    await chooseMode(tab, '2', 'blade');
-    await hover(tab, -0.06, 0.004);
-    const [start, end] = [await above(tab, -0.06, 0.004), await above(tab, 0.01, 0)];
-    await tab.mouse.move(start.x, start.y);
-    await tab.mouse.down();
-    await until(tab, 'the blade goes in', () => globalThis.spherecut!.frame!.depth > 0.004);
-    await measured(tab, feed, `cutting${name}`, () =>
-      drag(tab, start, 12, (time) => [((end.x - start.x) * time) / 12, ((end.y - start.y) * time) / 12]),
-    );
-    await tab.mouse.up();
+    console.log(`from the start of the server to the first picture ${((performance.now() - begun) / 1000).toFixed(1)} s; load ${loadavg()[0]!.toFixed(1)}`);
+    await watchWound(tab);
+    const points = 40;
+    const ways = Array.from({ length: points + 1 }, (_, i) => [-0.055 + (0.05 * i) / points, 0.002 + 0.003 * Math.sin((3 * Math.PI * i) / points)] as const);
+    const length = ways.slice(1).reduce((sum, [x, y], i) => sum + Math.hypot(x - ways[i]![0], y - ways[i]![1]), 0);
+    for (const seconds of [5, length / 0.03]) {
+      await chooseMode(tab, '2', 'blade');
+      await hover(tab, ...ways[0]!);
+      const places: { x: number; y: number }[] = [];
+      for (const [x, y] of ways) places.push(await above(tab, x, y));
+      await tab.mouse.move(places[0]!.x, places[0]!.y);
+      await tab.mouse.down();
+      await until(tab, 'the blade goes in', () => globalThis.spherecut!.frame!.depth > 0.004);
+      await tab.evaluate(() => Object.assign(globalThis.woundWatch!, { places: [], next: 0, lags: [], forces: [] }));
+      await tab.evaluate(() => [globalThis.spherecut!.latency, globalThis.spherecut!.toolLatency].forEach((latency) => latency.clear()));
+      const [before, seen, spent, start] = [await counters(tab), await look(tab), processorTime(served.process.pid!), performance.now()];
+      for (let time = 0; time < seconds; time = (performance.now() - start) / 1000) {
+        const at = (points * time) / seconds;
+        const leg = Math.min(Math.floor(at), points - 1);
+        const [a, b] = [places[leg]!, places[leg + 1]!];
+        await tab.mouse.move(a.x + (b.x - a.x) * (at - leg), a.y + (b.y - a.y) * (at - leg));
+        await tab.waitForTimeout(16);
+      }
+      const took = (performance.now() - start) / 1000;
+      const [after, end] = [await counters(tab), await look(tab)];
+      const worked = processorTime(served.process.pid!) - spent;
+      const forces = (await seenOfWound(tab)).forces;
+      const tool = await tab.evaluate(() => [0.5, 0.95].map((q) => globalThis.spherecut!.toolLatency.quantile(q)));
+      const { nodes, level } = await tab.evaluate(() => ({ nodes: globalThis.spherecut!.frame!.nodeCount, level: globalThis.spherecut!.frame!.level }));
+      await tab.waitForTimeout(1500); // what is still to come
+      const wound = await seenOfWound(tab);
+      await tab.mouse.up();
+      await tab.waitForTimeout(2000);
+      const [mouth, last] = [await mouthOfWound(tab), await look(tab)];
+      const stages = stageNames.map((name, i) => `${name} ${ms((after.stages[i] ?? 0) - (before.stages[i] ?? 0))}`);
+      console.log(`${(1000 * length).toFixed(0)} mm in ${took.toFixed(1)} s: ${stages.join(', ')}; load ${loadavg()[0]!.toFixed(1)}`);
+      console.log(`  ${last.messages.replaceAll('\n', ' | ')}`);
+      rows.push([
+        `${((1000 * length) / took).toFixed(0)} mm/s`,
+        `${nodes}, ${level}`,
+        ((end.solve - seen.solve) / took).toFixed(1),
+        ((after.pictures - before.pictures) / took).toFixed(1),
+        `${ms(tool[0]!)}, ${ms(tool[1]!)}`,
+        `${ms(quantile(wound.lags, 0.5))}, ${ms(quantile(wound.lags, 0.95))} (${wound.reached} of ${wound.passed})`,
+        `${newton(quantile(forces, 0.5))}, ${newton(quantile(forces, 1))}`,
+        `${(1e4 * last.cutArea).toFixed(2)} cm2`,
+        `${(1000 * mouth.width).toFixed(1)} mm, ${mouth.pixels.toFixed(0)} px`,
+        `${(worked / took).toFixed(2)}`,
+      ]);
+      if (rows.length === 2) break;
+      const reset = performance.now();
+      const epoch = await tab.evaluate(() => globalThis.spherecut!.session!.epoch);
+      await tab.click('#reset');
+      await tab.waitForFunction((old) => globalThis.spherecut!.session!.epoch !== old && globalThis.spherecut!.frame?.epoch !== old, epoch);
+      console.log(`  a reset takes ${((performance.now() - reset) / 1000).toFixed(1)} s`);
+      await ready(tab);
+    }
   } finally {
-    feed?.close();
     await browser.close();
     await served.stop();
   }
+  const head = ['blade', 'nodes, level', 'solves/s', 'pictures/s', 'tool 50, 95 %', 'wound 50, 95 %', 'force 50, 100 %', 'cut', 'mouth', 'cores of the server'];
+  console.log(`| ${head.join(' | ')} |\n|${head.map(() => '---').join('|')}|`);
+  for (const row of rows) console.log(`| ${row.join(' | ')} |`);
 }
+
+await (kind === 'stroke' ? strokes() : rates());
 for (const miss of misses) console.error(`MISSED: ${miss}`);
 process.exit(misses.length > 0 ? 1 : 0);
