@@ -4,6 +4,7 @@
 #include "solvers/finite/equilibrium.hpp"
 #include "topology/errors.hpp"
 
+#include <atomic>
 #include <fmt/format.h>
 
 namespace spherecut::bindings {
@@ -16,12 +17,12 @@ using solvers::FiniteBody;
 using solvers::FiniteState;
 using solvers::Law;
 
-/// A body for one thread at a time, and not from within the functions of its law.
+/// A body for one thread at a time, and not from within the functions of its law, on whatever thread they are called.
 struct LawBody {
   std::unique_ptr<FiniteBody> body;
   std::shared_ptr<Law> law;
-  mutable std::recursive_mutex lock;
-  mutable bool is_busy = false; // with the lock
+  mutable std::mutex lock;
+  mutable std::atomic<bool> is_busy{false}; // with the lock
 };
 
 struct BodyEquilibrium {
@@ -31,14 +32,16 @@ struct BodyEquilibrium {
 
 template <class Call>
 auto with_law_body(const LawBody& self, Call&& call) -> decltype(call(*self.body)) {
+  if (in_law_function() && self.is_busy)
+    throw InputError("body: asked from within a function of its own law; allowed: bodies that nothing else works with");
   return unlocked([&] {
     const std::lock_guard guard(self.lock);
-    if (self.is_busy)
-      throw InputError("body: asked from within a function of its own law; allowed: other bodies");
     struct Busy {
-      bool& flag;
-      explicit Busy(bool& f) : flag(f) { flag = true; }
+      std::atomic<bool>& flag;
+      explicit Busy(std::atomic<bool>& f) : flag(f) { flag = true; }
       ~Busy() { flag = false; }
+      Busy(const Busy&) = delete;
+      Busy& operator=(const Busy&) = delete;
     } const busy(self.is_busy);
     return call(*self.body);
   });

@@ -1,4 +1,4 @@
-// What bodies of both kinds are given from Python: surface that is held, and loads.
+// What bodies are given from Python: surface that is held, loads, laws that are functions.
 #pragma once
 
 #include "python/bindings/shared.hpp"
@@ -21,5 +21,8 @@ void hold(const std::vector<Held>& all, solvers::Problem& problem);
 
 /// N/m3 and Pa: a constant of three numbers, a function or None each. Throws InputError.
 solvers::Loads loads_from(const py::object& body_force, const py::object& traction, const py::object& lip_traction);
+
+/// Whether this thread is in a function of a law now.
+bool in_law_function();
 
 } // namespace spherecut::bindings

@@ -1,6 +1,6 @@
 // Material laws: those of the library, and laws that are functions of Python's.
 #include "python/bindings/floors.hpp"
-#include "python/bindings/shared.hpp"
+#include "python/bindings/held.hpp"
 #include "solvers/elasticity/function_law.hpp"
 
 #include <algorithm>
@@ -42,6 +42,15 @@ Doubles array_of_gradients(std::span<const Matrix3> gradients, bool one) {
   return array;
 }
 
+thread_local int law_functions = 0; // that this thread is in
+
+struct InLawFunction {
+  InLawFunction() { ++law_functions; }
+  ~InLawFunction() { --law_functions; }
+  InLawFunction(const InLawFunction&) = delete;
+  InLawFunction& operator=(const InLawFunction&) = delete;
+};
+
 /// A function of Python's of n gradients, each with `inner` numbers for a value.
 class ArrayFunction {
  public:
@@ -70,6 +79,7 @@ class ArrayFunction {
 
  private:
   [[nodiscard]] Doubles called(std::span<const Matrix3> gradients, bool one) const {
+    const InLawFunction inside; // until it returns
     const py::object value = (*function_)(array_of_gradients(gradients, one));
     const Doubles array = Doubles::ensure(value);
     if (!array) {
@@ -203,6 +213,10 @@ void bind_built_in(py::class_<Law, std::shared_ptr<Law>>& law) {
 }
 
 } // namespace
+
+bool in_law_function() {
+  return law_functions > 0;
+}
 
 void bind_law(py::module_& module) {
   py::class_<Law, std::shared_ptr<Law>> law(

@@ -228,9 +228,9 @@ std::vector<Matrix3> strained_states() {
 
 void require_sound(const FunctionLaw& law, const LawFunctions& functions) {
   const ElasticConstants moduli = law.small_strain();
-  if (!(moduli.shear_modulus > 0 && moduli.bulk_modulus > 0))
+  if (!(moduli.shear_modulus > 0 && moduli.bulk_modulus > same * moduli.shear_modulus))
     throw InputError(fmt::format("law {}: at rest the shear modulus is {:.6g} Pa and the bulk modulus {:.6g} Pa; "
-                                 "allowed: both above 0",
+                                 "allowed: both above 0, the latter above 1e-4 of the former",
                                  law.name(), moduli.shear_modulus, moduli.bulk_modulus));
   const auto state = [&](const Matrix3& f) {
     double energy = 0;

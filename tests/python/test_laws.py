@@ -91,7 +91,7 @@ def pressed(law, *, nodes=None, tolerance=1e-11, **options):
     body = sc.FiniteBody(domain, cloud, law, [base], body_force=[2e3, 0, -1e4])
     x = cloud.positions
     on_top = cloud.on_surface() & (x[:, 2] > 0.02 - 1e-9) & (np.hypot(x[:, 0], x[:, 1]) < 0.014)
-    state = sc.Equilibrium(body, tolerance=tolerance, penetration=1e-6, maximum_iterations=400, **options)
+    state = sc.Equilibrium(body, tolerance=tolerance, penetration=1e-6 if tolerance < 1e-6 else 1e-3, maximum_iterations=400, **options)
     ball = sc.Tool.sphere_tip(0.008)
     state.set_contact(ball, np.flatnonzero(on_top))
     status = [state.solve(ball.pose_at([0, 0, height])) for height in (0.019, 0.016)]
@@ -113,7 +113,7 @@ def test_a_press_with_a_law_of_functions(press, given, off):
     law = functions(0.0, bulk_modulus=kappa, **given) if blocks else functions(kappa, **given)
     own_body, own, own_status = pressed(law)
     scale = np.abs(state.coefficients).max()
-    assert scale > 1e-3 and status[1].touching >= 3 and status[1].tool_force[2] > 0.1
+    assert scale > 1e-3 and status[1].touching >= 2 and status[1].tool_force[2] > 0.1
     assert np.abs(own.coefficients - state.coefficients).max() < off * scale
     for mine, theirs in zip(own_status, status):
         assert np.abs(mine.tool_force - theirs.tool_force).max() < off * np.abs(status[1].tool_force).max()
@@ -145,9 +145,10 @@ def test_forces_balance_and_are_the_slope_of_the_energy(press):
 
 
 def test_newton_takes_tangents_of_functions():
-    built_in = pressed(sc.Law.neo_hookean(MU, LOOSE), method="newton")
+    nodes = block_nodes(0.012)
+    built_in = pressed(sc.Law.neo_hookean(MU, LOOSE), nodes=nodes, method="newton")
     for given in ({}, {"tangent": False}):
-        own = pressed(functions(LOOSE, **given), method="newton")
+        own = pressed(functions(LOOSE, **given), nodes=nodes, method="newton")
         assert own[2][1].factorisations == built_in[2][1].factorisations > 2
         assert np.abs(own[1].coefficients - built_in[1].coefficients).max() < 1e-9 * np.abs(built_in[1].coefficients).max()
 
@@ -175,16 +176,16 @@ def test_a_scenario_with_a_law_of_functions(own, tmp_path):
     """Two steps of a run: the files say the same, and the law's name."""
     young, nu = 9 * LOOSE * MU / (3 * LOOSE + MU), 0.3
     text = SMALL.replace("young_modulus = 10000.0", f'law = "neo_hookean"\nyoung_modulus = {young!r}').replace(
-        "step = 0.2", "step = 0.7").replace("poisson_ratio = 0.3", f"poisson_ratio = {nu}")
+        "step = 0.2", "step = 0.5").replace("fine_spacing = 0.003", "fine_spacing = 0.005").replace("poisson_ratio = 0.3", f"poisson_ratio = {nu}")
     scenario = sc.Scenario.from_text(text)
     built_in = sc.Law.neo_hookean(MU, LOOSE)
     law = own(built_in)
     runs = [sc.run(scenario), sc.run(scenario.with_law(built_in)), sc.run(scenario.with_law(law), tmp_path / "run")]
     linear = sc.run(sc.Scenario.from_text(text.replace('law = "neo_hookean"\n', "")).with_law(law))
-    assert runs[0].forces["fz_N"][-1] > 0.05
+    assert runs[0].forces["force_z_N"][-1] > 0.05
     for run in (*runs[1:], linear):
-        for column in ("fx_N", "fy_N", "fz_N", "tx_Nm", "ty_Nm", "tz_Nm"):
-            assert run.forces[column] == pytest.approx(runs[0].forces[column], abs=1e-8 * runs[0].forces["fz_N"].max())
+        for column in ("force_x_N", "force_y_N", "force_z_N", "torque_x_Nm", "torque_y_Nm", "torque_z_Nm"):
+            assert run.forces[column] == pytest.approx(runs[0].forces[column], abs=1e-8 * runs[0].forces["force_z_N"].max())
     surfaces = [run.session.surface() for run in runs]
     for surface in surfaces[1:]:
         assert surface["displacement"] == pytest.approx(surfaces[0]["displacement"], abs=1e-9 * 0.02)
@@ -195,9 +196,9 @@ def test_a_scenario_with_a_law_of_functions(own, tmp_path):
         import pickle
 
         pickle.dumps(scenario.with_law(law))
-    cut = text + "\n[tearing]\nenabled = true\n" if "[tearing]" not in text else text
-    with pytest.raises(sc.InputError, match='"functions"|toughness'):
-        sc.run(sc.Scenario.from_text(cut.replace("[material]", "[material]\ntoughness = 5.0")).with_law(law))
+    rubbing = text.replace('law = "neo_hookean"\n', "") + '\n[contact]\ncondition = "frictional"\nfriction = 0.3\n'
+    with pytest.raises(sc.InputError, match='contact.condition = "frictional" does not go with material.law = "functions"'):
+        sc.run(sc.Scenario.from_text(rubbing).with_law(law))
 
 
 def test_an_anisotropic_law_of_functions():
@@ -285,7 +286,7 @@ def test_errors_of_the_functions_come_out_and_the_state_stays(threads):
             state = sc.Equilibrium(body)
             state.solve(load_factor=0.5)
             before, forces = state.coefficients, state.constraint_forces
-            after[0] = len(calls) + 30
+            after[0] = len(calls) + 2
             with pytest.raises(kind, match=words):
                 state.solve(load_factor=4.0)
             assert np.array_equal(state.coefficients, before) and np.array_equal(state.constraint_forces, forces)
@@ -307,9 +308,9 @@ def test_other_threads_run_and_a_body_is_not_asked_from_within():
 
     def energy(f):
         seen.append(threading.get_ident())
-        if bodies and bodies[0]() is not None:
+        for asked in bodies:
             with pytest.raises(sc.InputError, match="within a function of its own law"):
-                bodies[0]().evaluate(np.zeros((len(nodes), 3)))
+                asked.evaluate(np.zeros((len(nodes), 3)))
         return energy_of(LOOSE)(f)
 
     law = sc.Law.of_functions(energy, stress_of(LOOSE), tangent_of(LOOSE))
@@ -325,11 +326,13 @@ def test_other_threads_run_and_a_body_is_not_asked_from_within():
     for worker in workers:
         worker.join(timeout=300)
     assert results[0] is not None and results == [results[0]] * 3 and len(set(seen)) >= 3
-    bodies.append(weakref.ref(law))  # nothing but the body keeps the law's functions
-    bodies[0] = lambda: body
-    body.evaluate(np.zeros((len(nodes), 3)))
-    kept = weakref.ref(energy)
+    bodies.append(body)
+    for count in (1, 2):  # the function is called by the library's own threads too
+        sc.set_thread_count(count)
+        body.evaluate(np.zeros((len(nodes), 3)))
+    sc.set_thread_count(1)
     bodies.clear()
+    kept = weakref.ref(energy)
     del law, body, energy, solve, workers
     gc.collect()
     assert kept() is None
