@@ -145,7 +145,7 @@ std::shared_ptr<Law> ogden(const Doubles& terms, double bulk_modulus) {
 }
 
 std::shared_ptr<Law> holzapfel(double shear_modulus, double fibre_modulus, double fibre_exponent,
-                               const Doubles& directions, double dispersion, double bulk_modulus) {
+                               const Doubles& directions, double bulk_modulus, double dispersion) {
   solvers::HolzapfelLaw law;
   law.shear_modulus = shear_modulus;
   law.fibre_modulus = fibre_modulus;
@@ -207,7 +207,7 @@ void bind_built_in(py::class_<Law, std::shared_ptr<Law>>& law) {
                   "J^(-1/3). terms: (1 to 3, 2) of mu_p, Pa, and alpha_p.")
       .def_static(
           "holzapfel_gasser_ogden", &holzapfel, "shear_modulus"_a, "fibre_modulus"_a, "fibre_exponent"_a,
-          "directions"_a, "dispersion"_a = 0.0, "bulk_modulus"_a,
+          "directions"_a, "bulk_modulus"_a, "dispersion"_a = 0.0,
           "The neo-Hookean law with one or two families of fibres, which bear tension alone. fibre_modulus: k1, "
           "Pa. fibre_exponent: k2. directions: (1 or 2, 3), or (3,). dispersion: 0 to 1/3.");
 }

@@ -551,7 +551,7 @@ class Law:
         terms: (1 to 3, 2) of mu_p, Pa, and alpha_p.
         """
     @staticmethod
-    def holzapfel_gasser_ogden(shear_modulus: float, fibre_modulus: float, fibre_exponent: float, directions: npt.ArrayLike, dispersion: float = 0.0, bulk_modulus: float) -> Law:
+    def holzapfel_gasser_ogden(shear_modulus: float, fibre_modulus: float, fibre_exponent: float, directions: npt.ArrayLike, bulk_modulus: float, dispersion: float = 0.0) -> Law:
         """The neo-Hookean law with one or two families of fibres, which bear tension alone. fibre_modulus: k1, Pa.
         fibre_exponent: k2. directions: (1 or 2, 3), or (3,). dispersion: 0 to 1/3.
         """
