@@ -23,6 +23,7 @@ BUILD = Path(os.environ["SPHERECUT_BUILD"])
 PROGRAM = Path(os.environ["SPHERECUT_COMMAND"])
 STANDS_FOR = {"STUDY.toml": "examples/studies/press_spacing.toml", "SCENARIO.toml": "scenarios/block_punch.toml", "SCENARIO": "scenarios/block_punch.toml"}
 S = r"(?:build/release/)?spherecut"
+SMALL = "scenarios/small.toml"  # in the scratch copy: block_punch on fewer nodes
 
 # How a command is tried. The first entry whose pattern is the whole command counts.
 #   run          in a scratch copy of the repository, after what the page has before it; it must end with 0
@@ -73,11 +74,11 @@ HOW = [
     (rf"{S} run /usr/share/spherecut/scenarios/liver_cut\.toml --out out/demo", "run_coarse", {"/usr/share/spherecut/": ""}),
     (rf"{S} serve --open", "serve"),
     (rf"{S} serve \[SCENARIO\.toml\].*", "serve"),
-    (rf"{S} haptics SCENARIO\.toml --duration S --out DIR", "run_short", {"--duration S": "--virtual --duration 0.3"}),
-    (rf"{S} haptics SCENARIO\.toml --duration 60 --out DIR", "run_short", {"--duration 60": "--virtual --duration 0.3"}),
+    (rf"{S} haptics SCENARIO\.toml --duration S --out DIR", "run_short", {"SCENARIO.toml": SMALL, "--duration S": "--virtual --duration 0.3"}),
+    (rf"{S} haptics SCENARIO\.toml --duration 60 --out DIR", "run_short", {"SCENARIO.toml": SMALL, "--duration 60": "--virtual --duration 0.3"}),
     (rf"{S} haptics --replay DIR/haptic\.recording --out OTHER", "run"),
     (rf"{S} haptics --replay FILE", "run_short", {
-        "haptics --replay FILE": "haptics SCENARIO.toml --virtual --duration 0.3 --out made && spherecut haptics --replay made/haptic.recording --out again"}),
+        "haptics --replay FILE": f"haptics {SMALL} --virtual --duration 0.3 --out made && spherecut haptics --replay made/haptic.recording --out again"}),
     (r"spherecut (?:run|check|sweep|haptics|serve)", "help"),
     (rf"{S} sweep examples/studies/press_spacing\.toml --out out/\w+(?: --slurm)?", "run_study"),
     (rf"{S} sweep STUDY\.toml --out FOLDER -- .*", "run_study"),
@@ -93,7 +94,7 @@ HOW = [
     (r"build/release/tests/haptic_bridge_client/haptic_bridge_client 27510 60", "elsewhere", "tests/CMakeLists.txt", "SPHERECUT_BRIDGE_CLIENT"),
     (r"cmake -S examples/haptic_bridge_client -B client && cmake --build client", "run"),
     (r"cmake -S examples/devices -B devices && cmake --build devices", "run"),
-    (rf"{S} haptics SCENARIO\.toml --bench --out DIR", "run_short", {"--bench": "--bench --virtual", "DIR": "BENCH"}),
+    (rf"{S} haptics SCENARIO\.toml --bench --out DIR", "run_short", {"SCENARIO.toml": SMALL, "--bench": "--bench --virtual", "DIR": "BENCH"}),
     (r"cmake --preset release -DSPHERECUT_BUILD_REFERENCES=ON", "targets"),
     (r"ninja -C build/release spherecut_reference_getfem", "targets"),
     (r"build/release/spherecut_reference_getfem 0\.\d+ experiments/hemisphere_palpation/reference_nu\d+\.csv", "targets"),
@@ -239,6 +240,7 @@ def scratch_copy(folder: Path) -> Path:
     """What commands of a reader find in their clone, and the program on the PATH."""
     for name in ["scenarios", "examples", "docs"]:
         shutil.copytree(SOURCE / name, folder / name, ignore=shutil.ignore_patterns("images", "__pycache__"))
+    (folder / SMALL).write_text(coarser((folder / "scenarios" / "block_punch.toml").read_text()))
     (folder / "build").mkdir()
     (folder / "build" / "release").symlink_to(BUILD)
     return folder
@@ -318,7 +320,7 @@ def serve(text: str, folder: Path) -> None:
         (folder / "DIR").mkdir(exist_ok=True)
     else:
         text += " SCENARIO.toml --port 0"
-    command = [str(PROGRAM)] + words(text.replace("SCENARIO.toml", "scenarios/block_punch.toml"))[1:]
+    command = [str(PROGRAM)] + words(text.replace("SCENARIO.toml", SMALL))[1:]
     environment = os.environ | {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "OPENBLAS_NUM_THREADS": "1"}
     with subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as server:
         said, url = [], None
