@@ -81,7 +81,7 @@ class ArrayFunction {
   [[nodiscard]] Doubles called(std::span<const Matrix3> gradients, bool one) const {
     const InLawFunction inside; // until it returns
     const py::object value = (*function_)(array_of_gradients(gradients, one));
-    const Doubles array = Doubles::ensure(value);
+    Doubles array = Doubles::ensure(value);
     if (!array) {
       PyErr_Clear();
       throw InputError(fmt::format("{}: {}; allowed: an array of numbers", name_, std::string(py::repr(value))));
