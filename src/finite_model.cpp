@@ -54,7 +54,7 @@ Hindrance hindrance_of(const Scenario& scenario) {
 
 std::function<solvers::FibreFrame(const Vector3&)> fibre_field(const LawSettings& law) {
   const auto* fibres = std::get_if<solvers::HolzapfelLaw>(&law.spec.law);
-  if (fibres == nullptr || fibres->same_everywhere)
+  if (law.own || fibres == nullptr || fibres->same_everywhere)
     return nullptr;
   return [law](const Vector3& x) { return law.fibres_at(x); };
 }
@@ -87,8 +87,7 @@ void require_run(const Scenario& scenario) {
     return;
   throw InputError(fmt::format("{}:{}: {} does not go with material.law = \"{}\"; possible with it: fixed regions, "
                                "gravity, and a tool that presses without friction, by method galerkin",
-                               scenario.file.string(), hindrance.line, hindrance.what,
-                               solvers::law_name(scenario.law.spec)));
+                               scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
 }
 
 bool can_run(const Scenario& scenario) {
@@ -97,8 +96,7 @@ bool can_run(const Scenario& scenario) {
 
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                          const BodyModel& nodes, bool touched)
-    : body_(checked_problem(scenario, domain, nodes), solvers::make_law(scenario.law.spec), {},
-            fibre_field(scenario.law)),
+    : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), {}, fibre_field(scenario.law)),
       equilibrium_(body_, equilibrium_options()) {
   if (!touched)
     return;

@@ -104,12 +104,26 @@ LawSettings material_law(const Section& material, Offences& offences) {
   return settings;
 }
 
+std::shared_ptr<const solvers::Law> law_of(const LawSettings& law) {
+  return law.own ? law.own : solvers::make_law(law.spec);
+}
+
+std::string name_of(const LawSettings& law) {
+  return law.own ? law.own->name() : solvers::law_name(law.spec);
+}
+
+solvers::ElasticConstants moduli_of(const LawSettings& law) {
+  return law.own ? law.own->small_strain() : solvers::small_strain_moduli(law.spec);
+}
+
 std::string law_text(const LawSettings& law) {
-  const solvers::ElasticConstants moduli = solvers::small_strain_moduli(law.spec);
+  const solvers::ElasticConstants moduli = moduli_of(law);
   std::string text = fmt::format("material: law {}, at small strain E = {:.4g} Pa, nu = {:.4g} (shear modulus {:.4g} "
                                  "Pa, bulk modulus {:.4g} Pa)",
-                                 solvers::law_name(law.spec), moduli.young_modulus(), moduli.poisson_ratio(),
-                                 moduli.shear_modulus, moduli.bulk_modulus);
+                                 name_of(law), moduli.young_modulus(), moduli.poisson_ratio(), moduli.shear_modulus,
+                                 moduli.bulk_modulus);
+  if (law.own)
+    return text;
   if (const auto* fibres = std::get_if<solvers::HolzapfelLaw>(&law.spec.law))
     text += fmt::format("\n  {} famil{} of fibres, which add in tension alone: {:.4g} Pa along them at small strain",
                         fibres->families, fibres->families == 1 ? "y" : "ies", solvers::fibre_stiffness(*fibres));
@@ -124,14 +138,14 @@ std::string law_text(const LawSettings& law) {
 }
 
 bool is_nonlinear(const LawSettings& law) {
-  return !std::holds_alternative<solvers::LinearLaw>(law.spec.law);
+  return law.own || !std::holds_alternative<solvers::LinearLaw>(law.spec.law);
 }
 
 void require_linear(const std::filesystem::path& file, const LawSettings& law) {
   if (is_nonlinear(law))
     throw InputError(fmt::format("{}:{}: material.law = \"{}\": runs off line alone compute it; possible here: "
                                  "material.law = \"linear\" without material.prony",
-                                 file.string(), law.line, solvers::law_name(law.spec)));
+                                 file.string(), law.line, name_of(law)));
   if (!law.spec.prony.empty())
     throw InputError(fmt::format("{}:{}: material.prony: it can be checked, but no body is computed with it; possible: "
                                  "a material without it",

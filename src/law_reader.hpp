@@ -10,6 +10,12 @@ namespace spherecut::app {
 
 LawSettings material_law(const Section& material, Offences& offences);
 
+/// The program's own, or the one that the file says; its name; its moduli at rest, Pa. The first throws InputError as
+/// solvers::check_law.
+std::shared_ptr<const solvers::Law> law_of(const LawSettings& law);
+std::string name_of(const LawSettings& law);
+solvers::ElasticConstants moduli_of(const LawSettings& law);
+
 /// Name, moduli at small strain, of a viscoelastic law those after a long time too, and what fibres add; several lines.
 std::string law_text(const LawSettings& law);
 

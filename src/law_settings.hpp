@@ -3,6 +3,7 @@
 
 #include "solvers/elasticity/law.hpp"
 
+#include <memory>
 #include <variant>
 #include <vector>
 
@@ -23,6 +24,8 @@ struct LawSettings {
   solvers::LawSpec spec;
   std::vector<FibreFamily> fibres; // of the families
   int line = 0;                    // of the scenario file
+  /// A program's own, in place of spec and fibres; null: theirs.
+  std::shared_ptr<const solvers::Law> own;
   /// Directions at a place of the given shape; zero, no fibre, on the line or the point that radial ones run away from.
   [[nodiscard]] solvers::FibreFrame fibres_at(const Vector3& x) const;
 };

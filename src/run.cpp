@@ -46,7 +46,7 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     text += session.body() == nullptr
                 ? fmt::format("  {} nodes, law {}, {} iterations a step, least volume ratio {:.3g}, largest residual "
                               "{:.1e}\n",
-                              peak.nodes, solvers::law_name(session.scenario().law.spec), median(found.iterations),
+                              peak.nodes, name_of(session.scenario().law), median(found.iterations),
                               found.least_jacobian, found.largest_residual)
                 : fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
                               solvers::to_string(session.scenario().method.method),

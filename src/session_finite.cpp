@@ -1,5 +1,6 @@
 // Steps of a session whose law is not linear: its body is one at finite strain, on nodes that stay.
 #include "solvers/bank_pairs.hpp"
+#include "src/law_reader.hpp"
 #include "src/session.hpp"
 #include "src/stage_timer.hpp"
 #include "topology/errors.hpp"
@@ -37,7 +38,7 @@ void Session::make_finite() {
   finite_ = std::make_unique<FiniteModel>(scenario_, organ_.domain, model_, touches());
   const solvers::SprinkleReport& report = model_.sprinkling.report;
   say_(fmt::format("{} nodes, {} of them on the surface, {} fixed; law {}", model_.sprinkling.nodes.size(),
-                   report.surface_nodes + report.edge_nodes, finite_->held(), solvers::law_name(scenario_.law.spec)));
+                   report.surface_nodes + report.edge_nodes, finite_->held(), name_of(scenario_.law)));
 }
 
 FiniteStep Session::solve_finite(double time, const std::optional<topology::ToolPose>& pose) {

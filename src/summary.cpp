@@ -33,7 +33,7 @@ OrderedJson inputs(const Session& session) {
   out["scenario"] = scenario.file.string();
   out["scenario_text"] = scenario.text;
   out["method"] = solvers::to_string(scenario.method.method);
-  out["law"] = solvers::law_name(scenario.law.spec);
+  out["law"] = name_of(scenario.law);
   out["young_modulus_Pa"] = scenario.material.young_modulus;
   out["poisson_ratio"] = scenario.material.poisson_ratio;
   out["density_kg_m3"] = scenario.material.density;
@@ -100,7 +100,7 @@ OrderedJson solver(const Session& session, const RunFindings& findings) {
   }
   if (is_nonlinear(session.scenario().law))
     out["finite_strain"] = {
-        {"law", solvers::law_name(session.scenario().law.spec)},
+        {"law", name_of(session.scenario().law)},
         {"median_iterations", median(findings.iterations)},
         {"most_iterations",
          findings.iterations.empty() ? 0 : *std::max_element(findings.iterations.begin(), findings.iterations.end())},

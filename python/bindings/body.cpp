@@ -1,6 +1,6 @@
 // Bodies: a boundary value problem, discretised and factored; its fields.
 #include "python/bindings/floors.hpp"
-#include "python/bindings/shared.hpp"
+#include "python/bindings/held.hpp"
 #include "src/cut_output.hpp"
 #include "topology/errors.hpp"
 
@@ -14,22 +14,6 @@ namespace {
 using namespace py::literals;
 using solvers::Field;
 using solvers::Material;
-
-/// Surface that is held.
-struct Held {
-  std::shared_ptr<app::FixedRegion> region; // or a function
-  std::optional<Kept> function;
-  std::array<bool, 3> components{true, true, true};
-  Vector3 value = Vector3::Zero(); // m, where there is no field
-  VectorFunction field;
-  [[nodiscard]] bool holds(const Vector3& x, const Vector3& normal) const {
-    if (region)
-      return region->holds(x);
-    const py::gil_scoped_acquire acquire;
-    return (**function)(array_of(x), array_of(normal)).cast<bool>();
-  }
-  [[nodiscard]] Vector3 at(const Vector3& x) const { return field ? field(x) : value; }
-};
 
 Held held_from(const py::object& region, const std::array<bool, 3>& components, const py::object& displacement) {
   Held held;
@@ -94,23 +78,6 @@ void hold_nodes(const std::vector<Held>& all, solvers::Problem& problem) {
       throw InputError(fmt::format("held[{}]: no surface node lies in its region; allowed: at least one", k));
 }
 
-void hold(const std::vector<Held>& all, solvers::Problem& problem) {
-  hold_nodes(all, problem);
-  const auto holds = [all](const Vector3& x, const Vector3& normal) {
-    return std::any_of(all.begin(), all.end(), [&](const Held& held) { return held.holds(x, normal); });
-  };
-  if (std::all_of(all.begin(), all.end(), [](const Held& h) { return h.components == std::array{true, true, true}; }))
-    problem.prescribed_region = holds;
-  else
-    problem.prescribed_region = [all](const Vector3& x, const Vector3& normal, int axis) {
-      return std::any_of(all.begin(), all.end(), [&](const Held& held) {
-        return held.components[static_cast<std::size_t>(axis)] && held.holds(x, normal);
-      });
-    };
-  if (std::any_of(all.begin(), all.end(), [](const Held& held) { return static_cast<bool>(held.field); }))
-    problem.prescribed_field = [all](const Vector3& x) { return first_displacement(all, x); };
-}
-
 std::shared_ptr<Body> body_from(std::shared_ptr<topology::Domain> domain, const solvers::NodeCloud& nodes,
                                 const Material& material, const std::vector<Held>& held, const py::object& body_force,
                                 const py::object& traction, const py::object& lip_traction,
@@ -123,9 +90,7 @@ std::shared_ptr<Body> body_from(std::shared_ptr<topology::Domain> domain, const 
   problem.incision = std::move(incision);
   problem.nodes = nodes;
   problem.material = material;
-  problem.loads.body_force = vector_function(body_force, "body_force");
-  problem.loads.traction = boundary_function(traction, "traction");
-  problem.loads.lip_traction = boundary_function(lip_traction, "lip_traction");
+  problem.loads = loads_from(body_force, traction, lip_traction);
   if (initial_strain)
     problem.loads.initial_strain = matrix_from(*initial_strain, "initial_strain");
   if (touched_from)
@@ -331,6 +296,38 @@ void bind_body_class(py::module_& module) {
 }
 
 } // namespace
+
+bool Held::holds(const Vector3& x, const Vector3& normal) const {
+  if (region)
+    return region->holds(x);
+  const py::gil_scoped_acquire acquire;
+  return (**function)(array_of(x), array_of(normal)).cast<bool>();
+}
+
+void hold(const std::vector<Held>& all, solvers::Problem& problem) {
+  hold_nodes(all, problem);
+  const auto holds = [all](const Vector3& x, const Vector3& normal) {
+    return std::any_of(all.begin(), all.end(), [&](const Held& held) { return held.holds(x, normal); });
+  };
+  if (std::all_of(all.begin(), all.end(), [](const Held& h) { return h.components == std::array{true, true, true}; }))
+    problem.prescribed_region = holds;
+  else
+    problem.prescribed_region = [all](const Vector3& x, const Vector3& normal, int axis) {
+      return std::any_of(all.begin(), all.end(), [&](const Held& held) {
+        return held.components[static_cast<std::size_t>(axis)] && held.holds(x, normal);
+      });
+    };
+  if (std::any_of(all.begin(), all.end(), [](const Held& held) { return static_cast<bool>(held.field); }))
+    problem.prescribed_field = [all](const Vector3& x) { return first_displacement(all, x); };
+}
+
+solvers::Loads loads_from(const py::object& body_force, const py::object& traction, const py::object& lip_traction) {
+  solvers::Loads loads;
+  loads.body_force = vector_function(body_force, "body_force");
+  loads.traction = boundary_function(traction, "traction");
+  loads.lip_traction = boundary_function(lip_traction, "lip_traction");
+  return loads;
+}
 
 void PointValues::add(const solvers::PointState& state) {
   displacement.push_back(state.displacement);

@@ -14,6 +14,8 @@ void bind_incision(pybind11::module_& module);
 void bind_wound(pybind11::module_& module);
 void bind_nodes(pybind11::module_& module);
 void bind_body(pybind11::module_& module);
+void bind_law(pybind11::module_& module);
+void bind_finite(pybind11::module_& module);
 void bind_contact(pybind11::module_& module);
 void bind_fracture(pybind11::module_& module);
 void bind_session(pybind11::module_& module);

@@ -61,6 +61,8 @@ PYBIND11_MODULE(_core, module) {
   bindings::bind_wound(module);
   bindings::bind_nodes(module);
   bindings::bind_body(module);
+  bindings::bind_law(module);
+  bindings::bind_finite(module);
   bindings::bind_contact(module);
   bindings::bind_fracture(module);
   bindings::bind_session(module);

@@ -149,8 +149,24 @@ void bind_scenario(py::module_& module) {
           "The same scenario with another toughness, J/m2: a number, or a function of a point of the body at rest, "
           "(3,), m. Blade and tears meet it in every session; a function is asked on the threads of the session. Its "
           "text stays what it was, and it cannot be pickled.")
+      .def(
+          "with_law",
+          [](const Scenario& self, std::shared_ptr<solvers::Law> law) {
+            auto copy = std::make_shared<Scenario>(self);
+            const solvers::ElasticConstants moduli = law->small_strain();
+            copy->material.young_modulus = moduli.young_modulus();
+            copy->material.poisson_ratio = moduli.poisson_ratio();
+            copy->law.own = std::move(law);
+            return copy;
+          },
+          "law"_a,
+          "The same scenario with another law, a Law, at finite strain: sessions press it without friction, under its "
+          "weight, and raise InputError for a scenario that asks for more. Its text stays what it was, and it cannot "
+          "be pickled.")
       .def(py::pickle(
           [](const Scenario& self) {
+            if (self.law.own)
+              throw InputError("pickle: a scenario with a law of its own; allowed: one as its file has it");
             if (self.toughness_function)
               throw InputError("pickle: a scenario with a toughness of its own; allowed: one as its file has it");
             return py::make_tuple(self.text, self.file.string(), self.nodes.random_seed);

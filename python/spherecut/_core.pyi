@@ -532,6 +532,190 @@ class Body:
         and seconds of supports, assembly and factor.
         """
 
+class Law:
+    """A hyperelastic law: strain energy and stress as functions of the deformation gradient F, (3, 3), at finite
+    strain. The built-in ones raise InputError for constants with which they are not stable.
+    """
+    @staticmethod
+    def linear(shear_modulus: float, bulk_modulus: float) -> Law:
+        """Small strain: W = mu dev e : dev e + kappa/2 (tr e)^2. Moduli: Pa."""
+    @staticmethod
+    def neo_hookean(shear_modulus: float, bulk_modulus: float) -> Law:
+        """W = mu/2 (J^(-2/3) tr F^T F - 3) + U(J), U = kappa/4 (J^2 - 1 - 2 ln J). Moduli: Pa."""
+    @staticmethod
+    def yeoh(c1: float, c2: float, c3: float, bulk_modulus: float) -> Law:
+        """W = c1 (I - 3) + c2 (I - 3)^2 + c3 (I - 3)^3 + U(J), I = J^(-2/3) tr F^T F. All in Pa."""
+    @staticmethod
+    def ogden(terms: npt.ArrayLike, bulk_modulus: float) -> Law:
+        """W = sum of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + U(J), l the stretches times J^(-1/3).
+        terms: (1 to 3, 2) of mu_p, Pa, and alpha_p.
+        """
+    @staticmethod
+    def holzapfel_gasser_ogden(shear_modulus: float, fibre_modulus: float, fibre_exponent: float, directions: npt.ArrayLike, bulk_modulus: float, dispersion: float = 0.0) -> Law:
+        """The neo-Hookean law with one or two families of fibres, which bear tension alone. fibre_modulus: k1, Pa.
+        fibre_exponent: k2. directions: (1 or 2, 3), or (3,). dispersion: 0 to 1/3.
+        """
+    @staticmethod
+    def of_functions(energy: Any, stress: Any = None, tangent: Any = None, *, bulk_modulus: float = 0.0, name: str = 'functions', many: bool = True) -> Law:
+        """A law from functions of F, (n, 3, 3), det F > 0. energy: W, (n,), J/m3; inf where the law cannot be asked.
+        stress: first Piola stress dW/dF, (n, 3, 3), Pa. tangent: dP_ij/dF_kl, (n, 3, 3, 3, 3), Pa. Without tangent
+        it is made by central differences of the stress, without stress that by differences of the energy, of fourth
+        order in steps of 1e-3: about 1e-11 of the shear modulus off, and 1e-8 where differences are taken of
+        differences. many=False: the functions get one F, (3, 3), at a time. bulk_modulus: kappa, Pa; above 0, U(J)
+        = kappa/4 (J^2 - 1 - 2 ln J) is added, and near nu = 0.5 bodies take the pressure of blocks. Functions are
+        called with the interpreter's lock, on any thread; what they raise comes out. Raises InputError where they
+        do not fit each other at six strained states, or F = 1 bears a stress; later for values that are not finite,
+        with F and the place in the body.
+        """
+    def energy(self, gradients: npt.ArrayLike) -> npt.NDArray[Any]:
+        """W, (n,), J/m3 of the body at rest, at F, (n, 3, 3) or (3, 3); inf where det F <= 0."""
+    def stress(self, gradients: npt.ArrayLike) -> npt.NDArray[Any]:
+        """First Piola stress, (n, 3, 3), Pa, at F, (n, 3, 3) or (3, 3)."""
+    def tangent(self, gradients: npt.ArrayLike) -> npt.NDArray[Any]:
+        """dP_ij/dF_kl, (n, 3, 3, 3, 3), Pa, at F, (n, 3, 3) or (3, 3)."""
+    @property
+    def shear_modulus(self) -> float:
+        """mu at rest, Pa; without fibres."""
+    @property
+    def bulk_modulus(self) -> float:
+        """kappa at rest, Pa."""
+    @property
+    def young_modulus(self) -> float:
+        """E at rest, Pa."""
+    @property
+    def poisson_ratio(self) -> float:
+        """nu at rest."""
+    @property
+    def name(self) -> str:
+        """As in a scenario, or as given."""
+
+class FiniteValues:
+    """What a body at finite strain is at n points; the arrays are its memory."""
+    @property
+    def displacement(self) -> npt.NDArray[Any]:
+        """(n, 3), m."""
+    @property
+    def deformation(self) -> npt.NDArray[Any]:
+        """(n, 3, 3): F."""
+    @property
+    def first_piola(self) -> npt.NDArray[Any]:
+        """(n, 3, 3), Pa: P = dW/dF."""
+    @property
+    def cauchy(self) -> npt.NDArray[Any]:
+        """(n, 3, 3), Pa: P F^T / J."""
+    @property
+    def jacobian(self) -> npt.NDArray[Any]:
+        """(n,): J = det F."""
+    @property
+    def energy(self) -> npt.NDArray[Any]:
+        """(n,), J/m3 of the body at rest: W."""
+
+class FiniteBody:
+    """A body of a Law at finite strain. Its states are coefficients, (n, 3), m, of which displacements are sums; an
+    Equilibrium finds them. One thread works with it at a time; others wait.
+    """
+    def __init__(self, domain: Domain, nodes: Nodes, law: Law, held: Sequence[Held], *, body_force: Any = None, traction: Any = None, lip_traction: Any = None, incision: Optional[Incision] = None, sight: str = 'enriched', support_radius: float = 1.75, cell_size: float = 0.75, quadrature: int = 2, pointwise_modulus: float = 2.5) -> None:
+        """held: list of Held. body_force: N per m3 of the body at rest, (3,) or a function of x. traction: Pa on the
+        surface at rest, (3,) or a function of x and normal; lip_traction: the same on the faces of the cut. Loads
+        keep their direction. sight: 'visibility', 'diffraction' or 'enriched'. support_radius, cell_size: in
+        spacings. quadrature: rule of a cell, 1 to 3. pointwise_modulus: of the part of the pressure that is taken
+        point by point, over the shear modulus. Raises InputError and NumericalError as Body.
+        """
+    def evaluate(self, coefficients: npt.ArrayLike) -> tuple[float, npt.NDArray[Any]]:
+        """Strain energy, J, and internal forces, (n, 3), N, its slope by the coefficients; inf and zero where the law
+        cannot be asked.
+        """
+    def at(self, points: npt.ArrayLike, coefficients: npt.ArrayLike) -> FiniteValues:
+        """FiniteValues at points of the body at rest, (n, 3), m. Raises InputError for a point that no sphere covers."""
+    def nodal_displacements(self, coefficients: npt.ArrayLike) -> npt.NDArray[Any]:
+        """(n, 3), m, at the nodes."""
+    @property
+    def loads(self) -> npt.NDArray[Any]:
+        """(n, 3), N: forces of the loads on the coefficients."""
+    @property
+    def prescribed(self) -> npt.NDArray[Any]:
+        """(k, 3), m: the given displacement of every entry that is held; see held_nodes."""
+    @property
+    def held_nodes(self) -> npt.NDArray[Any]:
+        """(k,): the node of every entry that is held."""
+    @property
+    def nodes(self) -> Nodes:
+        """Nodes (a copy)."""
+    @property
+    def law(self) -> Law:
+        """Law."""
+    @property
+    def pointwise_share(self) -> float:
+        """Share of the volumetric energy that is taken point by point; 1: no blocks."""
+    @property
+    def volume(self) -> float:
+        """m3, of the points of integration."""
+
+class EquilibriumStatus:
+    """How an equilibrium was found."""
+    @property
+    def iterations(self) -> int:
+        """Of all steps."""
+    @property
+    def evaluations(self) -> int:
+        """Of the energy."""
+    @property
+    def steps(self) -> int:
+        """Parts that the way was gone in."""
+    @property
+    def halvings(self) -> int:
+        """Of steps."""
+    @property
+    def factorisations(self) -> int:
+        """Of the tangent."""
+    @property
+    def residual(self) -> float:
+        """Norm of the unbalanced forces over the acting ones."""
+    @property
+    def least_jacobian(self) -> float:
+        """Least det F of all points."""
+    @property
+    def energy(self) -> float:
+        """J, strain energy."""
+    @property
+    def touching(self) -> int:
+        """Nodes that touch the tool."""
+    @property
+    def penetration(self) -> float:
+        """Of the tool, in spacings, left over."""
+    @property
+    def tool_force(self) -> npt.NDArray[Any]:
+        """(3,), N, of the body on the tool."""
+    @property
+    def tool_torque(self) -> npt.NDArray[Any]:
+        """(3,), N m, of the same about the tool's point."""
+
+class Equilibrium:
+    """Equilibria of a FiniteBody along a way of loads, given displacements and poses of a tool."""
+    def __init__(self, body: FiniteBody, *, method: str = 'quasi_newton', tolerance: float = 0.001, maximum_iterations: int = 100, halvings: int = 6, least_jacobian: float = 0.01, penetration: float = 0.001, fall_back: bool = True) -> None:
+        """method: 'quasi_newton' or 'newton'. tolerance: of the unbalanced forces over the acting ones.
+        maximum_iterations: of a step, which is then halved. halvings: of a step, before Newton's method is asked,
+        if fall_back. least_jacobian: where a search stops short. penetration: of the tool, in spacings.
+        """
+    def set_contact(self, tool: Tool, nodes: npt.NDArray[Any]) -> None:
+        """The tool that presses without friction, and the surface nodes, (m,), it may touch."""
+    def solve(self, pose: Optional[ToolPose] = None, load_factor: float = 1.0, prescribed: Optional[npt.ArrayLike] = None) -> EquilibriumStatus:
+        """Goes from the present state to equilibrium. pose: of the tool. load_factor: of the body's loads. prescribed:
+        (k, 3), m, of every entry that is held; None: the body's own. Raises NumericalError where there is none to
+        be found, and what a function of the law raises: the state is then what it was before.
+        """
+    @property
+    def coefficients(self) -> npt.NDArray[Any]:
+        """(n, 3), m, of the state (a copy)."""
+    def set_coefficients(self, coefficients: npt.ArrayLike) -> None:
+        """Begins from these, (n, 3), m."""
+    @property
+    def constraint_forces(self) -> npt.NDArray[Any]:
+        """(k, 3), N, on the body, of every entry that is held."""
+    @property
+    def contact_forces(self) -> npt.NDArray[Any]:
+        """(m, 3), N, on the body at every node that the tool may touch; empty without a tool."""
+
 class ContactPatch:
     """A body seen from nodes that a tool may touch: displacement = base + compliance * force."""
     @property
@@ -773,6 +957,11 @@ class Scenario:
         """The same scenario with another toughness, J/m2: a number, or a function of a point of the body at rest,
         (3,), m. Blade and tears meet it in every session; a function is asked on the threads of the session. Its
         text stays what it was, and it cannot be pickled.
+        """
+    def with_law(self, law: Law) -> Scenario:
+        """The same scenario with another law, a Law, at finite strain: sessions press it without friction, under its
+        weight, and raise InputError for a scenario that asks for more. Its text stays what it was, and it cannot be
+        pickled.
         """
 
 class BladePose:

@@ -134,14 +134,24 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
   const std::vector<Vector3> reactions = reactions_;
   EquilibriumStatus status;
   least_seen_ = last_residual_ = 1;
-  if (!go(target, options_.halvings, status)) {
-    const double whole = motion(begin, target).norm();
-    const double reached = whole > 0 ? motion(begin, state_).norm() / whole : 0;
+  const auto go_back = [&] {
     state_ = begin;
     before_ = before;
     has_before_ = had_before;
     reactions_ = reactions;
     memory_.clear();
+  };
+  bool found = false;
+  try {
+    found = go(target, options_.halvings, status);
+  } catch (...) { // of a law that is a function, or an interruption
+    go_back();
+    throw;
+  }
+  if (!found) {
+    const double whole = motion(begin, target).norm();
+    const double reached = whole > 0 ? motion(begin, state_).norm() / whole : 0;
+    go_back();
     throw NumericalError(fmt::format(
         "no equilibrium found: {:.3g} of the step was reached in {} iterations and {} halvings; the unbalanced force "
         "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}{}; the condition of the rest "

@@ -59,8 +59,9 @@ class Equilibrium {
   void set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates);
 
   /// Goes from the present state to equilibrium with the loading. Throws NumericalError in words when there is none to
-  /// be found (with residual, least J, the part of the step reached and the condition of the rest operator): the state
-  /// is then what it was before. Throws InputError for a loading that does not fit the body.
+  /// be found (with residual, least J, the part of the step reached and the condition of the rest operator), InputError
+  /// for a loading that does not fit the body, and what a law of functions throws: the state is then what it was
+  /// before.
   EquilibriumStatus solve(const FiniteLoading& loading);
 
   [[nodiscard]] const VectorX& coefficients() const { return state_.coefficients; } // m, 3 a node

@@ -1,5 +1,6 @@
 #include "solvers/finite/finite_body.hpp"
 
+#include "solvers/elasticity/function_law.hpp"
 #include "solvers/finite/finite_tangent.hpp"
 #include "solvers/finite/held_shares.hpp"
 #include "solvers/finite/point_kernels.hpp"
@@ -208,6 +209,13 @@ double FiniteBody::deform(const VectorX& coefficients) const {
   return *std::min_element(work.chunk_least.begin(), work.chunk_least.end());
 }
 
+// Of a point that weighs something, counted from the first one of a group on.
+const Vector3& FiniteBody::place_of(int group, std::size_t point) const {
+  for (; point >= static_cast<std::size_t>(table_.count[group]); ++group)
+    point -= table_.count[group];
+  return table_.positions[static_cast<std::size_t>(point_lanes) * group + point];
+}
+
 void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const {
   Work& work = *work_;
   out.least_jacobian = deform(coefficients);
@@ -240,8 +248,12 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
     }
     const auto fibres =
         fibres_.empty() ? std::span<const FibreFrame>() : std::span(fibres_).subspan(point_start_[begin], count);
-    law_->evaluate_isochoric(std::span(gradient).first(count), fibres, std::span(density).first(count),
-                             std::span(stress).first(count));
+    try {
+      law_->evaluate_isochoric(std::span(gradient).first(count), fibres, std::span(density).first(count),
+                               std::span(stress).first(count));
+    } catch (const LawValueError& error) {
+      throw_with_place(error, place_of(begin, error.point()));
+    }
     double sum = 0;
     int point = 0;
     std::vector<double> local;
@@ -350,7 +362,11 @@ FiniteState FiniteBody::at(const Vector3& x, const VectorX& coefficients) const 
   std::vector<FibreFrame> frame;
   if (fibre_field_)
     frame.push_back(fibre_field_(x));
-  law_->evaluate({&state.deformation, 1}, frame, {&state.energy, 1}, {&state.first_piola, 1});
+  try {
+    law_->evaluate({&state.deformation, 1}, frame, {&state.energy, 1}, {&state.first_piola, 1});
+  } catch (const LawValueError& error) {
+    throw_with_place(error, x);
+  }
   state.jacobian = state.deformation.determinant();
   state.cauchy = state.first_piola * state.deformation.transpose() / state.jacobian;
   return state;

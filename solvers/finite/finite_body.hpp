@@ -105,6 +105,7 @@ class FiniteBody {
   void assemble_loads();
   /// F of all groups, and the mean J of all blocks; returns the least J.
   double deform(const VectorX& coefficients) const;
+  [[nodiscard]] const Vector3& place_of(int group, std::size_t point) const; // m
 
   struct Work;
 

@@ -1,6 +1,7 @@
 #include "solvers/finite/finite_tangent.hpp"
 
 #include "solvers/dense_products.hpp"
+#include "solvers/elasticity/function_law.hpp"
 #include "solvers/elimination_order.hpp"
 #include "solvers/parallel.hpp"
 #include "topology/errors.hpp"
@@ -118,8 +119,12 @@ void FiniteTangent::point_tangents(int group, const LaneValues* deformation, dou
     for (int k = 0; k < 9; ++k)
       f.data()[k] = deformation[k].value[lane];
     const double weight = body_.points().weights[group].value[lane];
-    Matrix9 d =
-        law.tangent_isochoric(f, body_.fibres_.empty() ? frame : body_.fibres_[body_.point_start_[group] + lane]);
+    Matrix9 d;
+    try {
+      d = law.tangent_isochoric(f, body_.fibres_.empty() ? frame : body_.fibres_[body_.point_start_[group] + lane]);
+    } catch (const LawValueError& error) {
+      throw_with_place(error, body_.points().positions[static_cast<std::size_t>(point_lanes) * group + lane]);
+    }
     if (minds) {
       Matrix3 c;
       c.col(0) = f.col(1).cross(f.col(2));

@@ -7,8 +7,12 @@ import importlib.util
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
+import urllib.error
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -19,15 +23,21 @@ BUILD = Path(os.environ["SPHERECUT_BUILD"])
 PROGRAM = Path(os.environ["SPHERECUT_COMMAND"])
 STANDS_FOR = {"STUDY.toml": "examples/studies/press_spacing.toml", "SCENARIO.toml": "scenarios/block_punch.toml", "SCENARIO": "scenarios/block_punch.toml"}
 S = r"(?:build/release/)?spherecut"
+SMALL = "scenarios/small.toml"  # in the scratch copy: block_punch on fewer nodes
 
 # How a command is tried. The first entry whose pattern is the whole command counts.
 #   run          in a scratch copy of the repository, after what the page has before it; it must end with 0
 #   run_python   likewise, where the Python package is built and matplotlib is there
 #   run_short    likewise, with words replaced so that it takes seconds and neither the network nor the clock
+#   run_coarse   likewise, and the scenario has fewer triangles, nodes and steps (coarser() below)
+#   quick        likewise, with --quick where that takes a second or two; of the other experiments the suite runs the same
+#                variant (tests/experiments), which must be there, and the command must be one that parse() takes
+#   serve        likewise, on any free port: the page comes over HTTP, a browser is opened where it is asked for, and SIGTERM
+#                ends it with 0
+#   help         the name of a subcommand within a sentence: it must say its help
 #   run_study    likewise, where the Python package is built, as far as --dry-run goes: every run is checked and listed
-#   parse        the program, its subcommand, options and files are there, and `spherecut check` accepts its scenario. For
-#                what takes minutes, for servers, for what waits for a hand
-#   dev          ./dev has that command and those options (what they do takes minutes)
+#   dev          ./dev has that command and those options: each builds something, for minutes to an hour, or is this suite
+#                itself; tests/src/test_dev_script.cpp runs the script
 #   ctest        some test has that name
 #   page_tests   tests/page/run.sh has that kind of test (ctest runs them)
 #   targets      CMake has that preset, that option, that target
@@ -57,14 +67,19 @@ HOW = [
     (r"pip install --no-build-isolation \.", "elsewhere", "tests/python/test_package.py", "--no-build-isolation"),
     (r"python3 -m venv --system-site-packages env && \. env/bin/activate", "run_short",
      {"--system-site-packages": "--system-site-packages --without-pip"}),
-    (rf"{S} experiment run \w+(?: --out DIR)?(?: \[--quick\])?", "parse"),
-    (rf"{S} run scenarios/\w+\.toml(?: --out (?:DIR|out/(?:demo|soft)))?", "parse"),
-    (rf"{S} run /usr/share/spherecut/scenarios/liver_cut\.toml --out out/demo", "parse"),
-    (rf"{S} serve(?: --open)?", "parse"),
-    (rf"{S} serve \[SCENARIO\.toml\].*", "parse"),
-    (rf"{S} haptics(?: SCENARIO\.toml --duration (?:S|60) --out DIR)?", "parse"),
-    (rf"{S} haptics --replay (?:FILE|DIR/haptic\.recording --out OTHER)", "parse"),
-    (r"spherecut (?:run|check|sweep)", "parse"),
+    (rf"{S} experiment run NAME --out DIR \[--quick\]", "run_short", {"NAME": "patch_test", "[--quick]": "--quick"}),
+    (rf"{S} experiment run \w+ --out DIR", "quick"),
+    (rf"{S} run scenarios/\w+\.toml --out (?:DIR|out/soft)", "run_coarse"),
+    (rf"{S} run scenarios/liver(?:_live)?\.toml", "run_coarse", {".toml": ".toml --out out/named"}),
+    (rf"{S} run /usr/share/spherecut/scenarios/liver_cut\.toml --out out/demo", "run_coarse", {"/usr/share/spherecut/": ""}),
+    (rf"{S} serve --open", "serve"),
+    (rf"{S} serve \[SCENARIO\.toml\].*", "serve"),
+    (rf"{S} haptics SCENARIO\.toml --duration S --out DIR", "run_short", {"SCENARIO.toml": SMALL, "--duration S": "--virtual --duration 0.3"}),
+    (rf"{S} haptics SCENARIO\.toml --duration 60 --out DIR", "run_short", {"SCENARIO.toml": SMALL, "--duration 60": "--virtual --duration 0.3"}),
+    (rf"{S} haptics --replay DIR/haptic\.recording --out OTHER", "run"),
+    (rf"{S} haptics --replay FILE", "run_short", {
+        "haptics --replay FILE": f"haptics {SMALL} --virtual --duration 0.3 --out made && spherecut haptics --replay made/haptic.recording --out again"}),
+    (r"spherecut (?:run|check|sweep|haptics|serve)", "help"),
     (rf"{S} sweep examples/studies/press_spacing\.toml --out out/\w+(?: --slurm)?", "run_study"),
     (rf"{S} sweep STUDY\.toml --out FOLDER -- .*", "run_study"),
     (r"PYTHONPATH=build/release/python python3 examples/studies/threads\.py", "run_short", {"examples/studies/threads.py": "examples/studies/threads.py 300"}),
@@ -87,7 +102,7 @@ HOW = [
     (r"build/release/tests/haptic_bridge_client/haptic_bridge_client 27510 60", "elsewhere", "tests/CMakeLists.txt", "SPHERECUT_BRIDGE_CLIENT"),
     (r"cmake -S examples/haptic_bridge_client -B client && cmake --build client", "run"),
     (r"cmake -S examples/devices -B devices && cmake --build devices", "run"),
-    (rf"{S} haptics SCENARIO\.toml --bench --out DIR", "parse"),
+    (rf"{S} haptics SCENARIO\.toml --bench --out DIR", "run_short", {"SCENARIO.toml": SMALL, "--bench": "--bench --virtual", "DIR": "BENCH"}),
     (r"cmake --preset release -DSPHERECUT_BUILD_REFERENCES=ON", "targets"),
     (r"ninja -C build/release spherecut_reference_getfem", "targets"),
     (r"build/release/spherecut_reference_getfem 0\.\d+ experiments/hemisphere_palpation/reference_nu\d+\.csv", "targets"),
@@ -144,7 +159,7 @@ test_names.__test__ = False
 
 
 def parse(text: str) -> None:
-    """Of a command of the program: that what it is made of is there."""
+    """Of a command of the program: that its subcommand, options, files and experiment are there."""
     _, *rest = words(text)
     subcommands = []
     while rest and not rest[0].startswith("-") and re.search(rf"^  {re.escape(rest[0])}\s", help_of(*subcommands).partition("Subcommands:")[2], re.M):
@@ -233,6 +248,7 @@ def scratch_copy(folder: Path) -> Path:
     """What commands of a reader find in their clone, and the program on the PATH."""
     for name in ["scenarios", "examples", "docs", "benchmarks"]:
         shutil.copytree(SOURCE / name, folder / name, ignore=shutil.ignore_patterns("images", "__pycache__"))
+    (folder / SMALL).write_text(coarser((folder / "scenarios" / "block_punch.toml").read_text()))
     (folder / "build").mkdir()
     (folder / "build" / "release").symlink_to(BUILD)
     return folder
@@ -248,11 +264,107 @@ def run(text: str, folder: Path) -> None:
     assert done.returncode == 0, f"'{text}' ended with {done.returncode}:\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
 
 
+def shortened(text: str, words_for: dict[str, str]) -> str:
+    for long, short in words_for.items():
+        assert long in text, f"'{text}' has no '{long}'"
+        before = r"(?<!/)" if long[0].isalnum() else ""
+        text = re.sub(before + re.escape(long) + (r"\b" if long[-1].isalnum() else ""), lambda _: short, text, count=1)
+    return text
+
+
+# What makes runs of the scenarios that come along last seconds: factors, and a shorter lift of the flap.
+COARSER = {"fine_spacing": 2, "coarse_spacing": 1.5, "step": 4}
+
+
+def coarser(text: str) -> str:
+    text = re.sub(r"^triangles = \d+", "triangles = 2000", text, flags=re.M)
+    for key, times in COARSER.items():
+        text = re.sub(rf"^{key} = ([\d.]+)", lambda found: f"{key} = {times * float(found[1]):g}", text, flags=re.M)
+    return text.replace("[-0.060, 0.003, 0.0710]", "[-0.060, 0.003, 0.0660]")
+
+
+def run_coarse(text: str, folder: Path, words_for: dict[str, str]) -> None:
+    text = shortened(text, words_for)
+    file = folder / re.search(r"scenarios/\w+\.toml", text)[0]
+    as_shipped = file.read_text()
+    assert coarser(as_shipped) != as_shipped
+    file.write_text(coarser(as_shipped))
+    run(text, folder)
+    file.write_text(as_shipped)
+
+
+# Experiments whose quick variant takes two seconds of one core at most.
+QUICK = {"patch_test", "smooth_convergence", "punch", "hertz", "hemisphere_palpation", "precut_straight", "precut_edge",
+         "precut_beam", "sever", "spacing_independence"}
+
+
+def quick(text: str, folder: Path) -> None:
+    name = words(text)[3]
+    if name in QUICK:
+        run(f"{text} --quick", folder)
+    else:
+        parse(text)
+        elsewhere(text, "tests/experiments/test_quick_experiments.cpp", f'require_quick_run_passes("{name}")')
+
+
+def get(url: str) -> tuple[int, str]:
+    try:
+        with urllib.request.urlopen(url, timeout=60) as answer:
+            return answer.status, answer.read().decode()
+    except urllib.error.HTTPError as error:
+        return error.code, error.read().decode()
+
+
+def serve(text: str, folder: Path) -> None:
+    """On a small block; a stand-in for the browser says what it was given."""
+    seen = folder / "opened"
+    (folder / "bin").mkdir(exist_ok=True)
+    (folder / "bin" / "xdg-open").write_text(f'#!/bin/sh\nprintf %s "$1" >"{seen}.part" && mv "{seen}.part" "{seen}"\n')
+    (folder / "bin" / "xdg-open").chmod(0o755)
+    page = BUILD / "page"
+    if "[" in text:
+        text = text.replace("[", "").replace("]", "").replace("8080", "0")
+        text = text.replace("--page DIR", f"--page {page}") if page.is_dir() else text.replace(" --page DIR", "")
+        (folder / "DIR").mkdir(exist_ok=True)
+    else:
+        text += " SCENARIO.toml --port 0"
+    command = [str(PROGRAM)] + words(text.replace("SCENARIO.toml", SMALL))[1:]
+    environment = os.environ | {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "OPENBLAS_NUM_THREADS": "1"}
+    with subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as server:
+        said, url = [], None
+        try:
+            for line in server.stdout:
+                said.append(line)
+                url = url or re.search(r"serving at (http://127\.0\.0\.1:\d+/)", line)
+                if "Ctrl-C ends it" in line:
+                    break
+            assert url, f"'{text}' does not say where it serves:\n{''.join(said)}"
+            status, body = get(url[1])
+            if page.is_dir():
+                assert status == 200 and "<html" in body and re.search(r'src="[^"]+\.js"', body), f"'{text}': {status} {body[:500]}"
+                script = re.search(r'src="\.?/?([^"]+\.js)"', body)[1]
+                assert get(url[1] + script)[0] == 200, f"'{text}': the page's {script} does not come"
+            else:
+                assert status == 404 and "The page is not built" in body, f"'{text}': {status} {body[:500]}"
+            assert get(url[1] + "nothing.js")[0] == 404
+            while not seen.exists():  # the test's own limit of time ends it
+                assert server.poll() is None
+                time.sleep(0.01)
+            assert seen.read_text() == url[1]
+            seen.unlink()
+        except BaseException:
+            server.kill()
+            raise
+        server.send_signal(signal.SIGTERM)
+        said.append(server.communicate()[0])
+    assert server.returncode == 0 and said[-1].rstrip().endswith("ended"), f"'{text}': {server.returncode}\n{''.join(said)}"
+
+
 def can_draw() -> bool:
     return bool(list((BUILD / "python" / "spherecut").glob("_core*.so"))) and importlib.util.find_spec("matplotlib") is not None
 
 
-WAYS = {"parse": parse, "dev": dev, "ctest": ctest, "page_tests": page_tests, "targets": targets, "elsewhere": elsewhere,
+WAYS = {"dev": dev, "ctest": ctest, "page_tests": page_tests, "targets": targets, "elsewhere": elsewhere,
         "packages": packages, "clone": clone}
 
 
@@ -285,7 +397,7 @@ def test_commands_of(page, tmp_path):
         if isinstance(entry, Command):
             way, *arguments = how(entry.text) or ["none"]
             assert way != "none", f"{entry}: say in HOW how it is tried"
-        if isinstance(entry, Written) or way.startswith("run"):
+        if isinstance(entry, Written) or way.startswith("run") or way in ("quick", "serve"):
             folder = folder or scratch_copy(tmp_path)
         try:
             if isinstance(entry, Written):
@@ -293,11 +405,14 @@ def test_commands_of(page, tmp_path):
             elif way == "run" or (way == "run_python" and can_draw()):
                 run(entry.text, folder)
             elif way == "run_short":
-                text = entry.text
-                for long, short in arguments[0].items():
-                    assert long in text
-                    text = re.sub(rf"(?<!/){re.escape(long)}\b", short, text, count=1)
-                run(text, folder)
+                run(shortened(entry.text, arguments[0]), folder)
+            elif way == "run_coarse":
+                run_coarse(entry.text, folder, *(arguments or [{}]))
+            elif way in ("quick", "serve"):
+                {"quick": quick, "serve": serve}[way](entry.text, folder)
+            elif way == "help":
+                said = said_by(PROGRAM, *words(entry.text)[1:], "--help")
+                assert re.search(r"^usage: spherecut \w+", said, re.I | re.M), said
             elif way == "run_study" and can_draw():
                 run(entry.text.replace(" --out", " --dry-run --out", 1), folder)
             elif way not in ("run_python", "run_study"):
