@@ -172,7 +172,10 @@ double curvature_of(const topology::Incision& incision, const FrontFrame& front,
   return length > 0.5 * h ? (after->ahead - before->ahead).dot(front.tangent) / length : 0;
 }
 
-constexpr double widest_turn = 0.9; // of the radius of curvature of the front: the tube's outer radius
+constexpr double widest_turn = 0.9;   // of the radius of curvature of the front: the tube's outer radius
+constexpr double longest_arc = 0.35;  // of the same: half the tube's length, where that is above the shortest
+constexpr double shortest_half = 1;   // of the tube's length, in spacings, down to which it is shortened
+constexpr double shortened_by = 0.25; // spacings, at a time
 
 struct GaussRule {
   std::array<double, 2> place{-0.5773502691896257, 0.5773502691896257};
@@ -207,7 +210,10 @@ Intensities each_sample(const Discretisation& body, const FrontFrame& front, con
   // count twice there, the second time negative.
   const double narrowed = std::min(1.0, widest_turn / (std::max(0.0, tube.curvature()) * options.outer * h));
   const double inner = narrowed * options.inner * h, outer = narrowed * options.outer * h;
-  const double half_length = options.half_length * h;
+  const double shortest = std::min(options.half_length, shortest_half) * h;
+  double half_length = options.half_length * h;
+  if (half_length * std::abs(tube.curvature()) > longest_arc)
+    half_length = std::max(shortest, longest_arc / std::abs(tube.curvature()));
   if (tube.curvature() * outer <= -widest_turn)
     throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
                                  front.point.x(), front.point.y(), front.point.z()));
@@ -241,14 +247,20 @@ Intensities each_sample(const Discretisation& body, const FrontFrame& front, con
                                  "surface; allowed: {:.3g} m",
                                  front.point.x(), front.point.y(), front.point.z(),
                                  -problem.domain->signed_distance(front.point), 0.2 * inset));
-  for (const double s : {-half_length, half_length})
-    for (int c = 0; c < 8 && inset == 0; ++c)
-      if (tube.at(outer * std::cos(c * std::numbers::pi / 4), outer * std::sin(c * std::numbers::pi / 4), s)
-              .leaves(*problem.domain))
-        throw InputError(
-            fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
-                        "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
-                        outer, 2 * half_length, front.point.x(), front.point.y(), front.point.z()));
+  const auto leaves_body = [&] {
+    for (const double s : {-half_length, half_length})
+      for (int c = 0; c < 8; ++c)
+        if (tube.at(outer * std::cos(c * std::numbers::pi / 4), outer * std::sin(c * std::numbers::pi / 4), s)
+                .leaves(*problem.domain))
+          return true;
+    return false;
+  };
+  while (inset == 0 && half_length > shortest && leaves_body())
+    half_length = std::max(shortest, half_length - shortened_by * h);
+  if (inset == 0 && leaves_body())
+    throw InputError(fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
+                                 "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
+                                 outer, 2 * half_length, front.point.x(), front.point.y(), front.point.z()));
   const std::array<Intensities, 3> modes{Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()};
   const GaussRule gauss;
   const int cells_along = std::max(1, options.along / 2), cells_radial = std::max(1, options.radial / 2);

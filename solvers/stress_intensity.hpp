@@ -36,7 +36,8 @@ Intensities displacement_correlation(const Discretisation& body, const Field& fi
 /// for the third.
 struct InteractionOptions {
   double inner = 0.5, outer = 3; // radii between which the virtual shift fades, in units of the spacing at the front
-  double half_length = 1;        // of the tube along the front, in the same units
+  double half_length = 2; // of the tube along the front, in the same units; down to 1 where it would leave the body or
+                          // the front turns by much along it
   int radial = 16, around = 24, along = 6; // points
 };
 /// Throws InputError when the tube leaves the body.

@@ -32,7 +32,9 @@ struct CutReport : BodyUpdate {
 /// Nodes of a body that has been built, and what of the time of its assembly, s, was sight and factorisation.
 void report_body(const BodyModel& body, double sight, BodyUpdate& report);
 
-/// How far the faces of the cut have parted, as the surface shows it that is written: corner by corner.
+/// How far the faces of the cut have parted: largest as the surface shows it that is written, corner by corner. The
+/// volume takes them to part with the root of the distance from the front, where that surface is flat from corner to
+/// corner.
 struct Opening {
   double largest = 0; // m, largest distance between two corners at one place of a sheet, along its normal
   double volume = 0; // m3, the integral of the opening over the sheets, each face displaced as the material on its side

@@ -12,9 +12,16 @@ struct FineZone {
   double candidate_radius = 0; // m
 };
 
+/// Nodes that the derived spacing at the fronts of precuts may ask for.
+inline constexpr int front_budget = 8000;
+
 /// Spacings of a scenario, still without the places where they are fine. Throws InputError when they contradict each
 /// other.
 FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain);
+
+/// What the spacing at the front of a precut costs, where it is above a fifth of how deep the precut reaches behind its
+/// front; nothing where all fronts are finer.
+std::optional<std::string> coarse_front(const Scenario& scenario, const topology::Domain& domain, const FineZone& zone);
 
 /// Edge of the triangles of built-in sheets and of the blade's sweep, m.
 double sheet_edge(const FineZone& zone);

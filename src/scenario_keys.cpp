@@ -375,8 +375,8 @@ constexpr std::array keys = {
         "cut.front_spacing", number, "m", "",
         "Node spacing at the fronts of the cuts (a precut that parts the organ has none) and along the way of the "
         "blade, where it is finer than nodes.fine_spacing; left out: that, or without it and without a tool 0.15 "
-        "radii of the smallest disc or a sixth of the root of another precut's area, for a "
-        "blade a twelfth of its edge.",
+        "of how far a precut reaches behind its front (a disc's radius, the depth of a cut from the surface), as far "
+        "as 8000 nodes go, and at most a sixth of the root of its area; for a blade a twelfth of its edge.",
         from(tiny, 1)},
 
     ScenarioKey{"blade", table, "", "", "A blade that cuts along its way; left out: none."},

@@ -105,6 +105,8 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
     }
   try {
     judge_walls();
+    if (const std::optional<std::string> front = coarse_front(scenario_, *organ_.domain, zone_))
+      warn("front", *front);
     sprinkle(nullptr, model_);
   } catch (const InputError& error) { // what was odd about the organ may be why
     std::string all =

@@ -40,9 +40,9 @@ std::string refusal_of(const ExperimentContext& context, const std::string& text
 } // namespace real_world
 
 std::vector<Check> run_real_world(const ExperimentContext& context) {
-  constexpr std::array<real_world::Group, 6> groups{real_world::organ_files,  real_world::organ_bodies,
-                                                    real_world::narrow_gaps,  real_world::device_elsewhere,
-                                                    real_world::slow_clients, real_world::disorder};
+  constexpr std::array<real_world::Group, 7> groups{
+      real_world::organ_files,      real_world::organ_bodies, real_world::default_cracks, real_world::narrow_gaps,
+      real_world::device_elsewhere, real_world::slow_clients, real_world::disorder};
   std::vector<Check> checks;
   for (const real_world::Group group : groups)
     for (Check& check : group(context)) {

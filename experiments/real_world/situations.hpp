@@ -15,6 +15,8 @@ using Group = std::vector<Check> (*)(const ExperimentContext& context);
 std::vector<Check> organ_files(const ExperimentContext& context);
 /// Walls, loads and sheets against closed forms.
 std::vector<Check> organ_bodies(const ExperimentContext& context);
+/// Cuts on nodes that nobody chose, against closed forms.
+std::vector<Check> default_cracks(const ExperimentContext& context);
 /// Slits of the surface against the same slit as a cut.
 std::vector<Check> narrow_gaps(const ExperimentContext& context);
 

@@ -10,6 +10,9 @@ namespace {
 
 constexpr double remembered = 0.5;                     // s, over which the rate is measured
 constexpr double leads_from = 1.5, leads_until = 1.25; // ticks between two poses
+constexpr double uneven_from = 1.0 / 16;               // share of the ticks without a pose, at the loop's rate
+constexpr double uneven_for = 1;                       // s, as which a client counts that was so
+constexpr double least_way = 2;                        // ticks
 constexpr double fades_from = slowest_client - 1;      // poses a second: one lost in fifty does not count
 constexpr double fade = 0.1;                           // s
 constexpr double settled = 0.2;                        // s
@@ -22,6 +25,7 @@ void ClientPace::begin() noexcept {
   measured_ = 0;
   kind_ = PaceKind::unknown;
   fresh_ = leads_ = false;
+  uneven_until_ = 0;
   length_ = 1;
   share_ = 1;
 }
@@ -54,8 +58,13 @@ void ClientPace::measure(std::uint64_t tick) noexcept {
   // Who has been silent for two poses' time may be slower now.
   const double period = silence > 2 * mean ? (span + silence) / static_cast<double>(used) : mean;
   measured_ = rate_ / period;
-  length_ = std::max(1.0, std::round(mean));
-  leads_ = leads_ ? mean > leads_until : mean > leads_from;
+  std::uint64_t empty = 0; // ticks without a pose
+  for (std::size_t back = 0; back + 1 < used; ++back)
+    empty += std::max<std::uint64_t>(at(back) - at(back + 1), 1) - 1;
+  if (used == window && static_cast<double>(empty) >= uneven_from * span)
+    uneven_until_ = tick + static_cast<std::uint64_t>(uneven_for * rate_);
+  leads_ = mean > (leads_ ? leads_until : leads_from) || tick < uneven_until_;
+  length_ = std::max(leads_ ? least_way : 1.0, std::round(mean));
   const bool is_settled = span + silence >= settled * rate_; // a few poses may come late by chance
   const bool slow =
       is_settled && measured_ < (kind_ == PaceKind::too_slow ? slowest_client : std::min(fades_from, rate_ - 1));

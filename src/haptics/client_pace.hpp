@@ -12,7 +12,7 @@ namespace spherecut::app {
 enum class PaceKind : std::uint8_t {
   unknown,      // it has only begun
   full,         // of every tick there is a pose
-  interpolated, // the loop's pose follows the client's, late by its time between two of them
+  interpolated, // the loop's pose follows the client's, late by its time between two of them, two ticks at least
   too_slow,     // the force fades: below slowest_client nothing keeps the hand from swinging
 };
 
@@ -35,7 +35,9 @@ struct PaceCounters {
 ///
 /// The rate is that of the poses of the last half second, at most 64. Below three quarters of the loop's the tool goes
 /// from where it is to each new pose in the mean time between two of them, evenly: the force has no steps then, and is
-/// as late as that. A pose that no hand could have reached (fastest_hand) is taken at once.
+/// as late as that. So it does, over two ticks, where a client of the loop's rate sends unevenly: one tick in
+/// sixteen or more had no pose, at some time within the last second. A pose that no hand could have reached
+/// (fastest_hand) is taken at once.
 class ClientPace {
  public:
   /// `rate`: ticks per second.
@@ -63,6 +65,7 @@ class ClientPace {
   bool fresh_ = false, leads_ = false;
   PathPose from_, to_, at_;             // of the way at hand; where the loop has the tool
   std::uint64_t began_ = 0, taken_ = 0; // ticks: of the way, of the newest pose
+  std::uint64_t uneven_until_ = 0;      // tick
   double length_ = 1;                   // of the way, ticks
   double share_ = 1;
 };

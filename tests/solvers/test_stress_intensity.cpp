@@ -105,6 +105,27 @@ TEST_CASE("The integral holds where its tube leaves the body, if the shift fades
   CHECK_THROWS_WITH(inset_integral(body, {}, *front, 100), Catch::Contains("from the surface"));
 }
 
+TEST_CASE("A tube of four spacings' length is shortened where it would leave the body, down to two",
+          "[stress_intensity]") {
+  const Intensities k(1.3, -0.7, 0.5);
+  const CutBlock block = cut_block(14, false, 1);
+  const ExactBody body(block, k);
+  int near = 0;
+  for (const topology::FrontFrame& front : front_samples(*block.incision, 0.2 * block.nodes.spacings.front())) {
+    const double depth = -block.domain->signed_distance(front.point) / block.nodes.spacings.front();
+    INFO("depth " << depth << " spacings");
+    try {
+      static_cast<void>(interaction_integral(body, {}, front, InteractionOptions{.half_length = 1}));
+    } catch (const InputError&) { // too near to the surface for the shortest
+      CHECK_THROWS_WITH(interaction_integral(body, {}, front), Catch::Contains("leaves the body"));
+      continue;
+    }
+    CHECK((interaction_integral(body, {}, front) - k).norm() < 0.05);
+    near += depth < 1.9 ? 1 : 0; // one of full length leaves the body there
+  }
+  CHECK(near >= 2);
+}
+
 TEST_CASE("The energy release rate adds up the modes", "[stress_intensity]") {
   const Material material{2, 0.3, 0};
   CHECK(energy_release_rate(material, {2, 0, 0}) == Approx(4 * (1 - 0.09) / 2));

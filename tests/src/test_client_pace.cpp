@@ -97,7 +97,7 @@ TEST_CASE("A client of any rate, with jitter, loss and reordering, gets no energ
         CHECK(outcome.peak > 0.3);
         CHECK(outcome.late_peak > 0.25 * outcome.peak); // it does not die away
         // What the sensor's rounding does to a reading comes over the time to the next.
-        const double rounding = stiffness * DeviceLimits{}.resolution * rate / 1000;
+        const double rounding = stiffness * DeviceLimits{}.resolution * std::min(rate, 500.0) / 1000;
         CHECK(outcome.step < 0.02 * outcome.peak + outcome.exact_step + rounding);
         CHECK(outcome.measured == Approx(rate).epsilon(0.1));
       }
@@ -120,6 +120,29 @@ TEST_CASE("Below 50 poses a second the force fades, and the reason is told") {
              Catch::Contains("force fades") && Catch::Contains("40 poses a second") && Catch::Contains("50 or more"));
   CHECK_THAT(pace_text({PaceKind::interpolated, 100}),
              Catch::Contains("100 poses a second") && Catch::Contains("10 ms late"));
+}
+
+TEST_CASE("A client of full rate whose poses come unevenly is led over two ticks, until they come evenly again") {
+  constexpr std::uint64_t uneven = 600, even = 2000; // ticks
+  ClientPace pace(1000);
+  pace.begin();
+  DeviceState state;
+  double before = 0, largest = 0;
+  for (std::uint64_t tick = 0; tick < uneven + even; ++tick) {
+    state.tick = tick;
+    const bool is_late = tick < uneven && tick % 8 == 0; // comes with the next
+    if (!is_late)
+      pace.take({0, 0, 1e-4 * static_cast<double>(tick)}, Eigen::Quaterniond::Identity(), tick);
+    pace.lead(state);
+    if (tick > 100 && tick < uneven) {
+      CHECK(state.client.period == 2);
+      largest = std::max(largest, state.position.z() - before);
+    }
+    before = state.position.z();
+  }
+  CHECK(largest < 1.6e-4); // not the two steps of a tick that takes two
+  CHECK(pace.kind() == PaceKind::full);
+  CHECK(state.client.period == 1);
 }
 
 TEST_CASE("A client of full rate is followed pose by pose, a slower one evenly and without allocations") {
