@@ -4,6 +4,7 @@
 #include "topology/errors.hpp"
 #include "topology/proximity.hpp"
 #include "topology/sheet_front.hpp"
+#include "topology/sight_work.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -133,6 +134,8 @@ EyeMemory& eye_memory_of_this_thread() {
   return *memory;
 }
 
+thread_local std::uint64_t lines_walked = 0;
+
 std::uint64_t next_incision_number() {
   static std::atomic<std::uint64_t> last{0};
   return ++last;
@@ -220,6 +223,7 @@ struct Incision::Data {
 
   /// What blocks(a, b) says where no known triangle does; the one that does is known then.
   [[nodiscard]] bool blocks_anew(const Vector3& a, const Vector3& b, Blockers& known) const {
+    ++lines_walked;
     const Vector3 p = a - tree.origin(), q = b - tree.origin();
     return tree.any_on_segment(a, b, [&](int place) {
       if (!walls[place].meets(p, q, flat))
@@ -274,6 +278,10 @@ struct Incision::Data {
   mutable std::once_flag area_known;
   mutable double area = 0; // m2
 };
+
+std::uint64_t sight_lines_walked() {
+  return lines_walked;
+}
 
 Incision::Incision(std::vector<SurfaceMesh> sheets, std::shared_ptr<const Domain> domain, int revision,
                    std::vector<SurfaceMesh> walls)
