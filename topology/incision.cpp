@@ -119,14 +119,14 @@ class EyeMemory {
     std::uint64_t hash = incision;
     for (int axis = 0; axis < 3; ++axis)
       hash = (hash ^ std::bit_cast<std::uint64_t>(at[axis])) * 0x9E3779B97F4A7C15ULL;
-    Entry& entry = entries_[hash >> 54U];
+    Entry& entry = entries_[hash >> 52U];
     if (entry.incision != incision || entry.at != at)
       entry = {at, incision, {}, {}};
     return entry;
   }
 
  private:
-  std::array<Entry, 1024> entries_;
+  std::array<Entry, 4096> entries_;
 };
 
 EyeMemory& eye_memory_of_this_thread() {
