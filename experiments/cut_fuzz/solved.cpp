@@ -2,6 +2,7 @@
 
 #include "src/session.hpp"
 #include "topology/errors.hpp"
+#include "topology/interruption.hpp"
 #include "topology/surface_io.hpp"
 
 #include <algorithm>
@@ -75,18 +76,19 @@ SolvedOutcome solve_cuts(const FuzzOrgan& organ, int first, int count, const std
       for (const solvers::PointState& state : session.node_states())
         largest = std::max(largest, state.displacement.allFinite() ? state.displacement.norm() / size
                                                                    : std::numeric_limits<double>::infinity());
-      if (largest <= 1) {
-        outcome.largest = std::max(outcome.largest, largest);
-        continue;
-      }
-      ++outcome.beyond;
+      outcome.beyond += largest > 1 ? 1 : 0;
       const auto tells = [](const std::string& said) { return said.find("the organ's size") != std::string::npos; };
-      if (std::none_of(session.warnings().begin(), session.warnings().end(), tells))
+      if (std::any_of(session.warnings().begin(), session.warnings().end(), tells))
+        continue;
+      outcome.largest = std::max(outcome.largest, largest);
+      if (largest > 1)
         fail(fmt::format("moves by {:.3g} times the organ's size, and it is not said", largest));
     } catch (const InputError& error) {
       refuse(error.what());
     } catch (const NumericalError& error) {
       refuse(error.what());
+    } catch (const Interrupted&) {
+      throw;
     } catch (const std::exception& error) {
       fail(std::string("threw: ") + error.what());
     }
