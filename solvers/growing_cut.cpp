@@ -448,14 +448,21 @@ GrowthReport GrowingCut::grow(const NodeChange& change, const std::shared_ptr<co
   std::vector<int> new_slot = s.slot;
   for (int k = 0; k < change.added.size(); ++k)
     new_slot.push_back(s.next_room + k);
+  const auto leaves_window = [&](const State::Box& box) {
+    for (const CellShapes& cell : box.cells)
+      for (int node : cell.nodes)
+        if (new_slot[node] < 0)
+          return true;
+    return false;
+  };
+  for (const int box : touched_boxes) // before anything is evaluated in vain
+    if (leaves_window(s.boxes[box]))
+      return anew("the cut left the predicted way", std::move(next), std::move(removed));
   std::vector<std::pair<int, State::Box>> exchanged;
   std::vector<State::Box> fresh_boxes = s.evaluated(increment);
   for (std::size_t k = 0; k < touched_boxes.size(); ++k) {
-    for (const State::Box* one : {&std::as_const(fresh_boxes[k]), &std::as_const(s.boxes[touched_boxes[k]])})
-      for (const CellShapes& cell : one->cells)
-        for (int node : cell.nodes)
-          if (new_slot[node] < 0)
-            outside = "the cut left the predicted way";
+    if (leaves_window(fresh_boxes[k]))
+      outside = "the cut left the predicted way";
     exchanged.emplace_back(touched_boxes[k], std::move(fresh_boxes[k]));
   }
   // The same for means over the surface: those whose points see the change have new weights, and where the faces or

@@ -590,13 +590,25 @@ solvers::PointState Session::at(const Vector3& x) const {
 }
 
 void Session::evaluate_nodes(StepResult& result) {
+  double farthest = 0; // m, that a node moves
+  Vector3 place = Vector3::Zero();
   for (const Vector3& x : model_.sprinkling.nodes.positions) {
     node_states_.push_back(model_.body->at(x, model_.field));
     const Matrix3& gradient = node_states_.back().gradient;
     const Matrix3 skew = 0.5 * (gradient - gradient.transpose());
     const double angle = Vector3(skew(2, 1), skew(0, 2), skew(1, 0)).norm() * 180 / std::numbers::pi;
     result.rotation_degrees = std::max(result.rotation_degrees, angle);
+    if (const double moved = node_states_.back().displacement.norm(); !std::isnan(farthest) && !(moved <= farthest)) {
+      farthest = moved;
+      place = x;
+    }
   }
+  if (const double size = organ_.domain->bounds().extent().norm(); !(farthest <= size))
+    warn("astray",
+         fmt::format("tissue at [{:.4g}, {:.4g}, {:.4g}] m moves by {:.3g} m at t = {:g} s, farther than the organ's "
+                     "size of {:.3g} m: it hangs by next to nothing, or its loads are far too large; what is computed "
+                     "of it is of no use",
+                     place.x(), place.y(), place.z(), farthest, result.time, size));
   if (result.rotation_degrees > stretched_rotation)
     warn("rotation",
          fmt::format("tissue rotates by {:.0f} degrees at t = {:g} s (over {:g}): linear elasticity is being "

@@ -4,9 +4,13 @@
 #include "topology/errors.hpp"
 #include "topology/proximity.hpp"
 #include "topology/sheet_front.hpp"
+#include "topology/sight_work.hpp"
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <fmt/format.h>
 #include <iterator>
 #include <mutex>
@@ -86,6 +90,55 @@ bool before(const FrontSegment& a, const FrontSegment& b) {
 
 Eigen::Vector3f single(const Vector3& x) {
   return x.cast<float>();
+}
+
+/// Triangles that have blocked sight lines from one place, the last first. Lines from there to places beside one
+/// another are mostly blocked by the same few, which are asked before the whole tree.
+struct Blockers {
+  static constexpr int most = 12;
+  std::array<int, most> walls{};
+  int count = 0;
+  void come_first(int at) { std::rotate(walls.begin(), walls.begin() + at, walls.begin() + at + 1); }
+  void add(int wall) {
+    count = std::min(count + 1, most);
+    walls[count - 1] = wall;
+    come_first(count - 1);
+  }
+};
+
+/// What a thread has found out about the eyes that it looked from last.
+class EyeMemory {
+ public:
+  struct Entry {
+    Vector3 at = Vector3::Constant(std::numeric_limits<double>::quiet_NaN());
+    std::uint64_t incision = 0;
+    Blockers before, before_lifted;
+  };
+  /// Of an eye on an incision by its number; empty where the eye is new.
+  Entry& of(const Vector3& at, std::uint64_t incision) {
+    std::uint64_t hash = incision;
+    for (int axis = 0; axis < 3; ++axis)
+      hash = (hash ^ std::bit_cast<std::uint64_t>(at[axis])) * 0x9E3779B97F4A7C15ULL;
+    Entry& entry = entries_[hash >> 52U];
+    if (entry.incision != incision || entry.at != at)
+      entry = {at, incision, {}, {}};
+    return entry;
+  }
+
+ private:
+  std::array<Entry, 4096> entries_;
+};
+
+EyeMemory& eye_memory_of_this_thread() {
+  thread_local const std::unique_ptr<EyeMemory> memory = std::make_unique<EyeMemory>();
+  return *memory;
+}
+
+thread_local std::uint64_t lines_walked = 0;
+
+std::uint64_t next_incision_number() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
 }
 
 } // namespace
@@ -168,26 +221,26 @@ struct Incision::Data {
     return {mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]};
   }
 
-  [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b) const {
-    int wall = -1;
-    return blocks(a, b, wall);
-  }
-  [[nodiscard]] bool blocks(const Vector3& a, const Vector3& b, int& wall) const {
+  /// What blocks(a, b) says where no known triangle does; the one that does is known then.
+  [[nodiscard]] bool blocks_anew(const Vector3& a, const Vector3& b, Blockers& known) const {
+    ++lines_walked;
     const Vector3 p = a - tree.origin(), q = b - tree.origin();
-    if (wall >= 0 && walls[wall].meets(p, q, flat))
-      return true;
     return tree.any_on_segment(a, b, [&](int place) {
       if (!walls[place].meets(p, q, flat))
         return false;
-      wall = place;
+      known.add(place);
       return true;
     });
   }
-
-  /// Whether x sees the point f of the front, apart from the last thousandth of the way, where the border itself is.
-  [[nodiscard]] bool sees_front(const Vector3& x, const Vector3& f) const {
-    constexpr double pulled_in = 1e-3;
-    return !blocks(x, f + pulled_in * (x - f));
+  /// Whether a known triangle blocks the sight line from a to b.
+  [[nodiscard]] bool is_known_to_block(const Vector3& a, const Vector3& b, Blockers& known) const {
+    const Vector3 p = a - tree.origin(), q = b - tree.origin();
+    for (int k = 0; k < known.count; ++k)
+      if (walls[known.walls[k]].meets(p, q, flat)) {
+        known.come_first(k);
+        return true;
+      }
+    return false;
   }
 
   /// Sets the directions of a frame at `share` of its segment.
@@ -206,8 +259,9 @@ struct Incision::Data {
   int cut_sheets;
   std::shared_ptr<const Domain> domain;
   int revision;
-  double flat = 0; // m, height within which a point lies on a triangle
-  BoxTree tree;    // of all triangles; the next four in its order
+  std::uint64_t number = next_incision_number(); // of this object, none other has it
+  double flat = 0;                               // m, height within which a point lies on a triangle
+  BoxTree tree;                                  // of all triangles; the next four in its order
   std::vector<SheetTriangle> triangles;
   std::vector<std::array<Vector3, 3>> corners;
   std::vector<Wall> walls;
@@ -224,6 +278,10 @@ struct Incision::Data {
   mutable std::once_flag area_known;
   mutable double area = 0; // m2
 };
+
+std::uint64_t sight_lines_walked() {
+  return lines_walked;
+}
 
 Incision::Incision(std::vector<SurfaceMesh> sheets, std::shared_ptr<const Domain> domain, int revision,
                    std::vector<SurfaceMesh> walls)
@@ -258,7 +316,8 @@ double Incision::area() const {
 }
 
 bool Incision::blocks(const Vector3& a, const Vector3& b) const {
-  return data_->blocks(a, b);
+  Blockers& known = eye_memory_of_this_thread().of(a, data_->number).before;
+  return data_->is_known_to_block(a, b, known) || data_->blocks_anew(a, b, known);
 }
 
 bool Incision::walls_between(const Vector3& centre, const Vector3& half, const Vector3& y, std::size_t most,
@@ -292,7 +351,13 @@ bool Incision::blocks(const Vector3& a, const Vector3& b, std::span<int> walls) 
 }
 
 bool Incision::blocks(const Vector3& a, const Vector3& b, int& wall) const {
-  return data_->blocks(a, b, wall);
+  if (wall >= 0 && data_->walls[wall].meets(a - data_->tree.origin(), b - data_->tree.origin(), data_->flat))
+    return true;
+  Blockers& known = eye_memory_of_this_thread().of(b, data_->number).before;
+  const bool is_blocked = data_->is_known_to_block(a, b, known) || data_->blocks_anew(a, b, known);
+  if (is_blocked)
+    wall = known.walls.front();
+  return is_blocked;
 }
 
 bool Incision::near(const Vector3& x, double radius) const {
@@ -385,12 +450,16 @@ FrontFrame Incision::front_frame_at(int segment, double share) const {
 }
 
 bool Incision::hides(const Eye& x, const Eye& y) const {
-  return data_->blocks(x.at, y.at) && hides_blocked(x, y);
+  Blockers& known = eye_memory_of_this_thread().of(x.at, data_->number).before;
+  return (data_->is_known_to_block(x.at, y.at, known) || data_->blocks_anew(x.at, y.at, known)) && hides_blocked(x, y);
 }
 
 bool Incision::hides_blocked(const Eye& x, const Eye& y) const {
   // Only points at a face can be hidden by its bulge.
-  return (!x.on_face() && !y.on_face()) || data_->blocks(x.lifted, y.lifted);
+  if (!x.on_face() && !y.on_face())
+    return true;
+  Blockers& known = eye_memory_of_this_thread().of(x.at, data_->number).before_lifted;
+  return data_->is_known_to_block(x.lifted, y.lifted, known) || data_->blocks_anew(x.lifted, y.lifted, known);
 }
 
 std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach, int first) const {
@@ -399,14 +468,45 @@ std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach,
   // sheet is wide. Lifted off the face it looks at a place a little ahead of the front, where both sides meet; by so
   // little that no leg leaves the ellipsoid of the ways up to `reach` by more than the eyes are lifted.
   constexpr double most_ahead = 0.15;
-  const auto sees = [&](const Eye& eye, const Vector3& over, const Vector3& ahead) {
-    return data.sees_front(eye.at, over) || (eye.on_face() && !data.blocks(eye.lifted, over + ahead));
+  // A line to the front ends a thousandth of the way before it, where the border itself is.
+  constexpr double pulled_in = 1e-3;
+  // Of two eyes at one place in the memory the second has lists of its own.
+  EyeMemory::Entry& of_x = eye_memory_of_this_thread().of(x.at, data.number);
+  EyeMemory::Entry& of_y = eye_memory_of_this_thread().of(y.at, data.number);
+  EyeMemory::Entry own_x;
+  EyeMemory::Entry& known_x = &of_x == &of_y ? own_x : of_x;
+  struct Line {
+    const Eye& eye;
+    EyeMemory::Entry& known;
+    Vector3 to, lifted_to;
+    bool is_blocked, is_lifted_blocked; // by a known triangle
+  };
+  const auto line_from = [&](const Eye& eye, EyeMemory::Entry& known, const Vector3& over, const Vector3& ahead) {
+    Line line{eye, known, over + pulled_in * (eye.at - over), over + ahead, false, true};
+    line.is_blocked = data.is_known_to_block(eye.at, line.to, known.before);
+    if (line.is_blocked && eye.on_face())
+      line.is_lifted_blocked = data.is_known_to_block(eye.lifted, line.lifted_to, known.before_lifted);
+    return line;
+  };
+  const auto is_free = [&](const Line& way) {
+    if (!way.is_blocked && !data.blocks_anew(way.eye.at, way.to, way.known.before))
+      return true;
+    if (!way.eye.on_face())
+      return false;
+    if (way.is_blocked)
+      return !way.is_lifted_blocked && !data.blocks_anew(way.eye.lifted, way.lifted_to, way.known.before_lifted);
+    return !data.is_known_to_block(way.eye.lifted, way.lifted_to, way.known.before_lifted) &&
+           !data.blocks_anew(way.eye.lifted, way.lifted_to, way.known.before_lifted);
   };
   const auto is_clear = [&](int segment, double share, const Vector3& over, double way) {
     const FrontPiece& piece = data.pieces[segment];
     const Vector3 ahead =
         std::min(most_ahead * reach, 0.5 * (reach - way)) * ((1 - share) * piece.from.ahead + share * piece.to.ahead);
-    return sees(x, over, ahead) && sees(y, over, ahead);
+    const Line from_x = line_from(x, known_x, over, ahead);
+    if (from_x.is_blocked && from_x.is_lifted_blocked)
+      return false;
+    const Line from_y = line_from(y, of_y, over, ahead);
+    return !(from_y.is_blocked && from_y.is_lifted_blocked) && is_free(from_x) && is_free(from_y);
   };
   const Eigen::Vector3f at_x = single(x.at - data.front_tree.origin()), at_y = single(y.at - data.front_tree.origin());
   const auto bound = [&](const BoxTree::Boxes& boxes) -> BoxTree::Four {

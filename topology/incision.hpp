@@ -51,7 +51,7 @@ struct Detour {
   Vector3 over = Vector3::Zero(); // m, point of the front
 };
 
-/// All sheets of a cut body at one moment. Immutable; queries are thread safe and do not allocate.
+/// All sheets of a cut body at one moment. Immutable; queries are thread safe and allocate at a thread's first alone.
 class Incision {
  public:
   /// Sheets are open or closed, consistently oriented, 2-manifold with border; they may reach out of the body and cross

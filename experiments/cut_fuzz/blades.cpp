@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <iterator>
 #include <numbers>
@@ -328,6 +329,12 @@ int fuzz_kind_count() {
 FuzzCut make_fuzz_cut(const FuzzOrgan& organ, int kind, std::mt19937_64& random) {
   Dice dice(random);
   return makers.at(kind)(organ, dice);
+}
+
+FuzzCut make_fuzz_cut(const FuzzOrgan& organ, int number) {
+  std::mt19937_64 random(static_cast<std::uint64_t>(number) * 0x9E3779B97F4A7C15ULL + 1);
+  random.discard(8);
+  return make_fuzz_cut(organ, number % fuzz_kind_count(), random);
 }
 
 } // namespace spherecut::experiments

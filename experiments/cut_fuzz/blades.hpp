@@ -26,5 +26,7 @@ struct FuzzCut {
 int fuzz_kind_count();
 
 FuzzCut make_fuzz_cut(const FuzzOrgan& organ, int kind, std::mt19937_64& random);
+/// The blade of a number, which alone decides about it.
+FuzzCut make_fuzz_cut(const FuzzOrgan& organ, int number);
 
 } // namespace spherecut::experiments

@@ -101,10 +101,10 @@ SurfaceMesh fissured_block() {
   });
 }
 
-// A box without lid, 100 x 60 x 40 mm, whose walls are 0.5 mm thin.
-SurfaceMesh thin_walls() {
-  const std::array lines{planes(-0.05, 0.05, 10, {-0.0495, 0.0495}), planes(-0.03, 0.03, 6, {-0.0295, 0.0295}),
-                         planes(0, 0.04, 4, {0.0005})};
+// A box without lid, 100 x 60 x 40 mm, with walls of `wall` m.
+SurfaceMesh open_box(double wall) {
+  const std::array lines{planes(-0.05, 0.05, 10, {-0.05 + wall, 0.05 - wall}),
+                         planes(-0.03, 0.03, 6, {-0.03 + wall, 0.03 - wall}), planes(0, 0.04, 4, {wall})};
   return solid_of_cells(lines, [lines](int i, int j, int k) {
     return k == 0 || i == 0 || j == 0 || i + 2 == std::ssize(lines[0]) || j + 2 == std::ssize(lines[1]);
   });
@@ -116,13 +116,15 @@ SurfaceMesh block_with_cavity() {
   return solid_of_cells(lines, [](int i, int j, int k) { return i < 3 || i > 6 || j < 2 || j > 3 || k < 1 || k > 2; });
 }
 
-// A block of 60 x 60 x 40 mm, 5 mm beside it one of 30 x 60 x 40 mm, and a crumb of 2 mm.
-SurfaceMesh islands() {
+// A block of 60 x 60 x 40 mm, 5 mm beside it one of 30 x 60 x 40 mm, and as the third a crumb of 2 mm.
+SurfaceMesh islands(int count) {
   SurfaceMesh all;
   for (const auto& [lower, upper, edge] :
        {std::tuple(Vector3(-0.05, -0.03, 0), Vector3(0.01, 0.03, 0.04), 0.01),
         std::tuple(Vector3(0.015, -0.03, 0), Vector3(0.045, 0.03, 0.04), 0.01),
         std::tuple(Vector3(0.0485, -0.001, 0.019), Vector3(0.0505, 0.001, 0.021), 0.002)}) {
+    if (count-- == 0)
+      break;
     const SurfaceMesh block = topology::make_block(lower, upper, edge);
     const int first = static_cast<int>(all.vertices.size());
     all.vertices.insert(all.vertices.end(), block.vertices.begin(), block.vertices.end());
@@ -189,9 +191,7 @@ FuzzOutcome cut_fuzz(const FuzzOrgan& organ, int first, int count) {
   const double organ_volume = topology::volume(organ.surface);
   FuzzOutcome outcome;
   for (int blade = first; blade < first + count; ++blade) {
-    std::mt19937_64 random(static_cast<std::uint64_t>(blade) * 0x9E3779B97F4A7C15ULL + 1);
-    random.discard(8);
-    const FuzzCut cut = make_fuzz_cut(organ, blade % fuzz_kind_count(), random);
+    const FuzzCut cut = make_fuzz_cut(organ, blade);
     ++outcome.blades;
     ++outcome.kinds[cut.kind];
     const auto fail = [&](const std::string& what) {
@@ -269,21 +269,35 @@ void add(FuzzOutcome& total, const FuzzOutcome& more) {
   total.failures.insert(total.failures.end(), more.failures.begin(), more.failures.end());
 }
 
+namespace {
+
+void add_organ(std::vector<FuzzOrgan>& organs, const std::string& name, const SurfaceMesh& surface) {
+  organs.push_back({name, surface, topology::make_organ_domain(surface)});
+}
+
+} // namespace
+
 std::vector<FuzzOrgan> fuzz_organs() {
   std::vector<FuzzOrgan> organs;
-  const auto add_organ = [&](const std::string& name, const SurfaceMesh& surface) {
-    organs.push_back({name, surface, topology::make_organ_domain(surface)});
-  };
-  add_organ("block", topology::make_block({0.1, 0.06, 0.04}, 0.01));
-  add_organ("liver", topology::make_liver(2000));
+  add_organ(organs, "block", topology::make_block({0.1, 0.06, 0.04}, 0.01));
+  add_organ(organs, "liver", topology::make_liver(2000));
   if (const char* file = std::getenv("SPHERECUT_LIVER_OBJ"); file != nullptr)
-    add_organ("scanned liver", topology::read_surface(file, 0.0337).mesh);
+    add_organ(organs, "scanned liver", topology::read_surface(file, 0.0337).mesh);
   else
-    add_organ("cylinder", topology::make_cylinder(0.04, 0.05, 0.01));
-  add_organ("fissured block", fissured_block());
-  add_organ("thin walls", thin_walls());
-  add_organ("cavity", block_with_cavity());
-  add_organ("islands", islands());
+    add_organ(organs, "cylinder", topology::make_cylinder(0.04, 0.05, 0.01));
+  add_organ(organs, "fissured block", fissured_block());
+  add_organ(organs, "thin walls", open_box(0.0005));
+  add_organ(organs, "cavity", block_with_cavity());
+  add_organ(organs, "islands", islands(3));
+  return organs;
+}
+
+std::vector<FuzzOrgan> solved_organs() {
+  std::vector<FuzzOrgan> organs;
+  add_organ(organs, "fissured block", fissured_block());
+  add_organ(organs, "walls of 5 mm", open_box(0.005));
+  add_organ(organs, "cavity", block_with_cavity());
+  add_organ(organs, "islands", islands(2));
   return organs;
 }
 

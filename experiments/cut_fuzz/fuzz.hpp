@@ -37,4 +37,8 @@ void add(FuzzOutcome& total, const FuzzOutcome& more);
 /// block with fissures of 0.1 and 1 mm, a box with walls of 0.5 mm, a block with a closed cavity, and three islands.
 std::vector<FuzzOrgan> fuzz_organs();
 
+/// Those whose cuts are solved: the block with fissures, a box whose walls of 5 mm a small body resolves, the cavity
+/// and the islands.
+std::vector<FuzzOrgan> solved_organs();
+
 } // namespace spherecut::experiments

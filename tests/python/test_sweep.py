@@ -3,18 +3,20 @@
 import itertools
 import json
 import math
+import os
 import shutil
 import signal
 import subprocess
 import time
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 import spherecut as sc
 from conftest import COMMAND, SOURCE
 from spherecut.sweep import read_study
-from spherecut.sweep.study import latin_hypercube, toml_text
+from spherecut.sweep.study import latin_hypercube, read_toml, toml_text
 from spherecut.sweep.table import rows_of, write_parquet
 from sweep_support import KILLED, STUDY, arguments, program_that, settings, sweep, table, write_study
 
@@ -124,6 +126,27 @@ def test_what_is_refused(tmp_path, text, words):
     assert len(said.stderr.splitlines()) == 1 and said.stderr.startswith(f"spherecut: error: {study}: ")
     assert all(word in said.stderr for word in words), words
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("a = " + "[" * 100_000, "deeper than 32"),
+    ("a = " + "{a=" * 100_000, "deeper than 32"),
+    ("a." * 40_000 + "a = 1", "deeper than 32"),
+    ("a." * 40 + "a = 1", "deeper than 32"),
+    ("#\n" * 3_000_000, "larger than 4194304 bytes"),
+])
+def test_texts_without_bottom_or_end(tmp_path, text, words):
+    study = write_study(tmp_path, text)
+    with pytest.raises(sc.InputError, match=words) as refused:
+        read_toml(study)
+    assert str(study) in str(refused.value) and len(str(refused.value)) < 300
+
+
+def test_pipes_and_devices_are_no_studies(tmp_path):
+    os.mkfifo(tmp_path / "pipe.toml")
+    for file in (tmp_path / "pipe.toml", Path("/dev/zero"), tmp_path):
+        with pytest.raises(sc.InputError, match="no file, but a folder, a pipe or a device"):
+            read_toml(file)
 
 
 def test_refused_folders_and_programs(tmp_path):

@@ -1,9 +1,12 @@
 // Scribbles of a scalpel over a live block, as a hand that wants to see what happens draws them: straight strokes to
 // and fro across one another, some of them without lifting the blade between. SPHERECUT_SCRIBBLES blocks (2) from the
 // seed SPHERECUT_SCRIBBLES_FIRST (1) on, SPHERECUT_SCRIBBLES_EACH scribbles (1) in each. Odd seeds: the body follows in
-// the step; even ones: it is made beside the steps. Processor time is printed, never judged.
+// the step; even ones: it is made beside the steps. Processor time is printed, never judged; work is, by a count of the
+// sight lines that had to go through all triangles.
+#include "solvers/parallel.hpp"
 #include "src/haptics/simulation.hpp"
 #include "src/haptics/surface_follower.hpp"
+#include "topology/sight_work.hpp"
 #include "topology/splinters.hpp"
 
 #include "tests/src/scenario_session.hpp"
@@ -128,6 +131,7 @@ struct Scribbled {
   double front = 0;                   // m
   double swept = 0;                   // m2, by the edge below the block's top, were the tissue at rest
   std::vector<double> seconds;        // of processor time, of increments
+  std::uint64_t most_lines = 0;       // walked through the tree of triangles in an increment
   std::map<std::string, int> reasons; // of refusals and failures
 };
 
@@ -172,6 +176,7 @@ Scribbled scribble(unsigned seed, int each) {
     event.pose_tick = tick;
     event.swaps = session.recondensing() && hand.between(0, 1) < 0.5;
     const double begin = scribble_processor_seconds();
+    const std::uint64_t lines = topology::sight_lines_walked();
     const SolveRecord record = solve_recording(simulation, device, event, snapshot);
     const double spent = scribble_processor_seconds() - begin;
     out.solves += 1;
@@ -193,6 +198,7 @@ Scribbled scribble(unsigned seed, int each) {
     if (cut->triangles > 0) {
       out.cuts += 1;
       out.seconds.push_back(spent);
+      out.most_lines = std::max(out.most_lines, topology::sight_lines_walked() - lines);
       if (std::getenv("SPHERECUT_SCRIBBLES_EACH_INCREMENT") != nullptr)
         std::cout << "  tick " << tick << " " << 1e4 * cut->area << " cm2 front " << 1e2 * cut->front_length
                   << " cm sheets " << cut->sheets << " nodes " << cut->nodes << " kept " << cut->kept_nodes << " "
@@ -225,16 +231,15 @@ Scribbled scribble(unsigned seed, int each) {
 TEST_CASE("Scribbles over a live block leave no crumbs and never stop cutting without a word", "[cut]") {
   const int first = scribble_setting("SPHERECUT_SCRIBBLES_FIRST", 1),
             count = scribble_setting("SPHERECUT_SCRIBBLES", 2), each = scribble_setting("SPHERECUT_SCRIBBLES_EACH", 1);
-  std::vector<double> all;
   for (int seed = first; seed < first + count; ++seed) {
     Scribbled out = scribble(static_cast<unsigned>(seed), each);
     std::sort(out.seconds.begin(), out.seconds.end());
-    all.insert(all.end(), out.seconds.begin(), out.seconds.end());
     std::cout << "seed " << seed << ": " << out.solves << " solves, " << out.cuts << " increments, " << out.refused
               << " refused, " << out.failed << " failed, area " << 1e4 * out.area << " of " << 1e4 * out.swept
               << " cm2, front " << 1e2 * out.front << " cm, pieces at most " << out.pieces << ", crumbs " << out.crumbs;
     if (!out.seconds.empty())
-      std::cout << ", median " << out.seconds[out.seconds.size() / 2] << " s, worst " << out.seconds.back() << " s";
+      std::cout << ", median " << out.seconds[out.seconds.size() / 2] << " s, worst " << out.seconds.back()
+                << " s, lines " << out.most_lines;
     std::cout << "\n";
     for (const auto& [reason, times] : out.reasons)
       std::cout << "  " << times << " times: " << reason << "\n";
@@ -243,4 +248,18 @@ TEST_CASE("Scribbles over a live block leave no crumbs and never stop cutting wi
     // What the hand has drawn is cut, or it has been told what is not.
     CHECK((out.area >= 0.5 * out.swept || out.refused + out.failed > 0));
   }
+}
+
+TEST_CASE("Scribbles that took longest look along no more lines than a live cut has time for", "[cut]") {
+  // 0.67 and 0.91 million in the worst increments of these; 3.2 and 4.4 million where every line goes through the tree.
+  const int before = solvers::thread_count();
+  solvers::set_thread_count(1); // lines are counted thread by thread
+  for (const unsigned seed : {1U, 3U}) {
+    const Scribbled out = scribble(seed, 1);
+    CAPTURE(seed, out.most_lines);
+    CHECK(out.cuts >= 10);
+    CHECK(out.most_lines > 10'000);
+    CHECK(out.most_lines < 1'500'000);
+  }
+  solvers::set_thread_count(before);
 }

@@ -9,6 +9,7 @@ import hashlib
 import itertools
 import json
 import re
+import stat
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -21,6 +22,8 @@ import numpy.typing as npt
 from .._core import InputError, Scenario, scenario_keys
 
 MOST_RUNS = 100_000
+MOST_BYTES = 4_194_304  # of a study or scenario
+MOST_LEVELS = 32  # of tables and arrays in one another
 COMPONENTS = ("[x, y, z]", "three or six numbers")  # kinds of keys whose components may be named by [i]
 FILE_KEYS = ("organ.file", "precut[].file")
 
@@ -406,12 +409,12 @@ def check_figure(where: str, figure: Figure, keys: list[str]) -> None:
 def read_study(file: Path) -> Study:
     """A study file with all its scenarios, checked. Raises InputError: file, key, value, limit."""
     reader = _Reader(file)
-    content = _toml(file)
+    content = read_toml(file)
     reader.table(content, "", ("title", "scenario", "grid", "list", "latin_hypercube", "figure"))
     if "scenario" not in content:
         raise InputError(f"{file}: scenario: is missing; allowed: the name of a scenario file, relative to this one")
     scenario_file = file.parent / reader.text(content["scenario"], "scenario")
-    base = _toml(scenario_file, f"{file}: scenario = {shown(content['scenario'])}: ")
+    base = read_toml(scenario_file, f"{file}: scenario = {shown(content['scenario'])}: ")
     points = _points(reader, content)
     keys = list(points[0])
     hashes = _Hashes()
@@ -436,10 +439,30 @@ def read_study(file: Path) -> Study:
     return Study(file, title, scenario_file, keys, runs, _figures(reader, content.get("figure", []), keys))
 
 
-def _toml(file: Path, where: str = "") -> dict[str, Any]:
+def read_toml(file: Path, where: str = "") -> dict[str, Any]:
+    """A file of TOML that a stranger may have written: none that never ends, is too long, or has no bottom."""
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        if not stat.S_ISREG(file.stat().st_mode):
+            raise InputError(f"{where}{file}: this is no file, but a folder, a pipe or a device")
+        with file.open("rb") as stream:
+            text = stream.read(MOST_BYTES + 1)
+        if len(text) > MOST_BYTES:
+            raise InputError(f"{where}{file}: larger than {MOST_BYTES} bytes, not of a study")
+        content = tomllib.loads(text.decode("utf-8"))
     except FileNotFoundError:
         raise InputError(f"{where}{file}: there is no such file") from None
+    except RecursionError:
+        raise _too_deep(file, where) from None
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{where}{file}: {getattr(error, 'strerror', None) or error}") from None
+    level: list[Any] = [content]
+    for _ in range(MOST_LEVELS):
+        within = (one.values() if isinstance(one, dict) else one for one in level if isinstance(one, (dict, list)))
+        level = [child for values in within for child in values]
+        if not level:
+            return content
+    raise _too_deep(file, where)
+
+
+def _too_deep(file: Path, where: str) -> InputError:
+    return InputError(f"{where}{file}: tables and arrays lie deeper than {MOST_LEVELS} in one another; allowed: {MOST_LEVELS}")

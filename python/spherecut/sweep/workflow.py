@@ -94,7 +94,7 @@ def plan(study: Study, out: Path) -> list[tuple[str, Run]]:
             try:
                 there = tomllib.loads((out / "runs" / number / "scenario.toml").read_text(encoding="utf-8"))
                 why = _difference(there, study)
-            except (OSError, ValueError):
+            except (OSError, ValueError, RecursionError):
                 why = "its scenario.toml is gone"
             raise InputError(f"{study.file}: --out {out} has another study: run {number} is none of its points ({why}); "
                              "allowed: the study as it was, with points added, or another folder. Nothing has been changed")
