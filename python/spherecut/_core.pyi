@@ -560,12 +560,11 @@ class Law:
         """A law from functions of F, (n, 3, 3), det F > 0. energy: W, (n,), J/m3; inf where the law cannot be asked.
         stress: first Piola stress dW/dF, (n, 3, 3), Pa. tangent: dP_ij/dF_kl, (n, 3, 3, 3, 3), Pa. Without tangent
         it is made by central differences of the stress, without stress that by differences of the energy, of fourth
-        order in steps of 1e-3: about 1e-11 of the shear modulus off, and 1e-8 where differences are taken of
-        differences. many=False: the functions get one F, (3, 3), at a time. bulk_modulus: kappa, Pa; above 0, U(J)
-        = kappa/4 (J^2 - 1 - 2 ln J) is added, and near nu = 0.5 bodies take the pressure of blocks. Functions are
-        called with the interpreter's lock, on any thread; what they raise comes out. Raises InputError where they
-        do not fit each other at six strained states, or F = 1 bears a stress; later for values that are not finite,
-        with F and the place in the body.
+        order in steps of 1e-3, off by 1e-9 of the shear modulus or so (docs/python.md). many=False: the functions
+        get one F, (3, 3), at a time. bulk_modulus: kappa, Pa; above 0, U(J) = kappa/4 (J^2 - 1 - 2 ln J) is added,
+        and near nu = 0.5 bodies take the pressure of blocks. Functions are called with the interpreter's lock, on
+        any thread; what they raise comes out. Raises InputError where they do not fit each other at six strained
+        states, or F = 1 bears a stress; later for values that are not finite, with F and the place in the body.
         """
     def energy(self, gradients: npt.ArrayLike) -> npt.NDArray[Any]:
         """W, (n,), J/m3 of the body at rest, at F, (n, 3, 3) or (3, 3); inf where det F <= 0."""

@@ -37,8 +37,9 @@ class LawValueError : public InputError {
 /// Throws the error as an InputError that has the place too, x in m of the body at rest.
 [[noreturn]] void throw_with_place(const LawValueError& error, const Vector3& x);
 
-/// Steps of 1e-3 leave of a stress by differences about 1e-11 mu, of a tangent by differences of given stresses the
-/// same, and of one by differences of differences about 1e-8 mu, where derivatives of the law are of the order of mu.
+/// Of a neo-Hookean law strained by 5 and by 25 %, steps of 1e-3 leave of a stress by differences 1e-11 and 1e-10 mu,
+/// of a tangent by differences of given stresses 4e-11 and 2e-9 mu, and by differences of differences 6e-10 and 3e-9
+/// mu.
 ///
 /// Throws InputError, naming function, F, value and limit: no energy; a bulk modulus that is negative or not finite; at
 /// rest and at six strained states values that are not finite, a stress at rest above 1e-6 mu, a stress that is not the
