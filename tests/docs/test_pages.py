@@ -33,6 +33,15 @@ def test_tutorials_quote_their_scripts(page):
         build.check_quotes(page.stem, text + "```python\nsc.does_not_exist()\n```\n", script)
 
 
+def test_extending_quotes_the_sources():
+    page = (SOURCE / "docs" / "extending.md").read_text()
+    blocks = re.findall(r"^In `([\w/.]+)`:\n\n```cpp\n(.*?)^```", page, re.S | re.M)
+    assert len(blocks) == page.count("```cpp") > 10
+    for file, block in blocks:
+        assert block in (SOURCE / file).read_text(), f"docs/extending.md: {file} does not have\n{block}"
+    assert all((SOURCE / name).exists() for name in re.findall(r"`((?:topology|solvers|src|experiments|tests|python)/[\w/.]+)`", page))
+
+
 def test_every_page_has_its_place_on_the_site(tmp_path):
     """Pages come by pattern: one that no section names is a how-to page."""
     listed = {str(page.relative_to(SOURCE).with_suffix("")) for page in ALL}
