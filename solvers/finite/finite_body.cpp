@@ -18,7 +18,7 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr int groups_at_once = 32; // groups that are worked on together: sums are taken chunk by chunk
+constexpr int groups_of_a_sum = 32; // groups that are worked on together: sums are taken chunk by chunk
 constexpr double least_mapped_jacobian = 0.05;
 
 Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) {
@@ -107,7 +107,7 @@ void FiniteBody::tabulate() {
   work_->deformation.resize(9 * groups);
   work_->swollen.resize(groups);
   work_->jacobian.assign(blocks_.volume.size(), 1);
-  const std::size_t chunks = (groups + groups_at_once - 1) / groups_at_once;
+  const std::size_t chunks = (groups + groups_of_a_sum - 1) / groups_of_a_sum;
   work_->chunk_energy.resize(chunks);
   work_->chunk_least.resize(chunks);
   work_->incident_start.assign(static_cast<std::size_t>(size()) + 1, 0);
@@ -180,7 +180,7 @@ double FiniteBody::deform(const VectorX& coefficients) const {
   if (coefficients.size() != 3 * static_cast<Eigen::Index>(size()))
     throw InputError(fmt::format("{} coefficients for {} nodes; there are 3 a node", coefficients.size(), size()));
   Work& work = *work_;
-  parallel_ranges(table_.groups(), groups_at_once, [&](int begin, int end) {
+  parallel_ranges(table_.groups(), groups_of_a_sum, [&](int begin, int end) {
     double least = std::numeric_limits<double>::infinity();
     for (int group = begin; group < end; ++group) {
       const std::span<const int> nodes = table_.nodes_of(group);
@@ -197,7 +197,7 @@ double FiniteBody::deform(const VectorX& coefficients) const {
       }
       work.swollen[group] = swollen;
     }
-    work.chunk_least[begin / groups_at_once] = least;
+    work.chunk_least[begin / groups_of_a_sum] = least;
   });
   std::fill(work.jacobian.begin(), work.jacobian.end(), 0.0);
   if (blocks_.size() > 0) {
@@ -235,8 +235,8 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
   if (!one_thread)
     work.slots.resize(3 * table_.nodes.size());
   const bool minds = minds_volume();
-  parallel_ranges(table_.groups(), groups_at_once, [&](int begin, int end) {
-    constexpr int most = groups_at_once * point_lanes;
+  parallel_ranges(table_.groups(), groups_of_a_sum, [&](int begin, int end) {
+    constexpr int most = groups_of_a_sum * point_lanes;
     std::array<Matrix3, most> gradient, stress;
     std::array<double, most> density;
     int count = 0;
@@ -287,7 +287,7 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
                      work.slots.data() + 3 * static_cast<std::size_t>(table_.start[group]));
       }
     }
-    work.chunk_energy[begin / groups_at_once] = sum;
+    work.chunk_energy[begin / groups_of_a_sum] = sum;
   });
   if (!one_thread)
     parallel_ranges(size(), 64, [&](int begin, int end) {
