@@ -119,7 +119,7 @@ TEST_CASE("One cut has the same nodes however far its sheet reaches out of the b
                          fmt::format("{}", 0.06 + 2 * reach), fmt::format("{}", 0.015 + reach));
     const Session session = session_of(text);
     counts.insert(session.sprinkling().nodes.size());
-    CHECK(session.zone().spacing.fine == Approx(std::sqrt(0.06 * 0.015) / 6).epsilon(0.02));
+    CHECK(session.zone().spacing.fine == Approx(0.15 * 0.015)); // of its depth in the body
   }
   CHECK(counts.size() == 1);
 }

@@ -107,7 +107,7 @@ TEST_CASE("Where regions hold nothing, no piece of a precut organ is called seve
     std::string said;
     CHECK_THROWS_WITH(Session(scenario_of(text + unheld), [&](const std::string& line) { said += line; }),
                       Contains("no surface node") && !Contains("severed"));
-    CHECK(said.empty());
+    CHECK(said.find("severed") == std::string::npos);
   }
 }
 
