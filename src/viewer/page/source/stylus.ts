@@ -35,7 +35,7 @@ const settling = 2e-5; // m, by which the hand goes on until they have: every mo
 export class Stylus {
   mode: Mode = 'probe';
   /** To which depth a press goes, m; negative with the grasper: it pulls out. */
-  readonly depths: Record<Mode, number> = { probe: 0.006, blade: 0.012, grasper: -0.006 };
+  readonly depths: Record<Mode, number> = { probe: 0.006, blade: 0.008, grasper: -0.006 };
   /** Holds the tool: only then are poses sent. */
   holding = false;
   private stage: Stage = 'hovering';
