@@ -9,7 +9,6 @@
 #pragma once
 
 #include "topology/contact.hpp"
-#include "topology/overloaded.hpp"
 #include "topology/surface_walk.hpp"
 
 #include <cmath>
@@ -176,11 +175,15 @@ SurfaceContact deepest_contact(const Surface& surface, const ToolShape& tool, co
                                const SurfaceContact& last) {
   const int hint = surface.walk.internal(last.triangle);
   std::array<int, 10> end_triangles = last.end_triangles;
-  const Deepest deepest = std::visit(
-      Overloaded{[&](const SphereTip& tip) { return deepest_of_sphere(surface, tip, pose, hint); },
-                 [&](const FlatPunch& punch) { return deepest_of_punch(surface, punch, pose, last, end_triangles); },
-                 [&](const Laparoscope& scope) { return deepest_of_laparoscope(surface, scope, pose, last); }},
-      tool);
+  // Not std::visit, which may throw as far as a compiler knows.
+  static_assert(std::variant_size_v<ToolShape> == 3, "a tool shape without its deepest contact");
+  Deepest deepest;
+  if (const auto* scope = std::get_if<Laparoscope>(&tool))
+    deepest = deepest_of_laparoscope(surface, *scope, pose, last);
+  else if (const auto* punch = std::get_if<FlatPunch>(&tool))
+    deepest = deepest_of_punch(surface, *punch, pose, last, end_triangles);
+  else if (const auto* tip = std::get_if<SphereTip>(&tool))
+    deepest = deepest_of_sphere(surface, *tip, pose, hint);
   return {deepest.surface.point, deepest.surface.normal, deepest.depth, surface.walk.original(deepest.surface.triangle),
           deepest.tool_point,    end_triangles};
 }
