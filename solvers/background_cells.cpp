@@ -507,10 +507,6 @@ class Octree {
   BoxFiller filler_;
 };
 
-} // namespace
-
-namespace {
-
 void require_fit(const NodeCloud& nodes, const BackgroundOptions& options) {
   if (options.quadrature < 1 || options.quadrature > 3)
     throw InputError(fmt::format("quadrature rule {}; there are 1, 2 and 3", options.quadrature));

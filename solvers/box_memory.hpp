@@ -12,8 +12,9 @@
 
 namespace spherecut::solvers {
 
-/// Boxes that may meet the surface of one domain, as the last body that was made of it had them. Safe to share among
-/// threads: what is looked up does not change while a body is made.
+/// Boxes that may meet the surface of one domain, as the last body that was made of it had them. What is kept follows
+/// from box and domain alone, whatever the BackgroundOptions. Safe to share among threads: what is looked up does not
+/// change while a body is made.
 class BoxMemory {
  public:
   struct Box {
