@@ -20,7 +20,7 @@ endif()
 add_library(spherecut_options INTERFACE)
 target_compile_features(spherecut_options INTERFACE cxx_std_20)
 # Debian's libfcl and libopenvdb are built for baseline x86-64: Eigen types must keep the alignment they have there. This
-# does it for members; memory that Eigen takes follows the compiler's flags, which topology/types.hpp looks at.
+# does it for members; memory that Eigen takes follows the compiler's flags, which topology/base/types.hpp looks at.
 target_compile_definitions(spherecut_options INTERFACE EIGEN_MAX_ALIGN_BYTES=16)
 
 add_library(spherecut_warnings INTERFACE)

@@ -2,11 +2,11 @@
 # Whoever changes one file often builds with -DSPHERECUT_UNITY=OFF (the preset debug does).
 option(SPHERECUT_UNITY "Compile several sources together" ON)
 
-# spherecut_unity(TARGET [SIZE n] [ALONE name...]): up to n (8) sources of a folder in one unit. Names in unnamed namespaces
-# are therefore unique within a folder. On their own stay units of the large template libraries (time and memory), of one
-# instruction set, and those given as ALONE.
+# spherecut_unity(TARGET [TOGETHER] [SIZE n] [ALONE name...]): up to n (8) sources of a folder in one unit, with TOGETHER of
+# all folders of the target. Names in unnamed namespaces are therefore unique within a folder, or within the target. On
+# their own stay units of the large template libraries (time and memory), of one instruction set, and those given as ALONE.
 function(spherecut_unity target)
-  cmake_parse_arguments(PARSE_ARGV 1 unity "" "SIZE" "ALONE")
+  cmake_parse_arguments(PARSE_ARGV 1 unity "TOGETHER" "SIZE" "ALONE")
   if(NOT unity_SIZE)
     set(unity_SIZE 8)
   endif()
@@ -20,10 +20,13 @@ function(spherecut_unity target)
     cmake_path(ABSOLUTE_PATH source)
     cmake_path(GET source FILENAME name)
     file(STRINGS "${source}" heavy REGEX "^#include <(CGAL|openvdb|fcl|voro|boost/asio|boost/beast|getfem)" LIMIT_COUNT 1)
-    if(heavy OR name MATCHES "^(shape|law)_kernel" OR name IN_LIST unity_ALONE)
+    if(heavy OR name MATCHES "^(law_)?kernel[_.]" OR name IN_LIST unity_ALONE)
       set_source_files_properties("${source}" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     else()
       cmake_path(GET source PARENT_PATH folder)
+      if(unity_TOGETHER)
+        set(folder "${target}")
+      endif()
       string(MD5 key "${folder}")
       math(EXPR count_${key} "0${count_${key}} + 1")
       math(EXPR part "(${count_${key}} - 1) / ${unity_SIZE}")

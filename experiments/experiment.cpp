@@ -4,8 +4,8 @@
 #include "experiments/real_world/live_situations.hpp"
 #include "experiments/registered.hpp"
 #include "experiments/remeshing_ledger/run.hpp"
-#include "src/output_file.hpp"
-#include "topology/errors.hpp"
+#include "src/base/output_file.hpp"
+#include "topology/base/errors.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

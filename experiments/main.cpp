@@ -1,12 +1,13 @@
-// The command line of the experiments, which `spherecut experiment` passes on to. Exit status as src/main.cpp says.
+// The command line of the experiments, which `spherecut experiment` passes on to. Exit status as src/apps/main.cpp
+// says.
 #include "experiments/experiment.hpp"
-#include "solvers/parallel.hpp"
-#include "src/interrupt.hpp"
-#include "src/printable.hpp"
-#include "src/program.hpp"
-#include "src/run.hpp"
-#include "topology/errors.hpp"
-#include "topology/interruption.hpp"
+#include "solvers/algebra/parallel.hpp"
+#include "src/apps/program.hpp"
+#include "src/base/interrupt.hpp"
+#include "src/base/printable.hpp"
+#include "src/run/run.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/base/interruption.hpp"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

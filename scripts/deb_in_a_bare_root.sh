@@ -75,7 +75,7 @@ domain = sc.Domain.box([-0.02, -0.02, 0], [0.02, 0.02, 0.02], 0.004)
 nodes = sc.sprinkle(domain, sc.Spacing(0.004)).nodes
 body = sc.Body(domain, nodes, sc.Material(1e4, 0.3), [sc.Held(sc.Region.half_space([0, 0, 0], [0, 0, 1]))], body_force=[0, 0, -1e4])
 print(f"Python: spherecut {sc.__version__}, {len(nodes)} nodes, residual {body.residual(body.solve()):.1e}")' || fail "the Python package does not work"
-for installed in include/spherecut/solvers/discretisation.hpp lib/cmake/spherecut/spherecutConfig.cmake lib/libspherecut_app.a \
+for installed in include/spherecut/solvers/body/discretisation.hpp lib/cmake/spherecut/spherecutConfig.cmake lib/libspherecut_app.a \
   share/spherecut/page/index.html share/doc/spherecut/README.md share/doc/spherecut/html/index.html; do
   [ -s "$root/usr/$installed" ] || fail "/usr/$installed is not installed"
 done

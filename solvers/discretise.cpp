@@ -1,9 +1,9 @@
 // The method that a problem is solved by: the one place that knows them all.
 #include "solvers/appended/appended_body.hpp"
-#include "solvers/discretisation.hpp"
-#include "solvers/elastic_body.hpp"
-#include "solvers/published.hpp"
-#include "topology/errors.hpp"
+#include "solvers/body/discretisation.hpp"
+#include "solvers/body/elastic_body.hpp"
+#include "solvers/published/published.hpp"
+#include "topology/base/errors.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

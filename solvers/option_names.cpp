@@ -1,6 +1,6 @@
 // Names of the options that scenarios choose among: one table each, read in both directions.
-#include "solvers/lip_contact.hpp"
-#include "topology/errors.hpp"
+#include "solvers/contact/lip_contact.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <array>

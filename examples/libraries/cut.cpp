@@ -1,11 +1,11 @@
 // A penny-shaped cut, tilted, in a block, with a pressure on its faces: how far it opens, and the stress intensity
 // along its front against Sneddon's penny in an unbounded body, 2 p sqrt(a / pi). Then the way of a blade.
-#include <spherecut/solvers/lip_contact.hpp>
-#include <spherecut/solvers/stress_intensity.hpp>
-#include <spherecut/topology/blade.hpp>
-#include <spherecut/topology/cut_sheets.hpp>
-#include <spherecut/topology/organs.hpp>
-#include <spherecut/topology/wound.hpp>
+#include <spherecut/solvers/contact/lip_contact.hpp>
+#include <spherecut/solvers/fracture/stress_intensity.hpp>
+#include <spherecut/topology/blade/blade.hpp>
+#include <spherecut/topology/incision/cut_sheets.hpp>
+#include <spherecut/topology/organ/organs.hpp>
+#include <spherecut/topology/wound/wound.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // A device of one's own in the haptic loop: it is asked where it is and told a force, a thousand times a second. Here
 // it sways 4 mm into a block and out again, in virtual time, so that the same numbers come out every time;
 // app::run_realtime takes the same device.
-#include <spherecut/src/haptics/virtual_loop.hpp>
+#include <spherecut/src/live/virtual_loop.hpp>
 
 #include <cmath>
 #include <cstdio>

@@ -1,7 +1,7 @@
 // Presses a ball into a block that stands on its base, with the solvers alone: nodes, system, contact, field.
-#include <spherecut/solvers/contact_solver.hpp>
-#include <spherecut/src/version.hpp>
-#include <spherecut/topology/domain.hpp>
+#include <spherecut/solvers/contact/solver.hpp>
+#include <spherecut/src/base/version.hpp>
+#include <spherecut/topology/domain/domain.hpp>
 
 #include <cstdio>
 #include <string>

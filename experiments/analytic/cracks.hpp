@@ -1,7 +1,7 @@
 // Exact fields and intensities of cracks in linear elasticity.
 #pragma once
 
-#include "solvers/stress_intensity.hpp"
+#include "solvers/fracture/stress_intensity.hpp"
 
 #include <functional>
 

@@ -1,6 +1,6 @@
 #include "experiments/analytic/finite_strain.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

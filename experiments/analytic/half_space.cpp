@@ -1,6 +1,6 @@
 #include "experiments/analytic/half_space.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

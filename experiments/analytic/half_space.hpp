@@ -2,7 +2,7 @@
 // axis of the tool. The far field of each is that of solvers::half_space_displacement.
 #pragma once
 
-#include "solvers/material.hpp"
+#include "solvers/elasticity/material.hpp"
 
 namespace spherecut::experiments {
 

@@ -1,7 +1,7 @@
 // Displacement fields made up in closed form, with the loads that make them solutions of linear elasticity.
 #pragma once
 
-#include "solvers/discretisation.hpp"
+#include "solvers/body/discretisation.hpp"
 
 #include <cstdint>
 #include <vector>

@@ -10,9 +10,9 @@
 #include "experiments/support/statistics.hpp"
 #include "experiments/support/tilted_strip.hpp"
 
-#include "solvers/tearing.hpp"
-#include "src/figure.hpp"
-#include "topology/front_growth.hpp"
+#include "solvers/fracture/tearing.hpp"
+#include "src/output/figure.hpp"
+#include "topology/incision/front_growth.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -9,9 +9,9 @@
 #include "experiments/support/cut_body.hpp"
 #include "experiments/support/half_space_contact.hpp"
 #include "experiments/support/statistics.hpp"
-#include "solvers/lip_contact.hpp"
-#include "src/figure.hpp"
-#include "topology/cut_sheets.hpp"
+#include "solvers/contact/lip_contact.hpp"
+#include "src/output/figure.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "experiments/cut_fuzz/blades.hpp"
 
-#include "topology/blade.hpp"
-#include "topology/organs.hpp"
+#include "topology/blade/blade.hpp"
+#include "topology/organ/organs.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,7 +1,7 @@
 // Random and degenerate blades against an organ.
 #pragma once
 
-#include "topology/domain.hpp"
+#include "topology/domain/domain.hpp"
 
 #include <random>
 

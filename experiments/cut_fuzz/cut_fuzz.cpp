@@ -9,7 +9,7 @@
 #include "experiments/cut_fuzz/fuzz.hpp"
 #include "experiments/cut_fuzz/solved.hpp"
 #include "experiments/registered.hpp"
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <fmt/format.h>
 

@@ -1,9 +1,9 @@
 #include "experiments/cut_fuzz/fuzz.hpp"
 
-#include "topology/errors.hpp"
-#include "topology/organs.hpp"
-#include "topology/piece_audit.hpp"
-#include "topology/surface_check.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/organ/organs.hpp"
+#include "topology/organ/surface_check.hpp"
+#include "topology/wound/piece_audit.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

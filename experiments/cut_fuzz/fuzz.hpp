@@ -3,7 +3,7 @@
 
 #include "experiments/cut_fuzz/blades.hpp"
 
-#include "topology/wound.hpp"
+#include "topology/wound/wound.hpp"
 
 #include <map>
 #include <optional>

@@ -1,9 +1,9 @@
 #include "experiments/cut_fuzz/solved.hpp"
 
-#include "src/session.hpp"
-#include "topology/errors.hpp"
-#include "topology/interruption.hpp"
-#include "topology/surface_io.hpp"
+#include "src/session/session.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/base/interruption.hpp"
+#include "topology/files/surface_io.hpp"
 
 #include <algorithm>
 #include <cmath>

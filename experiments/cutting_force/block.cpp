@@ -2,7 +2,7 @@
 
 #include "experiments/support/cut_body.hpp"
 
-#include "topology/cut_sheets.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <cmath>
 

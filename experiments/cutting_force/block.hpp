@@ -1,7 +1,7 @@
 // A block between two held faces and a straight edge that cuts into it from its free end.
 #pragma once
 
-#include "solvers/blade_contact.hpp"
+#include "solvers/contact/blade_contact.hpp"
 
 namespace spherecut::experiments {
 

@@ -7,8 +7,8 @@
 #include "experiments/cutting_force/block.hpp"
 #include "experiments/registered.hpp"
 
-#include "src/figure.hpp"
-#include "topology/errors.hpp"
+#include "src/output/figure.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <array>

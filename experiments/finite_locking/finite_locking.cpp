@@ -6,7 +6,7 @@
 #include "experiments/registered.hpp"
 #include "experiments/support/finite_block.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -7,7 +7,7 @@
 #include "experiments/registered.hpp"
 #include "experiments/support/finite_block.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -6,8 +6,8 @@
 #include "experiments/support/statistics.hpp"
 
 #include "flap_scenario.hpp"
-#include "src/cut_output.hpp"
-#include "src/tear_output.hpp"
+#include "src/output/cut_output.hpp"
+#include "src/output/tear_output.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -5,7 +5,7 @@
 #include "experiments/registered.hpp"
 
 #include "experiments/support/haptic_motions.hpp"
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

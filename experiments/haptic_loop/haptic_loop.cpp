@@ -5,9 +5,9 @@
 // Command:   spherecut experiment run haptic_loop --out DIR
 #include "experiments/registered.hpp"
 
-#include "src/figure.hpp"
-#include "src/haptics/haptic_report.hpp"
-#include "src/haptics/run_haptics.hpp"
+#include "src/live/haptic_report.hpp"
+#include "src/live/run_haptics.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <cmath>

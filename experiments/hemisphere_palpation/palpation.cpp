@@ -2,10 +2,10 @@
 
 #include "experiments/support/sprinkle_to_count.hpp"
 #include "experiments/support/stopwatch.hpp"
-#include "solvers/contact_rings.hpp"
-#include "solvers/published.hpp"
-#include "solvers/tool_pattern.hpp"
-#include "topology/errors.hpp"
+#include "solvers/body/contact_rings.hpp"
+#include "solvers/published/published.hpp"
+#include "solvers/shapes/tool_pattern.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "experiments/hemisphere_palpation/reference.hpp"
-#include "solvers/discretisation.hpp"
+#include "solvers/body/discretisation.hpp"
 
 namespace spherecut::experiments {
 

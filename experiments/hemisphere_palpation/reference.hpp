@@ -3,7 +3,7 @@
 // and depth 1 m, so that u = depth * table and F = E * radius * depth * force.
 #pragma once
 
-#include "topology/types.hpp"
+#include "topology/base/types.hpp"
 
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
 #include "experiments/hemisphere_palpation/reference.hpp"
 
 #include "hemisphere_palpation/reference_tables.hpp" // made by CMake
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <charconv>
 #include <cmath>

@@ -7,10 +7,10 @@
 // Command:   spherecut experiment run liver_palpation --out DIR
 #include "experiments/registered.hpp"
 
-#include "src/figure.hpp"
-#include "src/session.hpp"
-#include "src/vtp.hpp"
-#include "topology/errors.hpp"
+#include "src/output/figure.hpp"
+#include "src/output/vtp.hpp"
+#include "src/session/session.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -13,7 +13,7 @@
 #include "experiments/support/cube.hpp"
 #include "experiments/support/statistics.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

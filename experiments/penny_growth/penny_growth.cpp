@@ -9,10 +9,10 @@
 #include "experiments/support/cut_body.hpp"
 #include "experiments/support/statistics.hpp"
 
-#include "solvers/tearing.hpp"
-#include "src/figure.hpp"
-#include "topology/cut_sheets.hpp"
-#include "topology/front_growth.hpp"
+#include "solvers/fracture/tearing.hpp"
+#include "src/output/figure.hpp"
+#include "topology/incision/cut_sheets.hpp"
+#include "topology/incision/front_growth.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -8,8 +8,8 @@
 #include "experiments/support/statistics.hpp"
 #include "experiments/support/tilted_strip.hpp"
 
-#include "src/figure.hpp"
-#include "topology/errors.hpp"
+#include "src/output/figure.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,7 @@
 #include "experiments/support/statistics.hpp"
 #include "experiments/support/tilted_strip.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <cmath>

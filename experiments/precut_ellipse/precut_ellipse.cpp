@@ -13,7 +13,7 @@
 #include "experiments/support/pressed_crack.hpp"
 #include "experiments/support/statistics.hpp"
 
-#include "topology/cut_sheets.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,7 +12,7 @@
 #include "experiments/support/pressed_crack.hpp"
 #include "experiments/support/statistics.hpp"
 
-#include "topology/cut_sheets.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -9,7 +9,7 @@
 #include "experiments/support/penny_body.hpp"
 #include "experiments/support/statistics.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

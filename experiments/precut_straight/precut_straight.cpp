@@ -11,7 +11,7 @@
 #include "experiments/support/statistics.hpp"
 #include "experiments/support/straight_crack.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -8,7 +8,7 @@
 #include "experiments/registered.hpp"
 #include "experiments/support/statistics.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Cuts in scenarios that say nothing of nodes: the volume of their opening and the intensities at their fronts.
 #include "experiments/analytic/cracks.hpp"
 #include "experiments/real_world/situations.hpp"
-#include "solvers/tearing.hpp"
+#include "solvers/fracture/tearing.hpp"
 
 #include <algorithm>
 #include <cmath>

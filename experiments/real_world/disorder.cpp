@@ -2,14 +2,14 @@
 // on it, and every long computation gives up when it is told to.
 #include "experiments/real_world/live_situations.hpp"
 #include "experiments/support/haptic_motions.hpp"
-#include "solvers/nodes.hpp"
-#include "src/output_file.hpp"
-#include "src/printable.hpp"
-#include "src/scenario_keys.hpp"
+#include "solvers/nodes/nodes.hpp"
+#include "src/base/output_file.hpp"
+#include "src/base/printable.hpp"
+#include "src/scenario/keys.hpp"
 #include "src/viewer/requests.hpp"
-#include "topology/errors.hpp"
-#include "topology/interruption.hpp"
-#include "topology/regular_file.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/base/interruption.hpp"
+#include "topology/base/regular_file.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -1,9 +1,9 @@
 #include "experiments/real_world/situations.hpp"
 
 #include "experiments/support/slit_block.hpp"
-#include "solvers/elastic_body.hpp"
-#include "topology/gap_walls.hpp"
-#include "topology/organs.hpp"
+#include "solvers/body/elastic_body.hpp"
+#include "topology/incision/gap_walls.hpp"
+#include "topology/organ/organs.hpp"
 
 #include <algorithm>
 #include <cmath>

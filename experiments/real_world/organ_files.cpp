@@ -1,8 +1,8 @@
 #include "experiments/real_world/situations.hpp"
 
-#include "topology/label_volume.hpp"
-#include "topology/organs.hpp"
-#include "topology/surface_check.hpp"
+#include "topology/files/label_volume.hpp"
+#include "topology/organ/organs.hpp"
+#include "topology/organ/surface_check.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

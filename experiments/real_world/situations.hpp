@@ -3,8 +3,8 @@
 
 #include "experiments/experiment.hpp"
 
-#include "src/scenario.hpp"
-#include "src/session.hpp"
+#include "src/scenario/scenario.hpp"
+#include "src/session/session.hpp"
 
 namespace spherecut::experiments::real_world {
 

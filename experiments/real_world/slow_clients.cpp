@@ -3,7 +3,7 @@
 #include "experiments/real_world/live_situations.hpp"
 #include "experiments/support/haptic_motions.hpp"
 #include "experiments/support/slow_client.hpp"
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <cmath>

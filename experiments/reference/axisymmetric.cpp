@@ -2,7 +2,7 @@
 // D elastic matrix. Integrals run around the axis: dV = 2 pi r dr dz.
 #include "experiments/reference/axisymmetric.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/Dense>
 #include <Eigen/SparseCholesky>

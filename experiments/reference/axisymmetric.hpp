@@ -2,8 +2,8 @@
 // under test.
 #pragma once
 
-#include "solvers/material.hpp"
-#include "topology/types.hpp"
+#include "solvers/elasticity/material.hpp"
+#include "topology/base/types.hpp"
 
 #include <functional>
 #include <vector>

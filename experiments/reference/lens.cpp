@@ -1,6 +1,6 @@
 #include "experiments/reference/lens.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <array>
 #include <cmath>

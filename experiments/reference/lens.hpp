@@ -3,7 +3,7 @@
 
 #include "experiments/reference/axisymmetric.hpp"
 
-#include "solvers/stress_intensity.hpp"
+#include "solvers/fracture/stress_intensity.hpp"
 
 namespace spherecut::experiments {
 

@@ -3,7 +3,7 @@
 #include "experiments/remeshing_ledger/mesh_request.hpp"
 #include "experiments/remeshing_ledger/surface_patch.hpp"
 #include "experiments/remeshing_ledger/tet_mesh.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "experiments/remeshing_ledger/cavity_fill.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

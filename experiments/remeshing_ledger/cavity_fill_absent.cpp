@@ -1,6 +1,6 @@
 // Builds that found no TetGen.
 #include "experiments/remeshing_ledger/cavity_fill.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 namespace spherecut::experiments::ledger {
 

@@ -5,7 +5,7 @@
 #include "experiments/remeshing_ledger/fem_model.hpp"
 #include "experiments/remeshing_ledger/meshed_back_end.hpp"
 #include "experiments/remeshing_ledger/sub_structure.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,8 @@
 // lambda M + mu M^T + mu tr(M) 1.
 #include "experiments/remeshing_ledger/fem_model.hpp"
 
-#include "solvers/elimination_order.hpp"
-#include "topology/errors.hpp"
+#include "solvers/algebra/elimination_order.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -3,7 +3,7 @@
 
 #include "experiments/remeshing_ledger/back_end.hpp"
 #include "experiments/remeshing_ledger/tet_mesh.hpp"
-#include "solvers/factorisation.hpp"
+#include "solvers/algebra/factorisation.hpp"
 
 #include <memory>
 

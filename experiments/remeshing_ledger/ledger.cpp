@@ -2,7 +2,7 @@
 
 #include "experiments/remeshing_ledger/own_process.hpp"
 #include "experiments/support/statistics.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

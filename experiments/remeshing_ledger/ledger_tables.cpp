@@ -1,7 +1,7 @@
 // CSV files, the tables of the page in Markdown, and figures.
 #include "experiments/remeshing_ledger/ledger.hpp"
 #include "experiments/support/statistics.hpp"
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "experiments/remeshing_ledger/level_set_rules.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

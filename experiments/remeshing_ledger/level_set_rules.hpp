@@ -1,7 +1,7 @@
 // Integration over tetrahedra that a level set cuts, by GetFEM (which stays in its .cpp, built where it is installed).
 #pragma once
 
-#include "topology/types.hpp"
+#include "topology/base/types.hpp"
 
 #include <array>
 #include <vector>

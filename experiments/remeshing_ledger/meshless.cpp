@@ -1,8 +1,8 @@
 // This project's own back end: nodes exchanged near the increment and the system updated, or everything anew.
 #include "experiments/remeshing_ledger/back_end.hpp"
 #include "experiments/support/cut_body.hpp"
-#include "solvers/growing_body.hpp"
-#include "topology/errors.hpp"
+#include "solvers/cut/growing_body.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

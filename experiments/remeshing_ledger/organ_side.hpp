@@ -1,7 +1,7 @@
 // Inside or outside of an organ, which a mesher asks some millions of times.
 #pragma once
 
-#include "topology/domain.hpp"
+#include "topology/domain/domain.hpp"
 
 #include <functional>
 #include <memory>

@@ -2,7 +2,7 @@
 
 #include "experiments/remeshing_ledger/organ_side.hpp"
 
-#include "topology/organs.hpp"
+#include "topology/organ/organs.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

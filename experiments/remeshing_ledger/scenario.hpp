@@ -2,9 +2,9 @@
 #pragma once
 
 #include "experiments/analytic/cracks.hpp"
-#include "solvers/material.hpp"
-#include "solvers/nodes.hpp"
-#include "topology/domain.hpp"
+#include "solvers/elasticity/material.hpp"
+#include "solvers/nodes/nodes.hpp"
+#include "topology/domain/domain.hpp"
 
 #include <Eigen/Geometry>
 #include <functional>

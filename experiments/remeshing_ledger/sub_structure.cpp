@@ -1,6 +1,6 @@
 #include "experiments/remeshing_ledger/sub_structure.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

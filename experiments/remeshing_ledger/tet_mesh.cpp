@@ -1,6 +1,6 @@
 #include "experiments/remeshing_ledger/tet_mesh.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

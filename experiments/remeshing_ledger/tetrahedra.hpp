@@ -1,7 +1,7 @@
 // Tetrahedra as plain arrays, and their shapes.
 #pragma once
 
-#include "topology/types.hpp"
+#include "topology/base/types.hpp"
 
 #include <functional>
 

@@ -5,7 +5,7 @@
 #include "experiments/remeshing_ledger/mesh_request.hpp"
 #include "experiments/remeshing_ledger/own_process.hpp"
 #include "experiments/remeshing_ledger/xfem_cells.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,10 +6,10 @@
 // Command:   spherecut experiment run reprojection --out DIR
 #include "experiments/registered.hpp"
 #include "experiments/support/statistics.hpp"
-#include "solvers/growing_cut.hpp"
-#include "src/figure.hpp"
-#include "topology/blade.hpp"
-#include "topology/wound.hpp"
+#include "solvers/cut/growing_cut.hpp"
+#include "src/output/figure.hpp"
+#include "topology/blade/blade.hpp"
+#include "topology/wound/wound.hpp"
 
 #include <algorithm>
 #include <cmath>

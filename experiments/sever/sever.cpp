@@ -7,11 +7,11 @@
 #include "experiments/registered.hpp"
 #include "experiments/support/cut_body.hpp"
 
-#include "solvers/collocation.hpp"
-#include "solvers/galerkin.hpp"
-#include "src/figure.hpp"
-#include "topology/cut_sheets.hpp"
-#include "topology/errors.hpp"
+#include "solvers/collocation/collocation.hpp"
+#include "solvers/galerkin/galerkin.hpp"
+#include "src/output/figure.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -8,8 +8,8 @@
 #include "experiments/support/statistics.hpp"
 #include "experiments/support/straight_crack.hpp"
 
-#include "solvers/tearing.hpp"
-#include "src/figure.hpp"
+#include "solvers/fracture/tearing.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <array>

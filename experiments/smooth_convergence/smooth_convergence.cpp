@@ -7,7 +7,7 @@
 #include "experiments/support/statistics.hpp"
 #include "experiments/support/stopwatch.hpp"
 
-#include "src/figure.hpp"
+#include "src/output/figure.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,10 +12,10 @@
 
 #include "experiments/support/haptic_motions.hpp"
 #include "experiments/support/stopwatch.hpp"
-#include "solvers/published_step.hpp"
-#include "solvers/tool_pattern.hpp"
-#include "src/figure.hpp"
-#include "topology/errors.hpp"
+#include "solvers/published/step.hpp"
+#include "solvers/shapes/tool_pattern.hpp"
+#include "src/output/figure.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <chrono>

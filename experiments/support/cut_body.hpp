@@ -1,7 +1,7 @@
 // Bodies with a cut that is there from the start, as the precut experiments use them.
 #pragma once
 
-#include "solvers/discretisation.hpp"
+#include "solvers/body/discretisation.hpp"
 
 #include <functional>
 

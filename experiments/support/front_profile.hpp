@@ -3,8 +3,8 @@
 
 #include "experiments/support/precut_series.hpp"
 
-#include "solvers/tearing.hpp"
-#include "src/figure.hpp"
+#include "solvers/fracture/tearing.hpp"
+#include "src/output/figure.hpp"
 
 #include <functional>
 #include <string>

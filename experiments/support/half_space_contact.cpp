@@ -2,7 +2,7 @@
 
 #include "experiments/support/sprinkle_to_count.hpp"
 #include "experiments/support/stopwatch.hpp"
-#include "solvers/contact_rings.hpp"
+#include "solvers/body/contact_rings.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // A local piece of an elastic half-space with a tool's patch on it: ground of the punch and Hertz experiments.
 #pragma once
 
-#include "solvers/contact_solver.hpp"
+#include "solvers/contact/solver.hpp"
 
 #include <functional>
 #include <string>

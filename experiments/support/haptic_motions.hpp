@@ -1,7 +1,7 @@
 // Motions of a ball on a block, and the errors of the force models on them: ground of the haptic experiments.
 #pragma once
 
-#include "src/haptics/haptic_report.hpp"
+#include "src/live/haptic_report.hpp"
 
 #include <string>
 #include <vector>

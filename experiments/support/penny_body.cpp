@@ -1,6 +1,6 @@
 #include "experiments/support/penny_body.hpp"
 
-#include "topology/cut_sheets.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <cmath>
 

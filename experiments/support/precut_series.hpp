@@ -3,7 +3,7 @@
 
 #include "experiments/experiment.hpp"
 
-#include "solvers/discretisation.hpp"
+#include "solvers/body/discretisation.hpp"
 
 #include <map>
 #include <string>

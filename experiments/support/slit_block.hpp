@@ -1,7 +1,7 @@
 // A block with a slit of its own surface: two legs side by side on a base, for the experiment real_world and for tests.
 #pragma once
 
-#include "topology/surface_mesh.hpp"
+#include "topology/surface/mesh.hpp"
 
 #include <vector>
 

@@ -2,7 +2,7 @@
 // busy computer make of a device, in virtual time.
 #pragma once
 
-#include "src/haptics/client_pace.hpp"
+#include "src/devices/client_pace.hpp"
 
 #include <deque>
 #include <random>

@@ -1,6 +1,6 @@
 #include "experiments/support/sprinkle_to_count.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

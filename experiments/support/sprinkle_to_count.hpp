@@ -1,7 +1,7 @@
 // Sprinkling to a number of nodes where the seeds themselves depend on the spacing.
 #pragma once
 
-#include "solvers/nodes.hpp"
+#include "solvers/nodes/nodes.hpp"
 
 #include <functional>
 

@@ -1,6 +1,6 @@
 #include "experiments/support/statistics.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

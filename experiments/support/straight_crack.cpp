@@ -1,6 +1,6 @@
 #include "experiments/support/straight_crack.hpp"
 
-#include "topology/cut_sheets.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 namespace spherecut::experiments {
 

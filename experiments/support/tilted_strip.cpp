@@ -1,6 +1,6 @@
 #include "experiments/support/tilted_strip.hpp"
 
-#include "topology/cut_sheets.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

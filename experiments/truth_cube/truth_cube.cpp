@@ -11,8 +11,8 @@
 #include "experiments/measured.hpp"
 #include "experiments/support/finite_block.hpp"
 
-#include "src/figure.hpp"
-#include "topology/errors.hpp"
+#include "src/output/figure.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <array>

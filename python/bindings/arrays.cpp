@@ -1,6 +1,6 @@
 #include "python/bindings/arrays.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <cmath>
 #include <cstring>

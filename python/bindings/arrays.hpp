@@ -5,7 +5,7 @@
 // copies. Into the library every array is copied once, because the library keeps vectors of its own.
 #pragma once
 
-#include "topology/types.hpp"
+#include "topology/base/types.hpp"
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>

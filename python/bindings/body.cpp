@@ -1,8 +1,8 @@
 // Bodies: a boundary value problem, discretised and factored; its fields.
 #include "python/bindings/floors.hpp"
 #include "python/bindings/held.hpp"
-#include "src/cut_output.hpp"
-#include "topology/errors.hpp"
+#include "src/output/cut_output.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

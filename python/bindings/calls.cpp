@@ -1,6 +1,6 @@
 #include "python/bindings/calls.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <fmt/format.h>
 #include <sys/syscall.h>

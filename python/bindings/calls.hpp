@@ -2,7 +2,7 @@
 #pragma once
 
 #include "python/bindings/arrays.hpp"
-#include "topology/interruption.hpp"
+#include "topology/base/interruption.hpp"
 
 #include <csignal>
 #include <functional>

@@ -1,7 +1,7 @@
 // Contact of a tool with a body, and of the lips of its cut.
 #include "python/bindings/floors.hpp"
 #include "python/bindings/shared.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <fmt/format.h>
 

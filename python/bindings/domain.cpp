@@ -2,7 +2,7 @@
 #include "python/bindings/calls.hpp"
 #include "python/bindings/floors.hpp"
 #include "python/bindings/shared.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,7 @@
 #include "python/bindings/floors.hpp"
 #include "python/bindings/held.hpp"
 #include "solvers/finite/equilibrium.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <atomic>
 #include <fmt/format.h>

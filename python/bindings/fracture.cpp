@@ -1,9 +1,9 @@
 // Stress intensities along the front of a cut, and where it tears on.
 #include "python/bindings/floors.hpp"
 #include "python/bindings/shared.hpp"
-#include "solvers/tear_seed.hpp"
-#include "solvers/tearing.hpp"
-#include "topology/errors.hpp"
+#include "solvers/fracture/tear_seed.hpp"
+#include "solvers/fracture/tearing.hpp"
+#include "topology/base/errors.hpp"
 
 #include <fmt/format.h>
 

@@ -1,9 +1,9 @@
 // Cuts: sheets, the incision that they make, the way of a blade.
 #include "python/bindings/floors.hpp"
 #include "python/bindings/shared.hpp"
-#include "topology/cut_sheets.hpp"
-#include "topology/errors.hpp"
-#include "topology/front_growth.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/incision/cut_sheets.hpp"
+#include "topology/incision/front_growth.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

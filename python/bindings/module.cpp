@@ -1,11 +1,11 @@
 // The Python module spherecut._core. The package around it is python/spherecut.
 #include "python/bindings/calls.hpp"
 #include "python/bindings/floors.hpp"
-#include "solvers/parallel.hpp"
-#include "src/output_file.hpp"
-#include "src/process_settings.hpp"
-#include "src/version.hpp"
-#include "topology/errors.hpp"
+#include "solvers/algebra/parallel.hpp"
+#include "src/base/output_file.hpp"
+#include "src/base/process_settings.hpp"
+#include "src/base/version.hpp"
+#include "topology/base/errors.hpp"
 
 #include <filesystem>
 

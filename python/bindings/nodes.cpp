@@ -1,8 +1,8 @@
 // Nodes and their sprinkling.
-#include "solvers/nodes.hpp"
+#include "solvers/nodes/nodes.hpp"
 #include "python/bindings/floors.hpp"
 #include "python/bindings/shared.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <fmt/format.h>
 

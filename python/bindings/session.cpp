@@ -1,12 +1,12 @@
 // Scenarios and sessions: a run step by step, with everything that it writes as arrays.
 #include "python/bindings/floors.hpp"
 #include "python/bindings/tables.hpp"
-#include "src/cut_output.hpp"
-#include "src/output_file.hpp"
-#include "src/run.hpp"
-#include "src/run_output.hpp"
-#include "src/scenario_keys.hpp"
-#include "topology/errors.hpp"
+#include "src/base/output_file.hpp"
+#include "src/output/cut_output.hpp"
+#include "src/output/run_output.hpp"
+#include "src/run/run.hpp"
+#include "src/scenario/keys.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

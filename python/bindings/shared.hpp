@@ -2,12 +2,12 @@
 #pragma once
 
 #include "python/bindings/calls.hpp"
-#include "solvers/contact_solver.hpp"
-#include "solvers/lip_contact.hpp"
-#include "src/scenario.hpp"
-#include "topology/blade.hpp"
-#include "topology/domain.hpp"
-#include "topology/incision.hpp"
+#include "solvers/contact/lip_contact.hpp"
+#include "solvers/contact/solver.hpp"
+#include "src/scenario/scenario.hpp"
+#include "topology/blade/blade.hpp"
+#include "topology/domain/domain.hpp"
+#include "topology/incision/incision.hpp"
 
 #include <mutex>
 

@@ -1,10 +1,10 @@
 // Surfaces: from arrays and files, checked and mended; organs made here; label volumes.
 #include "python/bindings/calls.hpp"
 #include "python/bindings/floors.hpp"
-#include "topology/errors.hpp"
-#include "topology/label_volume.hpp"
-#include "topology/organs.hpp"
-#include "topology/surface_check.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/files/label_volume.hpp"
+#include "topology/organ/organs.hpp"
+#include "topology/organ/surface_check.hpp"
 
 #include <Eigen/LU>
 #include <cmath>

@@ -1,8 +1,8 @@
 #include "python/bindings/tables.hpp"
 
-#include "src/cut_output.hpp"
-#include "src/run_output.hpp"
-#include "src/tear_output.hpp"
+#include "src/output/cut_output.hpp"
+#include "src/output/run_output.hpp"
+#include "src/output/tear_output.hpp"
 
 namespace spherecut::bindings {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "python/bindings/shared.hpp"
-#include "src/session.hpp"
+#include "src/session/session.hpp"
 
 namespace spherecut::bindings {
 

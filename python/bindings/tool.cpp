@@ -1,8 +1,8 @@
 // Tools, their poses, and where they touch an organ at rest.
 #include "python/bindings/floors.hpp"
 #include "python/bindings/shared.hpp"
-#include "topology/contact.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/tool/contact.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // The surface of an organ after its cut.
-#include "topology/wound.hpp"
+#include "topology/wound/wound.hpp"
 #include "python/bindings/floors.hpp"
 #include "python/bindings/shared.hpp"
 

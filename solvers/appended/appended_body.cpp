@@ -1,9 +1,9 @@
 #include "solvers/appended/appended_body.hpp"
 
-#include "solvers/elastic_body.hpp"
-#include "solvers/galerkin.hpp"
-#include "solvers/pieces.hpp"
-#include "topology/errors.hpp"
+#include "solvers/body/elastic_body.hpp"
+#include "solvers/body/pieces.hpp"
+#include "solvers/galerkin/galerkin.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "solvers/appended/kept_places.hpp"
-#include "solvers/growing_body.hpp"
+#include "solvers/cut/growing_body.hpp"
 
 #include <memory>
 

@@ -1,6 +1,6 @@
 #include "solvers/appended/cut_boxes.hpp"
 
-#include "solvers/split_box.hpp"
+#include "solvers/quadrature/split_box.hpp"
 
 #include <algorithm>
 #include <cmath>

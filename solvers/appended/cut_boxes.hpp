@@ -2,7 +2,7 @@
 #pragma once
 
 #include "solvers/appended/small_boxes.hpp"
-#include "topology/incision.hpp"
+#include "topology/incision/incision.hpp"
 
 #include <memory>
 #include <unordered_map>

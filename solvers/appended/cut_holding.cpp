@@ -2,10 +2,10 @@
 // parts.
 #include "solvers/appended/cut_system.hpp"
 
-#include "solvers/dense_cholesky.hpp"
-#include "solvers/dense_products.hpp"
-#include "solvers/galerkin.hpp"
-#include "topology/errors.hpp"
+#include "solvers/algebra/dense_cholesky.hpp"
+#include "solvers/algebra/dense_products.hpp"
+#include "solvers/galerkin/galerkin.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -2,7 +2,7 @@
 // cell.
 #include "solvers/appended/cut_system.hpp"
 
-#include "solvers/dense_products.hpp"
+#include "solvers/algebra/dense_products.hpp"
 
 #include <algorithm>
 

@@ -1,8 +1,8 @@
 #include "solvers/appended/cut_system.hpp"
 
-#include "solvers/dense_cholesky.hpp"
-#include "solvers/dense_products.hpp"
-#include "topology/errors.hpp"
+#include "solvers/algebra/dense_cholesky.hpp"
+#include "solvers/algebra/dense_products.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "solvers/appended/front_functions.hpp"
 
-#include "topology/point_tree.hpp"
+#include "topology/search/point_tree.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

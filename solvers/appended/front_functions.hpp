@@ -7,8 +7,8 @@
 // above the sheet; u_m the field of a unit intensity [Williams 1957] along the axes of station k.
 #pragma once
 
-#include "solvers/nodes.hpp"
-#include "solvers/stress_intensity.hpp"
+#include "solvers/fracture/stress_intensity.hpp"
+#include "solvers/nodes/nodes.hpp"
 
 #include <optional>
 

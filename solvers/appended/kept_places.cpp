@@ -1,6 +1,6 @@
 #include "solvers/appended/kept_places.hpp"
 
-#include "solvers/dense_products.hpp"
+#include "solvers/algebra/dense_products.hpp"
 
 #include <algorithm>
 #include <map>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "solvers/appended/cut_system.hpp"
-#include "solvers/surface_patches.hpp"
+#include "solvers/body/surface_patches.hpp"
 
 #include <unordered_map>
 

@@ -1,7 +1,7 @@
 #include "solvers/appended/small_boxes.hpp"
 
-#include "solvers/parallel.hpp"
-#include "topology/errors.hpp"
+#include "solvers/algebra/parallel.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

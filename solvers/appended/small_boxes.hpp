@@ -3,8 +3,8 @@
 // a box can be split later without evaluating a shape function again.
 #pragma once
 
-#include "solvers/background_cells.hpp"
-#include "solvers/shape_functions.hpp"
+#include "solvers/quadrature/background_cells.hpp"
+#include "solvers/shapes/functions.hpp"
 
 #include <span>
 

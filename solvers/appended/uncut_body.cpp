@@ -1,9 +1,9 @@
 #include "solvers/appended/uncut_body.hpp"
 
-#include "solvers/elastic_body.hpp"
-#include "solvers/elimination_order.hpp"
-#include "solvers/galerkin.hpp"
-#include "solvers/parallel.hpp"
+#include "solvers/algebra/elimination_order.hpp"
+#include "solvers/algebra/parallel.hpp"
+#include "solvers/body/elastic_body.hpp"
+#include "solvers/galerkin/galerkin.hpp"
 
 #include <algorithm>
 #include <cmath>

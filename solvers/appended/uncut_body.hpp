@@ -2,11 +2,11 @@
 // it.
 #pragma once
 
+#include "solvers/algebra/factorisation.hpp"
 #include "solvers/appended/small_boxes.hpp"
-#include "solvers/discretisation.hpp"
-#include "solvers/factorisation.hpp"
-#include "solvers/stiffness_matrix.hpp"
-#include "solvers/surface_patches.hpp"
+#include "solvers/body/discretisation.hpp"
+#include "solvers/body/surface_patches.hpp"
+#include "solvers/galerkin/stiffness_matrix.hpp"
 
 namespace spherecut::solvers {
 

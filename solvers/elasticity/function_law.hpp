@@ -3,7 +3,7 @@
 #pragma once
 
 #include "solvers/elasticity/law.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <functional>
 

@@ -6,7 +6,7 @@
 // Matrices of nine numbers are column-major: entry (i, j) at i + 3 j.
 #pragma once
 
-#include "topology/types.hpp"
+#include "topology/base/types.hpp"
 
 #include <array>
 #include <memory>

@@ -1,9 +1,9 @@
 #include "solvers/finite/consistent_gradients.hpp"
 
+#include "solvers/algebra/parallel.hpp"
 #include "solvers/finite/point_kernels.hpp"
-#include "solvers/parallel.hpp"
-#include "topology/disjoint_sets.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/search/disjoint_sets.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/QR>

@@ -1,6 +1,6 @@
 #include "solvers/finite/equilibrium.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 // converge is halved; where that does not help, Newton's method takes over.
 #pragma once
 
-#include "solvers/finite/finite_contact.hpp"
+#include "solvers/finite/contact.hpp"
 #include "solvers/finite/step_memory.hpp"
 
 #include <optional>

@@ -3,8 +3,8 @@
 // others.
 #pragma once
 
-#include "solvers/factorisation.hpp"
-#include "solvers/surface_patches.hpp"
+#include "solvers/algebra/factorisation.hpp"
+#include "solvers/body/surface_patches.hpp"
 
 namespace spherecut::solvers {
 

@@ -1,6 +1,6 @@
 #include "solvers/finite/held_shares.hpp"
 
-#include "topology/point_tree.hpp"
+#include "topology/search/point_tree.hpp"
 
 #include <algorithm>
 

@@ -2,7 +2,7 @@
 // so no share may go round an edge: then a constant stress, whose traction is another on each side, is met exactly.
 #pragma once
 
-#include "solvers/surface_patches.hpp"
+#include "solvers/body/surface_patches.hpp"
 
 namespace spherecut::solvers {
 

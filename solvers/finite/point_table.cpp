@@ -1,7 +1,7 @@
 #include "solvers/finite/point_table.hpp"
 
-#include "solvers/cell_shapes.hpp"
-#include "solvers/parallel.hpp"
+#include "solvers/algebra/parallel.hpp"
+#include "solvers/shapes/cell_shapes.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,8 @@
 // refer to the stress-free state and are evaluated once: whatever the body does, F = I + sum_J u_J (x) grad h_J.
 #pragma once
 
-#include "solvers/background_cells.hpp"
-#include "solvers/shape_functions.hpp"
+#include "solvers/quadrature/background_cells.hpp"
+#include "solvers/shapes/functions.hpp"
 
 #include <span>
 

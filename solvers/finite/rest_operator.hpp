@@ -2,7 +2,7 @@
 // deformation: d = A K0^-1 A^T r with A = F / J at every node.
 #pragma once
 
-#include "solvers/finite/finite_body.hpp"
+#include "solvers/finite/body.hpp"
 
 namespace spherecut::solvers {
 

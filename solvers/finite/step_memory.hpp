@@ -1,7 +1,7 @@
 // What a quasi-Newton iteration remembers: the last steps and how the forces changed along them (L-BFGS, Nocedal 1980).
 #pragma once
 
-#include "topology/types.hpp"
+#include "topology/base/types.hpp"
 
 #include <deque>
 #include <functional>

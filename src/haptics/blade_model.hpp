@@ -1,4 +1,4 @@
-// The force on a blade in the hand between two solves (src/blade_grip.hpp).
+// The force on a blade in the hand between two solves (src/blade/grip.hpp).
 #pragma once
 
 #include "src/haptics/contact_snapshot.hpp"

@@ -2,9 +2,9 @@
 // under the tool, from which the force at another pose of the tool follows without the body.
 #pragma once
 
-#include "solvers/contact_solver.hpp"
-#include "src/blade_grip.hpp"
-#include "topology/contact.hpp"
+#include "solvers/contact/solver.hpp"
+#include "src/blade/grip.hpp"
+#include "topology/tool/contact.hpp"
 
 #include <Eigen/Geometry>
 #include <cstdint>

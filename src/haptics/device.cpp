@@ -1,6 +1,6 @@
 #include "src/haptics/device.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <cmath>
 #include <fmt/format.h>

@@ -6,8 +6,8 @@
 // and a device has no clock, it is asked once a tick and answers with the newest it has.
 #pragma once
 
-#include "src/haptic_settings.hpp"
-#include "src/schedule.hpp"
+#include "src/scenario/haptic_settings.hpp"
+#include "src/scenario/schedule.hpp"
 
 #include <Eigen/Geometry>
 #include <cstdint>

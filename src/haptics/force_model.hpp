@@ -2,8 +2,8 @@
 // by the haptic thread alone: nothing here allocates, locks, waits or throws after construction.
 #pragma once
 
-#include "src/haptic_settings.hpp"
 #include "src/haptics/contact_snapshot.hpp"
+#include "src/scenario/haptic_settings.hpp"
 
 #include <memory>
 #include <optional>

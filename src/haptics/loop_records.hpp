@@ -1,8 +1,8 @@
 // What a haptic session leaves behind: every tick and every solve, enough to replay it.
 #pragma once
 
-#include "solvers/blade_contact.hpp"
-#include "src/haptics/haptic_tick.hpp"
+#include "solvers/contact/blade_contact.hpp"
+#include "src/haptics/tick.hpp"
 
 namespace spherecut::app {
 

@@ -1,6 +1,6 @@
 #include "src/haptics/passivity.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Energy at the tool port, and the damping that keeps the loop from giving more than it got.
 #pragma once
 
-#include "src/haptic_settings.hpp"
-#include "topology/types.hpp"
+#include "src/scenario/haptic_settings.hpp"
+#include "topology/base/types.hpp"
 
 #include <array>
 #include <optional>

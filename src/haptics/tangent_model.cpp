@@ -4,8 +4,8 @@
 // motion of the tool on the caught candidates.
 #include "src/haptics/tangent_model.hpp"
 
-#include "solvers/friction.hpp"
-#include "solvers/tool_gap.hpp"
+#include "solvers/contact/friction.hpp"
+#include "solvers/contact/tool_gap.hpp"
 
 #include <algorithm>
 #include <cmath>

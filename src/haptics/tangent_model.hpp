@@ -4,7 +4,7 @@
 
 #include "src/haptics/blade_model.hpp"
 
-#include "solvers/tool_gap.hpp"
+#include "solvers/contact/tool_gap.hpp"
 
 #include <array>
 #include <span>
@@ -12,9 +12,9 @@
 namespace spherecut::app {
 
 /// While the body behind the snapshot stands, this is the solve itself in fewer rounds, warm from the last tick: onset,
-/// spreading, sliding and loss of contact are followed, friction too (solvers/friction.hpp); a bonded contact goes with
-/// the tool and catches what the tool overtakes. A blade in the hand follows the condensed contact of its edge
-/// (blade_model.hpp). Rounds and pivots have a fixed budget; what is left over continues in the next tick.
+/// spreading, sliding and loss of contact are followed, friction too (solvers/contact/friction.hpp); a bonded contact
+/// goes with the tool and catches what the tool overtakes. A blade in the hand follows the condensed contact of its
+/// edge (blade_model.hpp). Rounds and pivots have a fixed budget; what is left over continues in the next tick.
 class TangentModel : public ForceModel {
  public:
   explicit TangentModel(const topology::ToolShape& tool);

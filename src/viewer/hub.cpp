@@ -1,8 +1,8 @@
 #include "src/viewer/hub.hpp"
 
-#include "src/scenario_document.hpp"
-#include "topology/errors.hpp"
-#include "topology/regular_file.hpp"
+#include "src/scenario/document.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/base/regular_file.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -3,7 +3,7 @@
 // ended.
 #pragma once
 
-#include "src/output_file.hpp"
+#include "src/base/output_file.hpp"
 #include "src/viewer/listed_files.hpp"
 #include "src/viewer/replies.hpp"
 

@@ -1,7 +1,7 @@
 // Sessions of the hub: built beside the one that goes on, recorded, replayed.
-#include "src/haptics/replay.hpp"
+#include "src/live/replay.hpp"
 #include "src/viewer/hub.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 #include "src/viewer/live_session.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,10 +1,10 @@
 // A session that goes on until it is told to stop, with the tool in the hand of a viewer: the real loop of three
-// threads (src/haptics/realtime_loop.hpp) behind calls that a viewer's thread makes and that never wait for it.
+// threads (src/live/realtime_loop.hpp) behind calls that a viewer's thread makes and that never wait for it.
 #pragma once
 
-#include "src/haptics/pointer_hand.hpp"
-#include "src/haptics/realtime_loop.hpp"
-#include "src/haptics/recording.hpp"
+#include "src/devices/pointer_hand.hpp"
+#include "src/live/realtime_loop.hpp"
+#include "src/live/recording.hpp"
 
 #include <atomic>
 #include <mutex>

@@ -1,7 +1,7 @@
 #include "src/viewer/replies.hpp"
 
-#include "src/version.hpp"
-#include "topology/overloaded.hpp"
+#include "src/base/version.hpp"
+#include "topology/base/overloaded.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,7 @@
 #include "src/viewer/requests.hpp"
 
-#include "src/scenario_keys.hpp"
-#include "topology/errors.hpp"
+#include "src/scenario/keys.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,10 +1,10 @@
 #include "src/viewer/serve.hpp"
 
-#include "src/interrupt.hpp"
-#include "src/progress.hpp"
+#include "src/base/interrupt.hpp"
+#include "src/base/progress.hpp"
 #include "src/viewer/hub.hpp"
-#include "topology/errors.hpp"
-#include "topology/interruption.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/base/interruption.hpp"
 
 #include <array>
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 // The command `spherecut serve`: a live session in a browser.
 #pragma once
 
-#include "src/run.hpp"
+#include "src/run/run.hpp"
 
 #include <cstdio>
 #include <filesystem>

@@ -1,6 +1,6 @@
 #include "src/viewer/web_server.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <boost/asio/io_context.hpp>

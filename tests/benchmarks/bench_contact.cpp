@@ -1,7 +1,7 @@
 // Contact queries on surfaces of growing size: the walk after 0.1 mm of motion, FCL's first touch, CGAL's closest
 // point. The walk's bound is 5 us on any organ of up to 500k triangles.
 #include "tests/support/bumpy_sphere.hpp"
-#include "topology/contact.hpp"
+#include "topology/tool/contact.hpp"
 
 #include <benchmark/benchmark.h>
 #include <memory>

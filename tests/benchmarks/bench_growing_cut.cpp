@@ -4,9 +4,9 @@
 // of +-45 degrees for an unknown one. Beside it: condensing anew (the background's work) and a full rebuild.
 // BM_cholesky_900 (bench_rebuild) is the yardstick of the machine.
 #include "solvers/appended/appended_body.hpp"
-#include "solvers/growing_body.hpp"
-#include "topology/blade.hpp"
-#include "topology/cut_sheets.hpp"
+#include "solvers/cut/growing_body.hpp"
+#include "topology/blade/blade.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 #include <algorithm>
 #include <benchmark/benchmark.h>

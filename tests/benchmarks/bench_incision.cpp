@@ -1,7 +1,7 @@
 // Queries of a cut of growing size, and what an increment of 2 mm of a blade costs. A sight line of up to 6 mm near 10k
 // triangles has a bound of 150 ns, an update of the level sets with voxels of 1 mm one of 0.7 ms.
-#include "topology/blade.hpp"
-#include "topology/cut_fields.hpp"
+#include "topology/blade/blade.hpp"
+#include "topology/incision/cut_fields.hpp"
 
 #include <benchmark/benchmark.h>
 #include <cmath>

@@ -1,5 +1,5 @@
 // The benchmarks run under the settings of the program.
-#include "src/process_settings.hpp"
+#include "src/base/process_settings.hpp"
 
 #include <benchmark/benchmark.h>
 

@@ -1,7 +1,7 @@
 // The paper's real-time step with 34 nodes, and its parts. 5000 steps a second is 200 us a step; the paper had 100 a
 // second.
-#include "solvers/dense_elimination.hpp"
-#include "solvers/published_step.hpp"
+#include "solvers/algebra/dense_elimination.hpp"
+#include "solvers/published/step.hpp"
 #include "tests/support/tip_pattern.hpp"
 
 #include <benchmark/benchmark.h>

@@ -2,8 +2,8 @@
 // the condensation onto the candidate patch that follows. Flat punch on a half-space block of half-width 4 radii, nu =
 // 0.3, the configuration of the `punch` experiment with default options. BM_cholesky_900 is the yardstick of the
 // machine.
-#include "solvers/contact_rings.hpp"
-#include "solvers/contact_solver.hpp"
+#include "solvers/body/contact_rings.hpp"
+#include "solvers/contact/solver.hpp"
 
 #include <Eigen/Cholesky>
 #include <benchmark/benchmark.h>

@@ -1,6 +1,6 @@
 // Moving least squares value and gradient at a point with 19 supporting nodes: kernels, search, and the whole call.
-#include "solvers/shape_functions.hpp"
-#include "solvers/shape_kernel.hpp"
+#include "solvers/shapes/functions.hpp"
+#include "solvers/shapes/kernel.hpp"
 
 #include <benchmark/benchmark.h>
 #include <cmath>

@@ -1,7 +1,7 @@
 // The wound's surface per 2 mm increment of a growing cut, and cut at once, on livers of growing size. The bar is 2 ms
 // an increment at 20k triangles, and a growth with the organ's size of at most 1.3 times at a fixed count crossed.
-#include "topology/organs.hpp"
-#include "topology/wound.hpp"
+#include "topology/organ/organs.hpp"
+#include "topology/wound/wound.hpp"
 
 #include <algorithm>
 #include <benchmark/benchmark.h>

@@ -37,7 +37,7 @@ SMALL = "scenarios/small.toml"  # in the scratch copy: block_punch on fewer node
 #   help         the name of a subcommand within a sentence: it must say its help
 #   run_study    likewise, where the Python package is built, as far as --dry-run goes: every run is checked and listed
 #   dev          ./dev has that command and those options: each builds something, for minutes to an hour, or is this suite
-#                itself; tests/src/test_dev_script.cpp runs the script
+#                itself; tests/src/run/test_dev_script.cpp runs the script
 #   ctest        some test has that name
 #   page_tests   tests/page/run.sh has that kind of test (ctest runs them)
 #   targets      CMake has that preset, that option, that target

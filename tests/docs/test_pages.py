@@ -64,5 +64,5 @@ def test_versions_agree():
 
 def test_public_headers():
     found = build.headers()
-    assert "solvers/discretisation.hpp" in found and len(found) > 40
+    assert "solvers/body/discretisation.hpp" in found and len(found) > 40
     assert all((SOURCE / header).is_file() and len(build.what_for(header)) > 10 for header in found)

@@ -1,9 +1,9 @@
 #include "experiments/analytic/half_space.hpp"
 #include "experiments/analytic/manufactured.hpp"
 
-#include "solvers/half_space.hpp"
+#include "solvers/contact/half_space.hpp"
 #include "tests/support/finite_differences.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

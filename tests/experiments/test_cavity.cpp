@@ -3,7 +3,7 @@
 #include "experiments/remeshing_ledger/mesh_request.hpp"
 #include "experiments/remeshing_ledger/sub_structure.hpp"
 #include "experiments/remeshing_ledger/surface_patch.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

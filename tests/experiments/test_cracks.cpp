@@ -2,7 +2,7 @@
 #include "experiments/analytic/cracks.hpp"
 #include "experiments/reference/lens.hpp"
 #include "tests/support/finite_differences.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>

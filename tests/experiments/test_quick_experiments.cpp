@@ -2,7 +2,7 @@
 #include "experiments/experiment.hpp"
 
 #include "tests/support/temporary_folder.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <catch2/catch.hpp>

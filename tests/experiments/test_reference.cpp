@@ -3,7 +3,7 @@
 #include "experiments/hemisphere_palpation/reference.hpp"
 #include "experiments/reference/axisymmetric.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,6 +1,6 @@
 // The figures of `spherecut haptics --bench` against responses that are known in closed form.
-#include "src/haptics/bench_figures.hpp"
-#include "topology/errors.hpp"
+#include "src/live/bench_figures.hpp"
+#include "topology/base/errors.hpp"
 
 #include <catch2/catch.hpp>
 #include <cmath>

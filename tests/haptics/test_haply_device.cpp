@@ -1,10 +1,10 @@
 // The device of an Inverse3 against a stand-in for its service. Under AddressSanitizer and ThreadSanitizer too: the
 // sources it needs and no more are compiled into this binary.
-#include "src/haptics/haply_device.hpp"
-#include "src/haptics/haptic_tick.hpp"
+#include "src/devices/haply_device.hpp"
+#include "src/haptics/tick.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/haply_service.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <catch2/catch.hpp>
 #include <chrono>

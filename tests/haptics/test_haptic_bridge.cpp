@@ -1,9 +1,9 @@
 // The bridge to real hardware: its packets, and a device that goes on whatever arrives. Under AddressSanitizer and
 // ThreadSanitizer too: the sources it needs and no more are compiled into this binary.
-#include "src/haptics/bridge_device.hpp"
-#include "src/haptics/haptic_tick.hpp"
+#include "src/devices/bridge_device.hpp"
+#include "src/haptics/tick.hpp"
 #include "tests/support/allocation_counter.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <arpa/inet.h>
 #include <array>

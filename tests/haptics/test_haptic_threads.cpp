@@ -1,5 +1,5 @@
 // The tick between threads, for ThreadSanitizer: the sources it needs and no more are compiled into this binary.
-#include "src/haptics/haptic_tick.hpp"
+#include "src/haptics/tick.hpp"
 #include "src/haptics/triple_buffer.hpp"
 
 #include <atomic>

@@ -33,7 +33,7 @@ deb)
   done
   dpkg-deb -x "$deb" "$work/unpacked"
   usr=$work/unpacked/usr
-  for name in include/spherecut/solvers/discretisation.hpp lib/cmake/spherecut/spherecutConfig.cmake lib/libspherecut_app.a \
+  for name in include/spherecut/solvers/body/discretisation.hpp lib/cmake/spherecut/spherecutConfig.cmake lib/libspherecut_app.a \
     share/doc/spherecut/README.md share/doc/spherecut/LICENSE share/doc/spherecut/CITATION.cff share/doc/spherecut/examples/libraries/palpate.cpp share/doc/spherecut/docs/start.md share/doc/spherecut/examples/python/press_a_liver.py; do
     [ -s "$usr/$name" ] || fail "the package has no /usr/$name"
   done

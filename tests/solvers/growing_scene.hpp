@@ -1,9 +1,9 @@
 // A small body whose cut grows, for tests of those that follow it.
 #pragma once
 
-#include "solvers/growing_body.hpp"
-#include "topology/blade.hpp"
-#include "topology/cut_sheets.hpp"
+#include "solvers/cut/growing_body.hpp"
+#include "topology/blade/blade.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
 namespace spherecut::tests {
 

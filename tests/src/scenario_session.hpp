@@ -1,10 +1,10 @@
 // Scenarios from text: what the reader says of them, and sessions of them.
 #pragma once
 
-#include "src/session.hpp"
+#include "src/session/session.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <string>
 #include <vector>

@@ -1,7 +1,7 @@
 // Sessions in virtual time that must come out the same twice.
 #pragma once
 
-#include "src/haptics/virtual_loop.hpp"
+#include "src/live/virtual_loop.hpp"
 
 #include <catch2/catch.hpp>
 #include <string>

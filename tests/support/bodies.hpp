@@ -1,7 +1,7 @@
 // Small bodies with nodes for tests of the discretisations.
 #pragma once
 
-#include "solvers/discretisation.hpp"
+#include "solvers/body/discretisation.hpp"
 
 #include <Eigen/Geometry>
 #include <random>

@@ -1,7 +1,7 @@
 // A closed test surface of any size with hills and hollows. Header only: benchmarks use it too.
 #pragma once
 
-#include "topology/surface_mesh.hpp"
+#include "topology/surface/mesh.hpp"
 
 #include <cmath>
 #include <map>

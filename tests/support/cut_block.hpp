@@ -1,7 +1,7 @@
 // A block with a plane cut that is aligned with nothing, and irregular nodes with pairs on the faces of the cut.
 #pragma once
 
-#include "solvers/discretisation.hpp"
+#include "solvers/body/discretisation.hpp"
 
 #include <memory>
 

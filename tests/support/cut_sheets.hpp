@@ -1,7 +1,7 @@
 // Sheets of incisions for tests.
 #pragma once
 
-#include "topology/surface_mesh.hpp"
+#include "topology/surface/mesh.hpp"
 
 #include <Eigen/Geometry>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Invariants that every checked organ surface must have.
 #pragma once
 
-#include "topology/surface_mesh.hpp"
+#include "topology/surface/mesh.hpp"
 
 namespace spherecut::tests {
 

@@ -1,7 +1,7 @@
 // Slow and simple answers about a triangulated surface, against which the quick ones are tested.
 #pragma once
 
-#include "topology/surface_mesh.hpp"
+#include "topology/surface/mesh.hpp"
 
 #include <random>
 

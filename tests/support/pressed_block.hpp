@@ -1,7 +1,7 @@
 // A block of soft tissue and its condensed top, for tests of contact.
 #pragma once
 
-#include "solvers/contact_solver.hpp"
+#include "solvers/contact/solver.hpp"
 #include "tests/support/bodies.hpp"
 
 namespace spherecut::tests {

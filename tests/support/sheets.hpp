@@ -1,7 +1,7 @@
 // Sheets to cut with.
 #pragma once
 
-#include "topology/surface_mesh.hpp"
+#include "topology/surface/mesh.hpp"
 
 #include <functional>
 

@@ -1,7 +1,7 @@
 // A pattern of 34 nodes about a tool tip on a plane surface: rings on the surface and in two layers below it.
 #pragma once
 
-#include "solvers/nodes.hpp"
+#include "solvers/nodes/nodes.hpp"
 
 #include <Eigen/Geometry>
 #include <cmath>

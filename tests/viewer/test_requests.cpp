@@ -1,7 +1,7 @@
 // Messages of viewers that are noise, or nearly messages: under AddressSanitizer, with the sources it needs alone.
 #include "src/viewer/requests.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <array>
 #include <catch2/catch.hpp>

@@ -4,7 +4,7 @@
 
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/web_client.hpp"
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <array>
 #include <atomic>

@@ -11,7 +11,7 @@
 // around it (an O-grid), so that no element touches the axis with a collapsed edge.
 #include "experiments/hemisphere_palpation/reference_getfem/half_ball_mesh.hpp"
 
-#include "topology/errors.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/Dense>
 #include <cmath>

@@ -1,7 +1,7 @@
 // A quarter of the half ball as 27-node hexahedra, graded towards the edge of the cap.
 #pragma once
 
-#include "topology/types.hpp"
+#include "topology/base/types.hpp"
 
 #include <array>
 #include <vector>

@@ -6,8 +6,8 @@
 // ../reference.cpp reads. One quarter of the body is meshed; the planes x = 0 and y = 0 are planes of symmetry.
 #include "experiments/hemisphere_palpation/reference.hpp"
 #include "experiments/hemisphere_palpation/reference_getfem/half_ball_mesh.hpp"
-#include "solvers/material.hpp"
-#include "topology/errors.hpp"
+#include "solvers/elasticity/material.hpp"
+#include "topology/base/errors.hpp"
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCore>

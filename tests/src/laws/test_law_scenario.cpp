@@ -1,6 +1,6 @@
 // The law of a scenario's material: read, checked, told, and refused where no body is computed with it.
-#include "src/law_reader.hpp"
-#include "src/scenario.hpp"
+#include "src/scenario/law_reader.hpp"
+#include "src/scenario/scenario.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 

@@ -1,1 +1,1 @@
-#include "solvers/nodes.hpp"
+#include "solvers/nodes/nodes.hpp"

@@ -1,0 +1,375 @@
+#include "solvers/finite/body.hpp"
+
+#include "solvers/algebra/parallel.hpp"
+#include "solvers/elasticity/function_law.hpp"
+#include "solvers/finite/held_shares.hpp"
+#include "solvers/finite/point_kernels.hpp"
+#include "solvers/finite/tangent.hpp"
+#include "solvers/galerkin/galerkin.hpp"
+#include "topology/base/errors.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace spherecut::solvers {
+
+namespace {
+
+constexpr int groups_of_a_sum = 32; // groups that are worked on together: sums are taken chunk by chunk
+constexpr double least_mapped_jacobian = 0.05;
+
+Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) {
+  if (law == nullptr)
+    throw InputError("a body at finite strain needs a law");
+  const ElasticConstants moduli = law->small_strain();
+  problem.material.young_modulus = moduli.young_modulus();
+  problem.material.poisson_ratio = moduli.poisson_ratio();
+  check_problem(problem);
+  require_domain(problem);
+  if (!problem.loads.initial_strain.isZero(0))
+    throw InputError("a body at finite strain takes no initial strain of small strains; prescribe what stretches it");
+  if (!(options.support_radius >= 1 && options.support_radius <= 4))
+    throw InputError(fmt::format("support radius of {} spacings; allowed: 1 to 4", options.support_radius));
+  if (!(options.pointwise_modulus >= 0))
+    throw InputError(fmt::format("pointwise modulus of {} mu; it must not be negative", options.pointwise_modulus));
+  if (options.sight == SightRule::appended && problem.incision != nullptr)
+    throw InputError("a body at finite strain has spheres that end or bend at a cut, no appended functions; allowed: "
+                     "visibility, diffraction, enriched");
+  return problem;
+}
+
+/// The cofactor matrix J F^-T, column-major, and J.
+double cofactor_of(const double* f, double* c) {
+  c[0] = f[4] * f[8] - f[7] * f[5];
+  c[3] = f[7] * f[2] - f[1] * f[8];
+  c[6] = f[1] * f[5] - f[4] * f[2];
+  c[1] = f[6] * f[5] - f[3] * f[8];
+  c[4] = f[0] * f[8] - f[6] * f[2];
+  c[7] = f[3] * f[2] - f[0] * f[5];
+  c[2] = f[3] * f[7] - f[6] * f[4];
+  c[5] = f[6] * f[1] - f[0] * f[7];
+  c[8] = f[0] * f[4] - f[3] * f[1];
+  return f[0] * c[0] + f[3] * c[3] + f[6] * c[6];
+}
+
+} // namespace
+
+struct FiniteBody::Work {
+  std::vector<LaneValues> deformation; // [group][9]
+  std::vector<double> swollen;         // [group], m3: sum of w J
+  std::vector<double> jacobian;        // [block]
+  std::vector<double> slots;           // [slot][3], N: with several threads
+  std::vector<int> incident_start, incident;
+  std::vector<double> chunk_energy, chunk_least;
+};
+
+FiniteBody::~FiniteBody() = default;
+
+FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options,
+                       const std::function<FibreFrame(const Vector3& x)>& fibres)
+    : problem_(with_law(std::move(problem), law.get(), options)), law_(std::move(law)), options_(options),
+      fibre_field_(fibres),
+      spheres_(problem_.nodes.positions, problem_.nodes.spacings, options.support_radius, Basis::linear,
+               worst_moment_condition, sight_about_cut(problem_, Method::galerkin, options.sight)),
+      work_(std::make_unique<Work>()) {
+  patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
+  held_ = std::make_unique<HeldMeans>(problem_.prescribed, held_shares(problem_, spheres_, *patches_), size());
+  tabulate();
+  assemble_loads();
+  supports_ = nodal_supports(spheres_);
+  tangent_ = std::make_unique<FiniteTangent>(*this);
+}
+
+void FiniteBody::tabulate() {
+  const BackgroundCells cells = background_cells(
+      *problem_.domain, problem_.nodes,
+      {options_.cell_size, options_.quadrature, options_.sight == SightRule::enriched}, problem_.incision.get());
+  table_ = tabulate_points(cells, spheres_);
+  const ElasticConstants moduli = law_->small_strain();
+  if (minds_volume())
+    share_ = std::min(1.0, options_.pointwise_modulus * moduli.shear_modulus / moduli.bulk_modulus);
+  if (share_ < 1)
+    blocks_ = dilatation_blocks(*problem_.domain, cells, table_, problem_.incision.get());
+  if (options_.consistent)
+    consistency_ = make_consistent(problem_.nodes.positions, surface_integrals(spheres_, patches_->points()), table_);
+  for (int group = 0; group < table_.groups(); ++group) {
+    point_start_.push_back(group == 0 ? 0 : point_start_.back() + table_.count[group - 1]);
+    for (int lane = 0; lane < table_.count[group]; ++lane) {
+      volume_ += table_.weights[group].value[lane];
+      if (fibre_field_)
+        fibres_.push_back(fibre_field_(table_.positions[static_cast<std::size_t>(point_lanes) * group + lane]));
+    }
+  }
+  const auto groups = static_cast<std::size_t>(table_.groups());
+  work_->deformation.resize(9 * groups);
+  work_->swollen.resize(groups);
+  work_->jacobian.assign(blocks_.volume.size(), 1);
+  const std::size_t chunks = (groups + groups_of_a_sum - 1) / groups_of_a_sum;
+  work_->chunk_energy.resize(chunks);
+  work_->chunk_least.resize(chunks);
+  work_->incident_start.assign(static_cast<std::size_t>(size()) + 1, 0);
+  for (const int node : table_.nodes)
+    ++work_->incident_start[node + 1];
+  for (int i = 0; i < size(); ++i)
+    work_->incident_start[i + 1] += work_->incident_start[i];
+  work_->incident.resize(table_.nodes.size());
+  std::vector<int> next(work_->incident_start.begin(), work_->incident_start.end() - 1);
+  for (int slot = 0; slot < std::ssize(table_.nodes); ++slot)
+    work_->incident[next[table_.nodes[slot]]++] = slot;
+}
+
+// Tractions are integrated at the points of the shares: so a constant stress is in balance with its own traction, and
+// with the forces of held means.
+void FiniteBody::assemble_loads() {
+  loads_ = VectorX::Zero(3 * static_cast<Eigen::Index>(size()));
+  ShapeFunctions shape;
+  const auto add = [&](const Vector3& x, const Vector3& force) {
+    if (force.isZero(0))
+      return;
+    if (!force.allFinite())
+      throw InputError(fmt::format("the load at ({:.6g}, {:.6g}, {:.6g}) m is not finite", x.x(), x.y(), x.z()));
+    if (!solvers::evaluate(spheres_, x, shape))
+      throw NumericalError(
+          fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
+    for (int k = 0; k < shape.size(); ++k)
+      loads_.segment<3>(3 * shape.nodes[k]) += shape.value[k] * force;
+  };
+  const Loads& loads = problem_.loads;
+  if (loads.body_force)
+    for (int group = 0; group < table_.groups(); ++group)
+      for (int lane = 0; lane < table_.count[group]; ++lane) {
+        const Vector3& x = table_.positions[static_cast<std::size_t>(point_lanes) * group + lane];
+        add(x, table_.weights[group].value[lane] * loads.body_force(x));
+      }
+  const std::span<const SurfacePoint> all = patches_->points();
+  const std::size_t skin = patches_->skin_points();
+  if (loads.traction)
+    for (const SurfacePoint& point : all.first(skin))
+      add(point.position, point.weight * loads.traction(point.position, point.normal));
+  if (loads.lip_traction)
+    for (const SurfacePoint& point : all.subspan(skin))
+      add(point.position, point.weight * loads.lip_traction(point.position, point.normal));
+}
+
+std::vector<Vector3> FiniteBody::prescribed_values() const {
+  if (problem_.prescribed_field)
+    return prescribed_values(problem_.prescribed_field);
+  std::vector<Vector3> values;
+  for (const Prescribed& entry : problem_.prescribed)
+    values.push_back(entry.value);
+  return values;
+}
+
+std::vector<Vector3> FiniteBody::prescribed_values(const std::function<Vector3(const Vector3& x)>& field) const {
+  std::vector<Vector3> values;
+  for (const DisplacementMean& mean : held_->means())
+    values.push_back(mean.of(field));
+  return values;
+}
+
+DisplacementMean FiniteBody::contact_mean(int node) const {
+  if (node < 0 || node >= size() || problem_.nodes.kinds[node] == NodeKind::interior)
+    throw InputError(fmt::format("node {} of {} is not on the surface: a tool cannot touch it", node, size()));
+  return patches_->contact_mean(node, spheres_, problem_);
+}
+
+double FiniteBody::deform(const VectorX& coefficients) const {
+  if (coefficients.size() != 3 * static_cast<Eigen::Index>(size()))
+    throw InputError(fmt::format("{} coefficients for {} nodes; there are 3 a node", coefficients.size(), size()));
+  Work& work = *work_;
+  parallel_ranges(table_.groups(), groups_of_a_sum, [&](int begin, int end) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int group = begin; group < end; ++group) {
+      const std::span<const int> nodes = table_.nodes_of(group);
+      LaneValues* f = work.deformation.data() + 9 * static_cast<std::size_t>(group);
+      deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table_.gradients_of(group),
+                            coefficients.data(), f);
+      double swollen = 0;
+      for (int lane = 0; lane < table_.count[group]; ++lane) {
+        const auto at = [&](int k) { return f[k].value[lane]; };
+        const double j = at(0) * (at(4) * at(8) - at(7) * at(5)) - at(3) * (at(1) * at(8) - at(7) * at(2)) +
+                         at(6) * (at(1) * at(5) - at(4) * at(2));
+        swollen += table_.weights[group].value[lane] * j;
+        least = std::min(least, std::isnan(j) ? -std::numeric_limits<double>::infinity() : j);
+      }
+      work.swollen[group] = swollen;
+    }
+    work.chunk_least[begin / groups_of_a_sum] = least;
+  });
+  std::fill(work.jacobian.begin(), work.jacobian.end(), 0.0);
+  if (blocks_.size() > 0) {
+    for (int group = 0; group < table_.groups(); ++group)
+      work.jacobian[blocks_.block[group]] += work.swollen[group];
+    for (int b = 0; b < blocks_.size(); ++b)
+      work.jacobian[b] /= blocks_.volume[b];
+  }
+  return *std::min_element(work.chunk_least.begin(), work.chunk_least.end());
+}
+
+// Of a point that weighs something, counted from the first one of a group on.
+const Vector3& FiniteBody::place_of(int group, std::size_t point) const {
+  for (; point >= static_cast<std::size_t>(table_.count[group]); ++group)
+    point -= table_.count[group];
+  return table_.positions[static_cast<std::size_t>(point_lanes) * group + point];
+}
+
+void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const {
+  Work& work = *work_;
+  out.least_jacobian = deform(coefficients);
+  if (minds_volume() && !(out.least_jacobian > 0)) {
+    out.energy = std::numeric_limits<double>::infinity();
+    return;
+  }
+  const double own = pointwise_share(), shared = 1 - own;
+  std::vector<double> pressure(work.jacobian.size());
+  double energy = 0;
+  for (int b = 0; b < blocks_.size(); ++b) {
+    pressure[b] = shared * law_->pressure(work.jacobian[b]);
+    energy += shared * blocks_.volume[b] * law_->volumetric_energy(work.jacobian[b]);
+  }
+  out.forces.setZero(3 * static_cast<Eigen::Index>(size()));
+  const bool one_thread = thread_count() == 1;
+  if (!one_thread)
+    work.slots.resize(3 * table_.nodes.size());
+  const bool minds = minds_volume();
+  parallel_ranges(table_.groups(), groups_of_a_sum, [&](int begin, int end) {
+    constexpr int most = groups_of_a_sum * point_lanes;
+    std::array<Matrix3, most> gradient, stress;
+    std::array<double, most> density;
+    int count = 0;
+    for (int group = begin; group < end; ++group) {
+      const LaneValues* f = work.deformation.data() + 9 * static_cast<std::size_t>(group);
+      for (int lane = 0; lane < table_.count[group]; ++lane, ++count)
+        for (int k = 0; k < 9; ++k)
+          gradient[count].data()[k] = f[k].value[lane];
+    }
+    const auto fibres =
+        fibres_.empty() ? std::span<const FibreFrame>() : std::span(fibres_).subspan(point_start_[begin], count);
+    try {
+      law_->evaluate_isochoric(std::span(gradient).first(count), fibres, std::span(density).first(count),
+                               std::span(stress).first(count));
+    } catch (const LawValueError& error) {
+      throw_with_place(error, place_of(begin, error.point()));
+    }
+    double sum = 0;
+    int point = 0;
+    std::vector<double> local;
+    for (int group = begin; group < end; ++group) {
+      LaneValues weighted[9];
+      const double of_block = blocks_.size() > 0 ? pressure[blocks_.block[group]] : 0;
+      for (int lane = 0; lane < table_.count[group]; ++lane, ++point) {
+        const double weight = table_.weights[group].value[lane];
+        double c[9], p = 0;
+        if (minds) {
+          const double j = cofactor_of(gradient[point].data(), c);
+          p = own * law_->pressure(j) + of_block;
+          density[point] += own * law_->volumetric_energy(j);
+        } else {
+          std::fill_n(c, 9, 0.0);
+        }
+        sum += weight * density[point];
+        for (int k = 0; k < 9; ++k)
+          weighted[k].value[lane] = weight * (stress[point].data()[k] + p * c[k]);
+      }
+      const std::span<const int> nodes = table_.nodes_of(group);
+      const int here = static_cast<int>(nodes.size());
+      if (one_thread) {
+        local.resize(3 * nodes.size());
+        group_forces(here, table_.gradients_of(group), weighted, local.data());
+        for (int k = 0; k < here; ++k)
+          for (int axis = 0; axis < 3; ++axis)
+            out.forces[3 * nodes[k] + axis] += local[3 * k + axis];
+      } else {
+        group_forces(here, table_.gradients_of(group), weighted,
+                     work.slots.data() + 3 * static_cast<std::size_t>(table_.start[group]));
+      }
+    }
+    work.chunk_energy[begin / groups_of_a_sum] = sum;
+  });
+  if (!one_thread)
+    parallel_ranges(size(), 64, [&](int begin, int end) {
+      for (int i = begin; i < end; ++i)
+        for (int k = work.incident_start[i]; k < work.incident_start[i + 1]; ++k)
+          for (int axis = 0; axis < 3; ++axis)
+            out.forces[3 * i + axis] += work.slots[3 * static_cast<std::size_t>(work.incident[k]) + axis];
+    });
+  for (const double part : work.chunk_energy)
+    energy += part;
+  out.energy = energy;
+}
+
+void FiniteBody::tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const {
+  deform(coefficients);
+  tangent_->assemble(work_->deformation, work_->jacobian, penalty, lower);
+}
+
+const std::vector<int>& FiniteBody::rank() const {
+  return tangent_->rank();
+}
+
+double FiniteBody::penalty_stiffness(int entry, double penalty) const {
+  return penalty * law_->small_strain().shear_modulus * problem_.nodes.spacings[problem_.prescribed[entry].node];
+}
+
+std::vector<Matrix3> FiniteBody::piola_maps(const VectorX& coefficients) const {
+  deform(coefficients);
+  std::vector<Matrix3> maps(size(), Matrix3::Zero());
+  std::vector<double> shares(size(), 0);
+  for (int group = 0; group < table_.groups(); ++group) {
+    const LaneValues* f = work_->deformation.data() + 9 * static_cast<std::size_t>(group);
+    Matrix3 mean;
+    for (int k = 0; k < 9; ++k) {
+      double sum = 0;
+      for (int lane = 0; lane < table_.count[group]; ++lane)
+        sum += f[k].value[lane];
+      mean.data()[k] = sum / table_.count[group];
+    }
+    for (int slot = table_.start[group]; slot < table_.start[group + 1]; ++slot) {
+      maps[table_.nodes[slot]] += table_.shares[slot] * mean;
+      shares[table_.nodes[slot]] += table_.shares[slot];
+    }
+  }
+  for (int i = 0; i < size(); ++i) {
+    if (shares[i] > 0)
+      maps[i] /= shares[i];
+    const double jacobian = maps[i].determinant();
+    if (jacobian > least_mapped_jacobian)
+      maps[i] /= jacobian;
+    else
+      maps[i].setIdentity();
+  }
+  return maps;
+}
+
+VectorX FiniteBody::nodal_displacements(const VectorX& coefficients) const {
+  Field field;
+  field.coefficients = coefficients;
+  return supports_.displacements(field);
+}
+
+FiniteState FiniteBody::at(const Vector3& x, const VectorX& coefficients) const {
+  ShapeFunctions shape;
+  require_support(spheres_, x, shape);
+  FiniteState state;
+  for (int k = 0; k < shape.size(); ++k) {
+    const Vector3 u = coefficients.segment<3>(3 * shape.nodes[k]);
+    state.displacement += shape.value[k] * u;
+    state.deformation += u * shape.gradient(k).transpose();
+  }
+  std::vector<FibreFrame> frame;
+  if (fibre_field_)
+    frame.push_back(fibre_field_(x));
+  try {
+    law_->evaluate({&state.deformation, 1}, frame, {&state.energy, 1}, {&state.first_piola, 1});
+  } catch (const LawValueError& error) {
+    throw_with_place(error, x);
+  }
+  state.jacobian = state.deformation.determinant();
+  state.cauchy = state.first_piola * state.deformation.transpose() / state.jacobian;
+  return state;
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,131 @@
+// A body at finite strain by the method of finite spheres, total Lagrangian: strain energy, forces and tangent of a
+// hyperelastic law as functions of the nodes' coefficients. solvers/finite/equilibrium.hpp finds its equilibria.
+//
+// Nearly incompressible laws take the pressure of the mean volume change of blocks of cells,
+//
+//   W = sum_q w_q [W_iso(F_q) + s U(J_q)] + (1 - s) sum_b V_b U(J_b),   J_b = sum_{q in b} w_q J_q / V_b,
+//
+// with a small pointwise share s that leaves no volume change within a block free.
+#pragma once
+
+#include "solvers/body/elastic_body.hpp"
+#include "solvers/elasticity/law.hpp"
+#include "solvers/finite/consistent_gradients.hpp"
+#include "solvers/finite/dilatation_blocks.hpp"
+#include "solvers/finite/held_means.hpp"
+
+namespace spherecut::solvers {
+
+class FiniteTangent; // solvers/finite/tangent.hpp
+
+struct FiniteOptions {
+  double support_radius = 1.75; // rho, radius of a sphere over the node's spacing
+  double cell_size = 0.75;      // edge of a background cell in units of the spacing
+  int quadrature = 2;           // rule of a cell, 1 to 3
+  /// Modulus of the pointwise part of the pressure over mu: s = that times mu over the bulk modulus, at most 1. 0: the
+  /// mean over blocks alone; infinity: every point has a pressure of its own.
+  double pointwise_modulus = 2.5;
+  bool consistent = true;                // whether the gradients are made consistent with the quadrature
+  SightRule sight = SightRule::enriched; // only where there is an incision; not `appended`
+};
+
+/// What a law says at one point of the deformed body.
+struct FiniteState {
+  Vector3 displacement = Vector3::Zero();    // m
+  Matrix3 deformation = Matrix3::Identity(); // F
+  Matrix3 first_piola = Matrix3::Zero();     // P, Pa
+  Matrix3 cauchy = Matrix3::Zero();          // P F^T / J, Pa
+  double jacobian = 1, energy = 0;           // energy: J per m3 of the stress-free body
+};
+
+/// Energy of a body and its slope at some coefficients.
+struct FiniteForces {
+  double energy = 0;         // J; infinite where the law cannot be asked (some J <= 0)
+  double least_jacobian = 1; // of all points
+  VectorX forces;            // dE/du, N, 3 a node; not set where the energy is infinite
+};
+
+class FiniteBody {
+ public:
+  /// The problem's material is replaced by the small-strain constants of the law. `fibres` gives the directions of a
+  /// fibrous law point by point; null: its own. Throws InputError for a problem that discretise() refuses, initial
+  /// strain, options out of their range and a missing law; NumericalError where a support is not sound.
+  FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options = {},
+             const std::function<FibreFrame(const Vector3& x)>& fibres = nullptr);
+  ~FiniteBody();
+  FiniteBody(const FiniteBody&) = delete;
+  FiniteBody& operator=(const FiniteBody&) = delete;
+
+  [[nodiscard]] const Problem& problem() const { return problem_; }
+  [[nodiscard]] const Law& law() const { return *law_; }
+  [[nodiscard]] const FiniteOptions& options() const { return options_; }
+  [[nodiscard]] int size() const { return problem_.nodes.size(); }
+  [[nodiscard]] const Spheres& spheres() const { return spheres_; }
+  [[nodiscard]] const PointTable& points() const { return table_; }
+  [[nodiscard]] const DilatationBlocks& blocks() const { return blocks_; } // none where every point has its pressure
+  [[nodiscard]] const ConsistencyReport& consistency() const { return consistency_; }
+  [[nodiscard]] const HeldMeans& held() const { return *held_; }
+  /// Share s of the volumetric energy that is taken point by point.
+  [[nodiscard]] double pointwise_share() const { return share_; }
+  [[nodiscard]] double volume() const { return volume_; } // m3, of the points
+  /// Whether the law has a volumetric part: states with J <= 0 are then refused.
+  [[nodiscard]] bool minds_volume() const { return law_->bulk_slope(1) > 0; }
+
+  /// Forces of the problem's loads at factor 1 on the coefficients, dead, N.
+  [[nodiscard]] const VectorX& loads() const { return loads_; }
+  /// Means of the problem's prescribed displacements, one per entry, and of any other field, m.
+  [[nodiscard]] std::vector<Vector3> prescribed_values() const;
+  [[nodiscard]] std::vector<Vector3> prescribed_values(const std::function<Vector3(const Vector3& x)>& field) const;
+  /// The share of the surface that a force of a tool on a surface node acts on.
+  [[nodiscard]] DisplacementMean contact_mean(int node) const;
+
+  /// Strain energy and internal forces, loads and constraints left out. Coefficients: 3 a node, m. The same bits with
+  /// any number of threads.
+  void evaluate(const VectorX& coefficients, FiniteForces& out) const;
+
+  /// Tangent d2E/du2 at the coefficients, its lower triangle of full 3 x 3 blocks, node i at rows 3 rank(i) .. + 2,
+  /// with the penalty of the held means: `penalty` times mu times the node's spacing, N/m, for every held component.
+  void tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const;
+  [[nodiscard]] const std::vector<int>& rank() const; // place of every node in the order of elimination
+  [[nodiscard]] double penalty_stiffness(int entry, double penalty) const;
+
+  /// Map of every node that carries the rest state along: mean of F about it over its determinant. Identity where
+  /// that is below 0.05.
+  [[nodiscard]] std::vector<Matrix3> piola_maps(const VectorX& coefficients) const;
+
+  /// Displacement of every node, u_h(x_i), 3N, m.
+  [[nodiscard]] VectorX nodal_displacements(const VectorX& coefficients) const;
+  /// Everything at a place of the stress-free body, with the pressure of that place's own J. Throws InputError when no
+  /// support covers x.
+  [[nodiscard]] FiniteState at(const Vector3& x, const VectorX& coefficients) const;
+
+ private:
+  friend class FiniteTangent;
+  void tabulate();
+  void assemble_loads();
+  /// F of all groups, and the mean J of all blocks; returns the least J.
+  double deform(const VectorX& coefficients) const;
+  [[nodiscard]] const Vector3& place_of(int group, std::size_t point) const; // m
+
+  struct Work;
+
+  Problem problem_;
+  std::shared_ptr<const Law> law_;
+  FiniteOptions options_;
+  std::function<FibreFrame(const Vector3& x)> fibre_field_;
+  Spheres spheres_;
+  std::unique_ptr<SurfacePatches> patches_;
+  PointTable table_;
+  DilatationBlocks blocks_;
+  ConsistencyReport consistency_;
+  std::unique_ptr<HeldMeans> held_;
+  std::vector<FibreFrame> fibres_; // of every point that weighs something, in the order of the groups; or none
+  std::vector<int> point_start_;   // of every group: its first such point
+  double volume_ = 0, share_ = 1;
+  VectorX loads_;
+  NodalSupports supports_;
+  std::unique_ptr<FiniteTangent> tangent_;
+  std::unique_ptr<Work> work_;
+};
+
+} // namespace spherecut::solvers

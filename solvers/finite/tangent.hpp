@@ -1,0 +1,33 @@
+// Assembly of the tangent of a body at finite strain as a sparse matrix in elimination order.
+#pragma once
+
+#include "solvers/finite/body.hpp"
+
+namespace spherecut::solvers {
+
+/// Which nodes couple, the order of elimination, and the sums over points. Belongs to one body.
+class FiniteTangent {
+ public:
+  explicit FiniteTangent(const FiniteBody& body);
+
+  [[nodiscard]] const std::vector<int>& rank() const { return rank_; }
+
+  /// `deformation`: F of all groups; `jacobian`: mean J of all blocks.
+  void assemble(const std::vector<LaneValues>& deformation, const std::vector<double>& jacobian, double penalty,
+                SparseMatrix& lower) const;
+
+ private:
+  void find_pattern();
+  void point_tangents(int group, const LaneValues* deformation, double block_jacobian, LaneValues* tangent,
+                      LaneValues* cofactor) const;
+  /// Adds a 3 x 3 block per pair of the nodes, whose ranks ascend; `matrix` has 3 rows and columns a node, in that
+  /// order.
+  void scatter(const std::vector<int>& ranks, const MatrixX& matrix, SparseMatrix& lower) const;
+
+  const FiniteBody& body_;
+  std::vector<int> rank_;
+  std::vector<std::vector<int>> block_groups_; // of every block
+  std::vector<int> column_start_, rows_;       // pattern by ranks of nodes: lower, the diagonal first
+};
+
+} // namespace spherecut::solvers

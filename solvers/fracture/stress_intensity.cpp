@@ -1,0 +1,476 @@
+#include "solvers/fracture/stress_intensity.hpp"
+
+#include "solvers/body/elastic_body.hpp"
+#include "solvers/fracture/inset_integral.hpp"
+#include "solvers/shapes/functions.hpp"
+#include "topology/base/errors.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+namespace spherecut::solvers {
+
+using topology::FrontFrame;
+
+namespace {
+
+double plane_strain_modulus(const Material& material) {
+  return material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
+}
+
+double spacing_at(const Discretisation& body, const Vector3& x) {
+  const NodeCloud& nodes = body.problem().nodes;
+  int best = 0;
+  for (int i = 1; i < nodes.size(); ++i)
+    if ((nodes.positions[i] - x).squaredNorm() < (nodes.positions[best] - x).squaredNorm())
+      best = i;
+  return nodes.spacings[best];
+}
+
+const topology::Incision& incision_of(const Discretisation& body) {
+  if (body.problem().incision == nullptr)
+    throw InputError("stress intensity: the body has no cut");
+  return *body.problem().incision;
+}
+
+} // namespace
+
+TipField tip_field(const Material& material, const Intensities& k, double ahead, double above) {
+  TipField field;
+  const double r = std::hypot(ahead, above), theta = std::atan2(above, ahead);
+  if (!(r > 0))
+    return field;
+  const double mu = material.shear_modulus(), kappa = 3 - 4 * material.poisson_ratio;
+  const double c = std::cos(theta / 2), s = std::sin(theta / 2),
+               size = std::sqrt(r / (2 * std::numbers::pi)) / (2 * mu);
+  // Angular functions of the three modes, and their derivatives.
+  const Vector3 f = k[0] * Vector3(c * (kappa - 1 + 2 * s * s), s * (kappa + 1 - 2 * c * c), 0) +
+                    k[1] * Vector3(s * (kappa + 1 + 2 * c * c), -c * (kappa - 1 - 2 * s * s), 0) +
+                    k[2] * Vector3(0, 0, 4 * s);
+  const Vector3 turn = k[0] * Vector3(-0.5 * s * (kappa - 1 + 2 * s * s) + 2 * s * c * c,
+                                      0.5 * c * (kappa + 1 - 2 * c * c) + 2 * s * s * c, 0) +
+                       k[1] * Vector3(0.5 * c * (kappa + 1 + 2 * c * c) - 2 * s * s * c,
+                                      0.5 * s * (kappa - 1 - 2 * s * s) + 2 * s * c * c, 0) +
+                       k[2] * Vector3(0, 0, 2 * c);
+  field.displacement = size * f;
+  const double ct = ahead / r, st = above / r;
+  field.gradient.col(0) = size / r * (0.5 * ct * f - st * turn);
+  field.gradient.col(1) = size / r * (0.5 * st * f + ct * turn);
+  return field;
+}
+
+double energy_release_rate(const Material& material, const Intensities& k) {
+  return (k[0] * k[0] + k[1] * k[1]) / plane_strain_modulus(material) + k[2] * k[2] / (2 * material.shear_modulus());
+}
+
+std::vector<FrontFrame> front_samples(const topology::Incision& incision, double spacing, double margin) {
+  if (!(spacing > 0))
+    throw InputError(fmt::format("front samples {} m apart: the distance must be positive", spacing));
+  std::vector<FrontFrame> samples;
+  double next = 0.5 * spacing, walked = 0;
+  for (const topology::FrontSegment& segment : incision.front()) {
+    const double length = (segment.to - segment.from).norm();
+    for (; next < walked + length; next += spacing) {
+      const Vector3 x = segment.from + (next - walked) / length * (segment.to - segment.from);
+      if (margin > 0 && incision.domain()->signed_distance(x) > -margin)
+        continue;
+      if (const auto frame = incision.front_frame(x, length))
+        samples.push_back(*frame);
+    }
+    walked += length;
+  }
+  return samples;
+}
+
+Intensities displacement_correlation(const Discretisation& body, const Field& field, const FrontFrame& front,
+                                     const CorrelationOptions& options) {
+  const topology::Incision& incision = incision_of(body);
+  const double h = spacing_at(body, front.point);
+  Eigen::Matrix2d normal_matrix = Eigen::Matrix2d::Zero();
+  Eigen::Matrix<double, 2, 3> right = Eigen::Matrix<double, 2, 3>::Zero();
+  for (int k = 0; k < options.samples; ++k) {
+    const double s = h * (options.from + (options.to - options.from) * (k + 0.5) / options.samples);
+    const auto face = incision.closest(front.point - s * front.ahead, 0.5 * s);
+    if (!face)
+      throw InputError(fmt::format("stress intensity: there is no sheet {:.3g} m behind the front at ({:.6g}, {:.6g}, "
+                                   "{:.6g}) m",
+                                   s, front.point.x(), front.point.y(), front.point.z()));
+    const Vector3 jump = body.at(face->point + lip_offset * h * face->normal, field).displacement -
+                         body.at(face->point - lip_offset * h * face->normal, field).displacement;
+    const Eigen::Vector2d terms(std::sqrt(s), s * std::sqrt(s));
+    const double weight = 1 / std::sqrt(s);
+    normal_matrix += weight * terms * terms.transpose();
+    right +=
+        weight * terms * Vector3(jump.dot(front.normal), jump.dot(front.ahead), jump.dot(front.tangent)).transpose();
+  }
+  const Vector3 leading = normal_matrix.inverse().row(0) * right;
+  const Material& material = body.problem().material;
+  const double plane = plane_strain_modulus(material) * std::sqrt(2 * std::numbers::pi) / 8;
+  return {plane * leading[0], plane * leading[1],
+          material.shear_modulus() * std::sqrt(2 * std::numbers::pi) / 4 * leading[2]};
+}
+
+namespace {
+
+/// Coordinates about a front that is locally an arc in the plane of the cut: X ahead, Z above, s along.
+class Tube {
+ public:
+  Tube(const FrontFrame& front, double curvature) : front_(front), curvature_(curvature) {}
+
+  struct Place {
+    Vector3 position;
+    Matrix3 axes;   // columns ahead, normal, tangent at the place
+    double stretch; // length along the front out here over that on the front
+    [[nodiscard]] bool leaves(const topology::Domain& domain) const { return domain.signed_distance(position) > 0; }
+  };
+  [[nodiscard]] Place at(double ahead, double above, double along) const {
+    const double turn = curvature_ * along;
+    const Vector3 a = std::cos(turn) * front_.ahead + std::sin(turn) * front_.tangent;
+    const Vector3 t = std::cos(turn) * front_.tangent - std::sin(turn) * front_.ahead;
+    // sin(turn) / curvature and (1 - cos(turn)) / curvature, also where it is straight
+    const double chord = std::abs(turn) < 1e-4 ? along : std::sin(turn) / curvature_;
+    const double sag = std::abs(turn) < 1e-4 ? 0.5 * turn * along : (1 - std::cos(turn)) / curvature_;
+    Place place;
+    place.position = front_.point + chord * front_.tangent - sag * front_.ahead + ahead * a + above * front_.normal;
+    place.axes << a, front_.normal, t;
+    place.stretch = 1 + curvature_ * ahead;
+    return place;
+  }
+  /// Gradient, in the axes of the place, of a field of vectors given in them that does not change along the front.
+  [[nodiscard]] Matrix3 curved_gradient(const TipField& field, double ahead) const {
+    Matrix3 gradient = field.gradient;
+    const double c = curvature_ / (1 + curvature_ * ahead);
+    gradient.col(2) = c * Vector3(-field.displacement[2], 0, field.displacement[0]);
+    return gradient;
+  }
+  /// Divergence of a symmetric tensor field given in the axes of the place, by central differences.
+  template <class Tensor>
+  [[nodiscard]] Vector3 divergence(const Tensor& tensor, double ahead, double above, double step) const {
+    const Matrix3 d_ahead = (tensor(ahead + step, above) - tensor(ahead - step, above)) / (2 * step);
+    const Matrix3 d_above = (tensor(ahead, above + step) - tensor(ahead, above - step)) / (2 * step);
+    const Matrix3 here = tensor(ahead, above);
+    const double c = curvature_ / (1 + curvature_ * ahead);
+    return {d_ahead(0, 0) + d_above(0, 1) + c * (here(0, 0) - here(2, 2)),
+            d_ahead(1, 0) + d_above(1, 1) + c * here(1, 0), d_ahead(2, 0) + d_above(2, 1) + 2 * c * here(2, 0)};
+  }
+  [[nodiscard]] double curvature() const { return curvature_; }
+
+ private:
+  FrontFrame front_;
+  double curvature_;
+};
+
+/// Curvature of the front in the plane of the cut, 1/m: positive where the way ahead fans out.
+double curvature_of(const topology::Incision& incision, const FrontFrame& front, double h) {
+  const auto before = incision.front_frame(front.point - h * front.tangent, 2 * h);
+  const auto after = incision.front_frame(front.point + h * front.tangent, 2 * h);
+  if (!before || !after)
+    return 0;
+  const double length = (after->point - before->point).norm();
+  return length > 0.5 * h ? (after->ahead - before->ahead).dot(front.tangent) / length : 0;
+}
+
+constexpr double widest_turn = 0.9;   // of the radius of curvature of the front: the tube's outer radius
+constexpr double longest_arc = 0.35;  // of the same: half the tube's length, where that is above the shortest
+constexpr double shortest_half = 1;   // of the tube's length, in spacings, down to which it is shortened
+constexpr double shortened_by = 0.25; // spacings, at a time
+
+struct GaussRule {
+  std::array<double, 2> place{-0.5773502691896257, 0.5773502691896257};
+};
+
+/// A point of the integral. To that of mode m it adds stress[m] : sigma + gradient[m] : grad u + load[m] times the load
+/// factor of the field.
+struct Sample {
+  Vector3 position;
+  std::array<Matrix3, 3> stress, gradient;
+  Vector3 load;
+};
+
+// With xi = q e the virtual shift of the front (e ahead, q = 1 at the front and 0 on the outside of the tube),
+//   I Q = int [sigma_ij v_i,k + tau_ij u_i,k - sigma_mn v_m,n delta_kj] xi_k,j dV + int (tau_ij,j u_i,k - b_i v_i,k)
+//   xi_k dV
+//         - int_faces (t_i v_i,k + tau_ij n_j u_i,k) xi_k dS,          Q = int q ds along the front,
+// u, sigma the field, v, tau = C grad v the auxiliary one, b the body force, t the traction on the faces, n out of the
+// material. v keeps its components in axes that turn with the front: tau is not quite in equilibrium then.
+// Within `inset_spacings` of the surface of the body xi fades to nothing (0: it does not, and the tube must not leave).
+//
+// Calls visit(sample) for every point and gives the factors that make intensities of the sums.
+template <class Visitor>
+Intensities each_sample(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
+                        double inset_spacings, Visitor&& visit_sample) {
+  const topology::Incision& incision = incision_of(body);
+  const Problem& problem = body.problem();
+  const Material& material = problem.material;
+  const double h = spacing_at(body, front.point);
+  const Tube tube(front, curvature_of(incision, front, h));
+  // Sections meet at the centre of curvature. Behind a front that turns round it the tube is narrowed, for they would
+  // count twice there, the second time negative.
+  const double narrowed = std::min(1.0, widest_turn / (std::max(0.0, tube.curvature()) * options.outer * h));
+  const double inner = narrowed * options.inner * h, outer = narrowed * options.outer * h;
+  const double shortest = std::min(options.half_length, shortest_half) * h;
+  double half_length = options.half_length * h;
+  if (half_length * std::abs(tube.curvature()) > longest_arc)
+    half_length = std::max(shortest, longest_arc / std::abs(tube.curvature()));
+  if (tube.curvature() * outer <= -widest_turn)
+    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
+                                 front.point.x(), front.point.y(), front.point.z()));
+  const auto fade = [&](double r) { // of the shift across the tube, with its derivative
+    const double t = std::clamp((outer - r) / (outer - inner), 0.0, 1.0);
+    return std::pair(t * t * (3 - 2 * t), r > inner && r < outer ? -6 * t * (1 - t) / (outer - inner) : 0.0);
+  };
+  const auto bump = [&](double s) { // and along it
+    const double t = s / half_length;
+    return std::pair((1 - t * t) * (1 - t * t), -4 * t * (1 - t * t) / half_length);
+  };
+  const double inset = inset_spacings * h;
+  struct Cover {
+    double share = 1;
+    Vector3 gradient = Vector3::Zero(); // 1/m
+  };
+  const auto cover = [&](const Vector3& x) { // of the shift near the surface of the body, where it has to vanish
+    Cover result;
+    if (!(inset > 0))
+      return result;
+    const double t = -problem.domain->signed_distance(x) / inset;
+    if (t >= 1)
+      return result;
+    result.share = t > 0 ? t * t * (3 - 2 * t) : 0;
+    if (t > 0)
+      result.gradient = -6 * t * (1 - t) / inset * problem.domain->normal(x);
+    return result;
+  };
+  if (inset > 0 && -problem.domain->signed_distance(front.point) < 0.2 * inset)
+    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m is {:.3g} m from the "
+                                 "surface; allowed: {:.3g} m",
+                                 front.point.x(), front.point.y(), front.point.z(),
+                                 -problem.domain->signed_distance(front.point), 0.2 * inset));
+  const auto leaves_body = [&] {
+    for (const double s : {-half_length, half_length})
+      for (int c = 0; c < 8; ++c)
+        if (tube.at(outer * std::cos(c * std::numbers::pi / 4), outer * std::sin(c * std::numbers::pi / 4), s)
+                .leaves(*problem.domain))
+          return true;
+    return false;
+  };
+  while (inset == 0 && half_length > shortest && leaves_body())
+    half_length = std::max(shortest, half_length - shortened_by * h);
+  if (inset == 0 && leaves_body())
+    throw InputError(fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
+                                 "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
+                                 outer, 2 * half_length, front.point.x(), front.point.y(), front.point.z()));
+  const std::array<Intensities, 3> modes{Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()};
+  const GaussRule gauss;
+  const int cells_along = std::max(1, options.along / 2), cells_radial = std::max(1, options.radial / 2);
+  const int cells_around = std::max(1, options.around / 2);
+  double total = 0; // of the bump, by the same rule
+  for (int a = 0; a < cells_along; ++a)
+    for (const double ga : gauss.place) {
+      const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1);
+      total += half_length / cells_along * bump(s).first * cover(tube.at(0, 0, s).position).share;
+    }
+  if (!(total > 0))
+    throw InputError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
+                                 2 * half_length));
+  // r = outer t^2: the singular products of the two fields are smooth in t.
+  const auto each_section = [&](const auto& visit) { // (s, weight ds, r, weight dr)
+    for (int a = 0; a < cells_along; ++a)
+      for (const double ga : gauss.place)
+        for (int b = 0; b < cells_radial; ++b)
+          for (const double gb : gauss.place) {
+            const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1),
+                         t = (b + 0.5 + 0.5 * gb) / cells_radial;
+            visit(s, half_length / cells_along, outer * t * t, outer * t / cells_radial);
+          }
+  };
+  // Where the sheet bends off the plane of the front (a tear kinks), a point belongs to the side of the sheet it is on.
+  const auto side_of = [&](const Vector3& x, double r, double above) {
+    const auto face = incision.closest(x, 0.5 * r);
+    if (!face || face->on_border)
+      return above >= 0 ? 1.0 : -1.0;
+    return (x - face->point).dot(face->normal) >= 0 ? 1.0 : -1.0;
+  };
+  each_section([&](double s, double ds, double r, double dr) {
+    const auto [fade_r, dq_r] = fade(r);
+    const auto [q_s, dq_s] = bump(s);
+    for (int c = 0; c < 2 * cells_around; ++c) {
+      const int cell = c / 2;
+      const double theta = std::numbers::pi * ((2 * cell + 1 + gauss.place[c % 2]) / cells_around - 1);
+      const double ahead = r * std::cos(theta);
+      double above = r * std::sin(theta);
+      const Tube::Place place = tube.at(ahead, above, s);
+      if (ahead < 0 && std::abs(above) < -ahead)
+        if (const double side = side_of(place.position, r, above); side * above < 0)
+          above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
+      const Cover covered = cover(place.position);
+      if (covered.share == 0)
+        continue;
+      const double q_r = fade_r * covered.share;
+      const double weight = r * (std::numbers::pi / cells_around) * ds * dr * place.stretch;
+      Sample sample;
+      sample.position = place.position;
+      // Gradient of xi = q e in the axes of the place; e turns along the front.
+      Matrix3 shift = Matrix3::Zero();
+      shift.row(0) = covered.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta),
+                                             fade_r * dq_s / place.stretch) +
+                     fade_r * q_s * place.axes.transpose() * covered.gradient;
+      shift(2, 2) = q_r * q_s * tube.curvature() / place.stretch;
+      for (int m = 0; m < 3; ++m) {
+        const TipField local = tip_field(material, modes[m], ahead, above);
+        const Matrix3 v = tube.curved_gradient(local, ahead);
+        const auto tau_at = [&](double x, double z) {
+          return stress_from_gradient(material, tube.curved_gradient(tip_field(material, modes[m], x, z), x));
+        };
+        const Matrix3 tau = stress_from_gradient(material, v);
+        sample.stress[m] = weight * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
+        Matrix3 by_gradient = tau * shift.transpose();
+        if (tube.curvature() != 0)
+          by_gradient.col(0) += q_r * q_s * tube.divergence(tau_at, ahead, above, 1e-4 * r);
+        sample.gradient[m] = weight * place.axes * by_gradient * place.axes.transpose();
+        sample.load[m] = 0;
+        if (problem.loads.body_force)
+          sample.load[m] =
+              -weight * q_r * q_s * (place.axes.transpose() * problem.loads.body_force(place.position)).dot(v.col(0));
+      }
+      visit_sample(sample);
+    }
+    // Both faces.
+    for (const double side : {1.0, -1.0}) {
+      const double off = std::min(lip_offset * h, 1e-3 * r);
+      Tube::Place place = tube.at(-r, side * off, s);
+      if (const auto face = incision.closest(tube.at(-r, 0, s).position, 0.5 * r); face && !face->on_border)
+        place.position = face->point + side * off * face->normal;
+      const double q_r = fade_r * cover(place.position).share;
+      if (q_r == 0)
+        continue;
+      const Vector3 outward = -side * front.normal;
+      Vector3 traction = Vector3::Zero();
+      if (problem.loads.lip_traction)
+        traction = place.axes.transpose() * problem.loads.lip_traction(place.position, outward);
+      if (traction.isZero(0) && tube.curvature() == 0)
+        continue;
+      Sample sample;
+      sample.position = place.position;
+      const double weight = q_r * q_s * ds * dr * place.stretch;
+      for (int m = 0; m < 3; ++m) {
+        const Matrix3 v = tube.curved_gradient(tip_field(material, modes[m], -r, side * 1e-12 * r), -r);
+        const Vector3 pull = -side * stress_from_gradient(material, v).col(1);
+        sample.stress[m].setZero();
+        sample.gradient[m] = -weight * place.axes * pull * place.axes.col(0).transpose();
+        sample.load[m] = -weight * traction.dot(v.col(0));
+      }
+      visit_sample(sample);
+    }
+  });
+  const double plane = plane_strain_modulus(material);
+  return Vector3(0.5 * plane, 0.5 * plane, material.shear_modulus()) / total;
+}
+
+Intensities integral_over(const Discretisation& body, const Field& field, const FrontFrame& front,
+                          const InteractionOptions& options, double inset) {
+  Vector3 integral = Vector3::Zero();
+  const Vector3 factors = each_sample(body, front, options, inset, [&](const Sample& sample) {
+    const PointState state = body.at(sample.position, field);
+    for (int m = 0; m < 3; ++m)
+      integral[m] += sample.stress[m].cwiseProduct(state.stress).sum() +
+                     sample.gradient[m].cwiseProduct(state.gradient).sum() + field.load_factor * sample.load[m];
+  });
+  return factors.cwiseProduct(integral);
+}
+
+void require_inset(double inset) {
+  if (!(inset > 0) || !std::isfinite(inset))
+    throw InputError(
+        fmt::format("stress intensity: a shift that fades over {} node spacings; it must be positive", inset));
+}
+
+// Of a point's shape functions: sigma and grad u are linear in the coefficients (state_from).
+IntensityRule rule_over(const Discretisation& body, bool with_pressure, const FrontFrame& front,
+                        const InteractionOptions& options, double inset) {
+  const Problem& problem = body.problem();
+  const double mu = problem.material.shear_modulus();
+  const double lambda = with_pressure ? 0 : problem.material.lame_lambda();
+  const Matrix3 initial = 0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose());
+  const Matrix3 relieved = lambda * initial.trace() * Matrix3::Identity() + 2 * mu * initial;
+  const std::size_t count = static_cast<std::size_t>(body.coefficient_count()) / 3; // nodes, and what a cut appends
+  std::vector<Matrix3> weights(count, Matrix3::Zero());                             // row: mode
+  std::vector<Vector3> pressures(with_pressure ? count : 0, Vector3::Zero());
+  std::vector<char> known(count, 0);
+  IntensityRule rule;
+  ShapeFunctions shape;
+  const Vector3 factors = each_sample(body, front, options, inset, [&](const Sample& sample) {
+    body.shape_at(sample.position, shape);
+    std::array<Matrix3, 3> by_gradient;
+    Vector3 traces;
+    for (int m = 0; m < 3; ++m) {
+      const Matrix3& by_stress = sample.stress[m];
+      traces[m] = by_stress.trace();
+      by_gradient[m] =
+          sample.gradient[m] + lambda * traces[m] * Matrix3::Identity() + mu * (by_stress + by_stress.transpose());
+      rule.loads[m] += sample.load[m] - by_stress.cwiseProduct(relieved).sum();
+    }
+    for (int k = 0; k < shape.size(); ++k) {
+      const auto node = static_cast<std::size_t>(shape.nodes[k]);
+      known[node] = 1;
+      for (int m = 0; m < 3; ++m)
+        weights[node].row(m) += (by_gradient[m] * shape.gradient(k)).transpose();
+      if (with_pressure)
+        pressures[node] -= shape.value[k] * traces;
+    }
+    for (const VectorTerm& term : shape.vectors) {
+      const auto group = static_cast<std::size_t>(term.group);
+      known[group] = 1;
+      for (int m = 0; m < 3; ++m)
+        for (int unknown = 0; unknown < 3; ++unknown)
+          weights[group](m, unknown) += by_gradient[m].cwiseProduct(term.gradient[unknown]).sum();
+    }
+  });
+  rule.loads = factors.cwiseProduct(rule.loads);
+  for (std::size_t i = 0; i < count; ++i)
+    if (known[i] != 0) {
+      rule.nodes.push_back(static_cast<int>(i));
+      rule.coefficients.emplace_back(factors.asDiagonal() * weights[i]);
+      if (with_pressure)
+        rule.pressures.emplace_back(factors.cwiseProduct(pressures[i]));
+    }
+  return rule;
+}
+
+} // namespace
+
+Intensities IntensityRule::operator()(const Field& field) const {
+  if ((field.pressure.size() > 0) != !pressures.empty())
+    throw InputError("stress intensity: the rule is for fields of another form, with or without pressure");
+  Intensities k = field.load_factor * loads;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    k += coefficients[i] * field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(nodes[i]));
+  for (std::size_t i = 0; i < pressures.size(); ++i)
+    k += field.pressure[nodes[i]] * pressures[i];
+  return k;
+}
+
+IntensityRule interaction_rule(const Discretisation& body, bool with_pressure, const FrontFrame& front,
+                               const InteractionOptions& options) {
+  return rule_over(body, with_pressure, front, options, 0);
+}
+
+IntensityRule inset_rule(const Discretisation& body, bool with_pressure, const FrontFrame& front, double inset,
+                         const InteractionOptions& options) {
+  require_inset(inset);
+  return rule_over(body, with_pressure, front, options, inset);
+}
+
+Intensities interaction_integral(const Discretisation& body, const Field& field, const FrontFrame& front,
+                                 const InteractionOptions& options) {
+  return integral_over(body, field, front, options, 0);
+}
+
+Intensities inset_integral(const Discretisation& body, const Field& field, const FrontFrame& front, double inset,
+                           const InteractionOptions& options) {
+  require_inset(inset);
+  return integral_over(body, field, front, options, inset);
+}
+
+} // namespace spherecut::solvers

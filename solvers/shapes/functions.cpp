@@ -1,0 +1,335 @@
+#include "solvers/shapes/functions.hpp"
+
+#include "solvers/shapes/cut_sight.hpp"
+#include "solvers/shapes/derivatives.hpp"
+#include "solvers/shapes/kernel.hpp"
+#include "topology/base/errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numeric>
+
+namespace spherecut::solvers {
+
+using shape_kernel::evaluate_support;
+using shape_kernel::Kernel;
+using shape_kernel::Support;
+
+namespace {
+
+constexpr double radius_growth = 1.25;
+constexpr int growth_steps_at_node = 6;
+constexpr int growth_steps_at_point = 4;
+
+// Memory of one support: on the stack unless it is unusually large.
+class SupportMemory {
+ public:
+  explicit SupportMemory(int candidates) {
+    // `collect` may write one register beyond the last candidate.
+    const std::size_t room = static_cast<std::size_t>(candidates) + 2 * SphereGrid::lanes;
+    double* coordinates = local_.data();
+    int* ids = local_ids_.data();
+    std::size_t stride = local_room;
+    if (room > local_room) {
+      stride = room;
+      large_.resize(4 * stride);
+      large_ids_.resize(stride);
+      coordinates = large_.data();
+      ids = large_ids_.data();
+    }
+    support = {0, ids, coordinates, coordinates + stride, coordinates + 2 * stride, coordinates + 3 * stride};
+  }
+  SupportMemory(const SupportMemory&) = delete;
+  SupportMemory& operator=(const SupportMemory&) = delete;
+
+  Support support{};
+
+ private:
+  static constexpr std::size_t local_room = 256;
+  alignas(64) std::array<double, 4 * local_room> local_;
+  std::array<int, local_room> local_ids_;
+  std::vector<double> large_;
+  std::vector<int> large_ids_;
+};
+
+// Adds sphere j to a support when it holds the point; d = x_j - x.
+void append(Support& support, int j, const Vector3& d, double radius) {
+  if (!(d.squaredNorm() < radius * radius))
+    return;
+  const int n = support.count++;
+  support.ids[n] = j;
+  support.dx[n] = d.x();
+  support.dy[n] = d.y();
+  support.dz[n] = d.z();
+  support.q[n] = 1 / (radius * radius);
+}
+
+// Completes the last register of a support with entries that weigh nothing.
+void pad(Support& support) {
+  for (int k = support.count; k < support.count + SphereGrid::lanes; ++k) {
+    support.dx[k] = support.q[k] = 1;
+    support.dy[k] = support.dz[k] = 0;
+  }
+}
+
+// Arrays of n entries; none for the second derivatives unless wanted.
+void resize(ShapeFunctions& out, int n, bool second) {
+  for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
+    array->resize(n);
+  if (second || !out.dxx.empty())
+    for (std::vector<double>* array : {&out.dxx, &out.dyy, &out.dzz, &out.dxy, &out.dxz, &out.dyz})
+      array->resize(second ? n : 0);
+}
+
+// The nodes whose spheres, grown by `factor`, hold x. Rare: every sphere is looked at.
+void collect_grown(const Spheres& spheres, const Vector3& x, double factor, Support& support) {
+  support.count = 0;
+  for (int j = 0; j < spheres.size(); ++j)
+    append(support, j, spheres.centres()[j] - x, factor * spheres.radii()[j]);
+  pad(support);
+}
+
+bool nothing(ShapeFunctions& out) {
+  out.nodes.clear();
+  resize(out, 0, false);
+  return false;
+}
+
+// Tries the support of x with all radii grown step by step.
+bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
+  SupportMemory memory(spheres.size());
+  double factor = 1;
+  for (int step = 0; step < growth_steps_at_point; ++step) {
+    collect_grown(spheres, x, factor *= radius_growth, memory.support);
+    if (evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out)) {
+      out.growth = factor;
+      return true;
+    }
+  }
+  return nothing(out);
+}
+
+// The same near the cut, first with the enriched basis where it is due, then without.
+bool evaluate_grown_near_cut(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second,
+                             ShapeFunctions& out) {
+  SupportMemory memory(spheres.size());
+  for (const CutSight::Enrich enrich : {CutSight::Enrich::where_near, CutSight::Enrich::never}) {
+    double factor = enrich == CutSight::Enrich::never ? 1 / radius_growth : 1;
+    const int steps = enrich == CutSight::Enrich::never ? growth_steps_at_point + 1 : growth_steps_at_point;
+    for (int step = 0; step < steps; ++step) {
+      collect_grown(spheres, x, factor *= radius_growth, memory.support);
+      if (spheres.cut()->evaluate(kernel, x, memory.support, true, second, 0, spheres.worst_condition(), enrich, out)) {
+        out.growth = std::max(out.growth, factor);
+        return true;
+      }
+      out.growth = std::max(out.growth, factor); // what was tried decides, too
+    }
+  }
+  return nothing(out);
+}
+
+bool evaluate_near_cut(const Kernel& kernel, const Spheres& spheres, const Vector3& point, bool second,
+                       ShapeFunctions& out) {
+  const CutSight& cut = *spheres.cut();
+  if (second && cut.sight().rule != SightRule::visibility)
+    throw InputError(fmt::format("second derivatives near a cut: the rule '{}' has none, take 'visibility'",
+                                 to_string(cut.sight().rule)));
+  const Vector3 x = cut.off_the_sheet(point);
+  const SphereGrid::Cell cell = spheres.grid().find(x);
+  SupportMemory memory(cell.padded);
+  kernel.collect(cell, x.data(), memory.support);
+  return cut.evaluate(kernel, x, memory.support, false, second, 0, spheres.worst_condition(),
+                      CutSight::Enrich::where_near, out) ||
+         evaluate_grown_near_cut(kernel, spheres, x, second, out);
+}
+
+bool evaluate_point(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
+  out.growth = 1;
+  const SphereGrid::Cell cell = spheres.grid().find(x);
+  SupportMemory memory(cell.padded);
+  kernel.collect(cell, x.data(), memory.support);
+  if (spheres.cut() != nullptr && spheres.cut()->concerns(memory.support))
+    return evaluate_near_cut(kernel, spheres, x, second, out);
+  return evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out) ||
+         (spheres.cut() == nullptr ? evaluate_grown(kernel, spheres, x, second, out)
+                                   : evaluate_grown_near_cut(kernel, spheres, x, second, out));
+}
+
+void check(const std::vector<Vector3>& centres, const std::vector<double>& spacings, double rho, Basis basis,
+           double worst_condition) {
+  const int needed = basis_size(basis) + 2;
+  if (std::ssize(centres) < needed)
+    throw InputError(fmt::format("shape functions: {} nodes; this basis needs at least {}", centres.size(), needed));
+  if (spacings.size() != centres.size())
+    throw InputError(fmt::format("shape functions: {} nodes but {} spacings", centres.size(), spacings.size()));
+  if (!(rho > 0) || !std::isfinite(rho))
+    throw InputError(fmt::format("shape functions: support radius of {} spacings; it must be positive", rho));
+  if (!(worst_condition > 1))
+    throw InputError(fmt::format("shape functions: worst condition {}; it must exceed 1", worst_condition));
+  for (int i = 0; i < std::ssize(centres); ++i) {
+    if (!centres[i].allFinite())
+      throw InputError(fmt::format("shape functions: node {} at ({}, {}, {}) is not finite", i, centres[i].x(),
+                                   centres[i].y(), centres[i].z()));
+    if (!(spacings[i] > 0) || !std::isfinite(spacings[i]))
+      throw InputError(fmt::format("shape functions: node {} has spacing {} m; it must be positive", i, spacings[i]));
+  }
+}
+
+} // namespace
+
+bool shape_kernel::evaluate_support(const Kernel& kernel, const Support& support, Basis basis, bool second,
+                                    double worst_condition, ShapeFunctions& out) {
+  const int n = support.count;
+  if (n < basis_size(basis))
+    return false;
+  if (basis == Basis::linear) {
+    const int padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
+    resize(out, padded, second);
+    shape_kernel::LinearOutput output{out.value.data(), out.dx.data(), out.dy.data(), out.dz.data(), {}};
+    if (second) {
+      output.second = {out.dxx.data(), out.dyy.data(), out.dzz.data(), out.dxy.data(), out.dxz.data(), out.dyz.data()};
+      out.moment_condition = kernel.evaluate_linear_second(support, output);
+    } else {
+      out.moment_condition = kernel.evaluate_linear(support, output);
+    }
+    resize(out, n, second);
+  } else {
+    resize(out, n, second);
+    evaluate_quadratic(support, second, out);
+  }
+  if (!(out.moment_condition <= worst_condition))
+    return false;
+  out.nodes.assign(support.ids, support.ids + n);
+  return true;
+}
+
+double quartic_spline(double s) {
+  if (s >= 1)
+    return 0;
+  const double t = 1 - s;
+  return t * t * t * (1 + 3 * s);
+}
+
+Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis,
+                 double worst_condition, const Sight& sight, const std::vector<char>& absent, const Spheres* before)
+    : centres_(std::move(centres)), basis_(basis), worst_condition_(worst_condition) {
+  check(centres_, spacings, rho, basis, worst_condition);
+  const int n = size(), needed = basis_size(basis) + 2;
+  std::vector<double> base(n);
+  const auto is_absent = [&](int i) { return !absent.empty() && absent[i] != 0; };
+  for (int i = 0; i < n; ++i)
+    base[i] = is_absent(i) ? 0 : rho * spacings[i];
+  if (sight.incision != nullptr && sight.radius_factor != 1)
+    for (int i = 0; i < n; ++i)
+      if (sight.incision->front_frame(centres_[i], sight.reach * spacings[i]))
+        base[i] *= sight.radius_factor;
+  radii_ = base;
+  const bool is_as_before = before != nullptr && before->centres_ == centres_ && before->radii_ == radii_;
+  grid_ = is_as_before ? before->grid_ : std::make_shared<const SphereGrid>(centres_, radii_);
+  if (sight.incision != nullptr) {
+    if (basis != Basis::linear)
+      throw InputError("shape functions: spheres around a cut have the linear basis alone");
+    if (!(sight.radius_factor > 0) || !std::isfinite(sight.radius_factor))
+      throw InputError(fmt::format("shape functions: radii at the front times {}; the factor must be positive",
+                                   sight.radius_factor));
+    cut_ = std::make_shared<CutSight>(sight, centres_, spacings, radii_);
+  }
+
+  // A node whose support is not sound asks for one more step of growth of every sphere that would then hold it; the
+  // steps are counted per sphere so that the outcome does not depend on the order of the nodes.
+  const Kernel& kernel = shape_kernel::dispatched();
+  ShapeFunctions shape;
+  // Near a front the nodes may be too few for the enriched basis: a support that stays so is left to the linear one.
+  std::vector<int> wanted(n, 0), level(n, 0), everyone(n);
+  std::iota(everyone.begin(), everyone.end(), 0);
+  const auto is_sound = [&](int i, Support& support, bool grown) {
+    if (cut_ != nullptr && (grown || cut_->concerns(support)))
+      return cut_->evaluate(kernel, centres_[i], support, grown, false, 2, worst_condition,
+                            wanted[i] < sight.enriched_growth ? CutSight::Enrich::where_near : CutSight::Enrich::never,
+                            shape);
+    return support.count >= needed && evaluate_support(kernel, support, basis, false, worst_condition, shape);
+  };
+  const auto unsound_nodes = [&] {
+    std::vector<int> unsound;
+    for (int i = 0; i < n; ++i) {
+      if (is_absent(i))
+        continue;
+      const SphereGrid::Cell cell = grid_->find(centres_[i]);
+      SupportMemory memory(cell.padded);
+      kernel.collect(cell, centres_[i].data(), memory.support);
+      if (!is_sound(i, memory.support, false))
+        unsound.push_back(i);
+    }
+    return unsound;
+  };
+  std::vector<int> unsound = unsound_nodes();
+  int round = 0;
+  while (!unsound.empty()) {
+    // The nodes in question alone, until they are sound. For a few of them every sphere is looked at.
+    while (!unsound.empty()) {
+      const double furthest = std::pow(radius_growth, ++round);
+      std::vector<double> widest(n);
+      for (int j = 0; j < n; ++j)
+        widest[j] = furthest * base[j];
+      const SphereGrid reach = unsound.size() > 100 ? SphereGrid(centres_, widest) : SphereGrid();
+      const auto near = [&](int i) -> std::span<const int> {
+        return unsound.size() > 100 ? reach.find(centres_[i]).ids : std::span<const int>(everyone);
+      };
+      for (int i : unsound) {
+        if (++wanted[i] > growth_steps_at_node)
+          throw NumericalError(fmt::format(
+              "shape functions: the support of node {} at ({:.6g}, {:.6g}, {:.6g}) m is not sound after {} steps of "
+              "growth by {} from a radius of {:.6g} m ({} such nodes); the nodes around it are too few or in a plane",
+              i, centres_[i].x(), centres_[i].y(), centres_[i].z(), growth_steps_at_node, radius_growth, base[i],
+              unsound.size()));
+        const double factor = std::pow(radius_growth, wanted[i]);
+        for (int j : near(i))
+          if ((centres_[j] - centres_[i]).norm() < factor * base[j])
+            level[j] = std::max(level[j], wanted[i]);
+      }
+      for (int j = 0; j < n; ++j)
+        radii_[j] = base[j] * std::pow(radius_growth, level[j]);
+      std::vector<int> still;
+      for (int i : unsound) {
+        const std::span<const int> candidates = near(i);
+        SupportMemory memory(static_cast<int>(candidates.size()));
+        for (int j : candidates)
+          append(memory.support, j, centres_[j] - centres_[i], radii_[j]);
+        pad(memory.support);
+        if (!is_sound(i, memory.support, true))
+          still.push_back(i);
+      }
+      unsound = std::move(still);
+    }
+    grid_ = std::make_shared<const SphereGrid>(centres_, radii_);
+    if (cut_ != nullptr)
+      cut_->update_radii(centres_, radii_);
+    unsound = unsound_nodes();
+  }
+  grown_ = static_cast<int>(std::count_if(level.begin(), level.end(), [](int l) { return l > 0; }));
+}
+
+bool evaluate(const Spheres& spheres, const Vector3& x, ShapeFunctions& out) {
+  return evaluate_point(shape_kernel::dispatched(), spheres, x, false, out);
+}
+
+bool evaluate(const Spheres& spheres, std::span<const Vector3> points, std::span<ShapeFunctions> out) {
+  if (points.size() != out.size())
+    throw InputError(fmt::format("shape functions: {} points but room for {}", points.size(), out.size()));
+  const Kernel& kernel = shape_kernel::dispatched();
+  bool sound = true;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    sound = evaluate_point(kernel, spheres, points[i], false, out[i]) && sound;
+  return sound;
+}
+
+bool evaluate_second(const Spheres& spheres, const Vector3& x, ShapeFunctions& out) {
+  return evaluate_point(shape_kernel::dispatched(), spheres, x, true, out);
+}
+
+bool shape_kernel::evaluate_with(const Kernel& kernel, const Spheres& spheres, const Vector3& x, ShapeFunctions& out) {
+  return evaluate_point(kernel, spheres, x, false, out);
+}
+
+} // namespace spherecut::solvers

@@ -1,0 +1,249 @@
+#include "src/live/simulation.hpp"
+
+#include "src/haptics/tick.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/base/interruption.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace spherecut::app {
+namespace {
+
+constexpr double pass_distance = 0.1; // fine spacings between poses that the blade passes
+
+// FNV-1a over words: equal bits, equal hash.
+class Hash {
+ public:
+  void add(std::uint64_t word) {
+    for (int byte = 0; byte < 8; ++byte)
+      value_ = (value_ ^ ((word >> (8 * byte)) & 0xff)) * 0x100000001b3U;
+  }
+  void add(double number) { add(std::bit_cast<std::uint64_t>(number)); }
+  [[nodiscard]] std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325U;
+};
+
+std::uint64_t topology_of(const Session& session, const StepResult& result) {
+  Hash hash;
+  for (const Vector3& x : session.sprinkling().nodes.positions)
+    for (int axis = 0; axis < 3; ++axis)
+      hash.add(x[axis]);
+  if (result.cut) {
+    hash.add(result.cut->area);
+    hash.add(result.cut->surface_hash);
+    hash.add(static_cast<std::uint64_t>(result.cut->closed_pairs));
+  }
+  return hash.value();
+}
+
+} // namespace
+
+void DegradationRule::rebuilt(double seconds) {
+  if (seconds > budget_) {
+    level_ = std::min(level_ + 1, most_degradation);
+    quick_ = 0;
+  } else if (seconds > budget_ / 3) {
+    quick_ = 0;
+  } else if (++quick_ == 8) {
+    level_ = std::max(level_ - 1, 0);
+    quick_ = 0;
+  }
+}
+
+void DegradationRule::solved(Rebuild rebuild, double seconds) {
+  if (rebuild == Rebuild::in_step)
+    rebuilt(seconds);
+  else if (rebuild == Rebuild::aside_early)
+    rebuilt(0);
+  else if (rebuild == Rebuild::aside)
+    rebuilt(budget_ / 2);
+}
+
+HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const std::string&)> say)
+    : session_(std::move(scenario), std::move(say), Leader::device) {
+  session_.set_force_only(true);
+  session_.set_tear_gradually(true);
+  session_.set_recondensing(true);
+  session_.set_going_on(true);
+  static_cast<void>(path());
+  parked_ = parked_tool();
+}
+
+const topology::ToolShape& HapticSimulation::tool() const {
+  static const topology::ToolShape none = topology::SphereTip{};
+  return session_.scenario().tool ? session_.scenario().tool->shape : none;
+}
+
+StepSample HapticSimulation::sample(const DeviceState& device) const {
+  const Scenario& scenario = session_.scenario();
+  StepSample sample{device.time, std::nullopt, std::nullopt};
+  const auto mode = static_cast<HandMode>(device.mode);
+  if (mode == HandMode::blade) {
+    sample.tool = parked_;
+    if (scenario.blade)
+      sample.blade = topology::BladePose{device.time, device.position, device.orientation};
+  } else if (mode == HandMode::probe || mode == HandMode::grasper) {
+    sample.tool = scenario.tool ? std::optional(tool_pose(scenario.tool->shape, device)) : std::nullopt;
+  } else if (scenario.tool) {
+    sample.tool = tool_pose(scenario.tool->shape, device);
+    if (scenario.blade) {
+      double time = device.time;
+      if (const double end = scenario.blade->path.back().time; solved_before(end)) // to there, whenever it is solved
+        time = std::min(time, end);
+      sample.blade = blade_pose(*scenario.blade, time);
+    }
+  } else {
+    sample.blade = topology::BladePose{device.time, device.position, device.orientation};
+  }
+  return sample;
+}
+
+bool HapticSimulation::holds_blade() const {
+  return mode_ == HandMode::blade || (mode_ == HandMode::usual && !session_.scenario().tool);
+}
+
+std::optional<topology::ToolPose> HapticSimulation::parked_tool() const {
+  const Scenario& scenario = session_.scenario();
+  if (!scenario.tool)
+    return std::nullopt;
+  topology::ToolPose pose = *session_.steps().front().tool;
+  double away = 0.5 * session_.organ().domain->bounds().extent().norm();
+  if (const auto* instrument = std::get_if<topology::Laparoscope>(&scenario.tool->shape))
+    away = std::min(away, 0.5 * (instrument->port - pose.point).norm());
+  pose.point += away * pose.axis;
+  return pose;
+}
+
+void HapticSimulation::prepare(const DeviceState& device) {
+  session_.prepare(sample(device));
+}
+
+void HapticSimulation::pass(const DeviceState& device) {
+  if (!session_.scenario().blade || !last_time_ || device.tick <= last_tick_ ||
+      static_cast<HandMode>(device.mode) != mode_ || !device.position.allFinite() ||
+      !device.orientation.coeffs().allFinite())
+    return;
+  const std::optional<topology::BladePose> pose = sample(device).blade;
+  const std::optional<topology::BladePose> last = passed_.empty() ? session_.last_blade() : passed_.back();
+  if (pose && last && pose->time > last->time &&
+      edge_travel(session_.scenario().blade->edge, *last, *pose) > pass_distance * session_.zone().spacing.fine)
+    passed_.push_back(*pose);
+}
+
+void HapticSimulation::solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot) {
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<topology::BladePose> passed = std::exchange(passed_, {});
+  last_tick_ = device.tick;
+  if (degradation != degradation_) {
+    session_.coarsen(std::pow(coarse_per_level, degradation));
+    degradation_ = degradation;
+  }
+  if (const auto mode = static_cast<HandMode>(device.mode); mode != mode_) {
+    session_.lift_blade();
+    mode_ = mode;
+    passed.clear();
+  }
+  if (mode_ != HandMode::usual)
+    session_.set_grip(mode_ == HandMode::grasper && (device.buttons & 1U) != 0);
+  session_.pass_blade(std::move(passed));
+  result_ = session_.step(sample(device));
+  last_time_ = device.time;
+  const BodyModel& model = session_.model();
+  snapshot.friction = session_.scenario().contact.friction;
+  const solvers::ContactCondition condition =
+      session_.grasps() ? solvers::ContactCondition::bonded : session_.scenario().contact.condition;
+  if (model.patch.nodes.empty() || !model.state) {
+    clear(snapshot);
+    snapshot.pose = result_.pose;
+    snapshot.contact = result_.contact;
+    snapshot.condition = condition;
+  } else {
+    const bool lips = model.lips && std::any_of(model.state->lips.closed.begin(), model.state->lips.closed.end(),
+                                                [](char closed) { return closed != 0; });
+    if (lips)
+      fill(solvers::held_patch(model.patch, *model.lips, model.state->lips.closed), model.state->tool, result_.contact,
+           condition, condensed_, snapshot);
+    else
+      fill(model.patch, model.state->tool, result_.contact, condition, condensed_, snapshot);
+    condensed_ = snapshot.condensed;
+  }
+  if (holds_blade()) {
+    clear(snapshot);
+    snapshot.pose.point = device.position;
+    snapshot.orientation = device.orientation;
+    if (session_.blade() != nullptr) {
+      snapshot.blade = session_.blade()->grip(model);
+      snapshot.force = snapshot.blade.force;
+      snapshot.torque = snapshot.blade.torque;
+    }
+  }
+  snapshot.pose_tick = device.tick;
+  snapshot.mode = device.mode;
+  snapshot.without_tool = !session_.scenario().tool;
+  snapshot.time = device.time;
+  snapshot.resprinkled = result_.resprinkled;
+  snapshot.cut_triangles = result_.cut ? result_.cut->triangles : 0;
+  snapshot.degradation = degradation_;
+  snapshot.nodes = result_.nodes;
+  snapshot.topology = topology_of(session_, result_);
+  snapshot.solve_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+namespace {
+
+/// Of the blade's cut in this step or, if there was none, of the last increment of a tear.
+SystemUpdate update_of(const StepResult& result) {
+  if (result.cut->update != SystemUpdate::none || !result.tear)
+    return result.cut->update;
+  return result.tear->increments.back().body.update;
+}
+
+} // namespace
+
+SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
+                            ContactSnapshot& snapshot) {
+  const auto failed = [&](const std::exception& error) {
+    SolveRecord record;
+    record.event = event;
+    record.failed = true;
+    record.reason = error.what();
+    return record;
+  };
+  try {
+    simulation.set_following_aside(event.aside);
+    if (event.swaps)
+      simulation.swap_body();
+    simulation.solve(device, event.degradation, snapshot);
+  } catch (const NumericalError& error) {
+    return failed(error);
+  } catch (const InputError& error) { // of the pose: the contact has reached a fixed region
+    return failed(error);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception& error) { // no thread, no memory: the loop goes on with the snapshot it has
+    return failed(error);
+  }
+  snapshot.sequence = event.sequence;
+  SolveRecord record = record_of(event, snapshot);
+  record.force_jump = simulation.result().force_jump;
+  if (const auto& cut = simulation.result().cut) {
+    record.cut_area = cut->area;
+    record.residual = simulation.result().residual;
+    record.update = to_string(update_of(simulation.result()));
+    record.blade_force = cut->blade.force;
+    record.blade_torque = cut->blade.torque;
+    record.blade_edge = cut->blade.edge_force;
+    record.blade_release = cut->blade.release;
+    record.blade_contacts = cut->blade.contacts;
+    record.blade_account = cut->blade.ledger;
+  }
+  return record;
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,163 @@
+// The body at one moment of a run: its cut, nodes, assembled system and solution. Everything that a cut replaces, so
+// that a refused cut leaves the old one standing.
+#pragma once
+
+#include "solvers/contact/lip_contact.hpp"
+#include "solvers/cut/growing_body.hpp"
+#include "solvers/fracture/tearing.hpp"
+#include "src/model/recondensing.hpp"
+#include "src/model/rest_memo.hpp"
+#include "src/model/surface_watch.hpp"
+#include "src/scenario/scenario.hpp"
+
+#include "topology/blade/blade.hpp"
+#include "topology/tool/contact.hpp"
+
+#include <optional>
+
+namespace spherecut::solvers {
+class UncutBody;
+}
+
+namespace spherecut::app {
+
+/// Spacings: banks of the surface that come so near to each other are looked at together.
+inline constexpr double near_banks = 0.25;
+
+/// Whether a cut of this scenario's body only appends unknowns (cut.sight = "appended").
+bool cut_appends(const Scenario& scenario);
+
+struct BodyModel {
+  std::shared_ptr<const topology::Incision> incision; // null: uncut
+  solvers::Sprinkling sprinkling;
+  double coarseness = 1;               // of its spacings, in those of the scenario
+  std::optional<Vector3> touched_from; // solvers::Problem::touched_from
+  std::vector<solvers::LipPair> pairs; // of the cut
+  std::vector<solvers::LipPair> banks; // of the organ's own surface where it has come to itself
+  /// Where the surface reaches deepest through itself in the last solution.
+  struct PassedThrough {
+    double depth = 0;                // m, 0: nowhere
+    Vector3 place = Vector3::Zero(); // m, at rest
+    double spacing = 0;              // m, of the node there
+  };
+  PassedThrough passed_through;
+  std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut
+  std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
+  const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
+  topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
+  int added_nodes = 0;                             // by updates since then
+  std::optional<topology::BladePose> window_seen;  // where the blade was when the window was last seen to cover its way
+  solvers::Field base;                             // without tool and contact
+  solvers::ContactPatch patch;                     // no nodes: the tool is far
+  std::optional<SurfaceWatch> watch;               // of the surface about the patch; empty: not looked at yet
+  int presses = 0;                                 // since it was condensed
+  std::optional<solvers::LipPatch> lips;           // pairs, then banks; empty: none has had to be held yet
+  std::optional<solvers::CutContactState> state;   // empty: not solved yet
+  solvers::Field field;                            // solution
+  mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
+  mutable RestMemo rest_memo{};                    // of the solution, likewise
+
+  /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
+  /// rest before the first solution.
+  [[nodiscard]] solvers::PointState at(const Vector3& x) const;
+  /// Shape functions there, with which the displacement is a sum over nodes; of a body that is built.
+  void shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const;
+  /// Nearest node that sees x; 0 where none does.
+  [[nodiscard]] int nearest_seen(const Vector3& x) const;
+};
+
+/// Whether a node of this kind is one of the organ's own surface, for a tool to touch.
+inline bool on_surface(solvers::NodeKind kind) {
+  return kind == solvers::NodeKind::surface || kind == solvers::NodeKind::edge;
+}
+
+/// Nodes of the fixed regions with the components that are held: an entry for every set of axes that are held by the
+/// same regions. Throws InputError naming the region that holds none.
+std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const topology::Domain& domain,
+                                             const solvers::NodeCloud& nodes);
+
+/// How many nodes these entries of fixed_nodes() hold.
+int held_nodes(const std::vector<solvers::Prescribed>& prescribed);
+
+/// Axes along which each of `count` nodes is held by any of the entries.
+std::vector<std::array<bool, 3>> held_axes(const std::vector<solvers::Prescribed>& prescribed, int count);
+
+/// Whether a force along the unit vector `normal` moves a node that is held along some axes.
+bool gives_way(const std::array<bool, 3>& held, const Vector3& normal);
+
+/// Surface nodes that a tool at `centre` may touch: within `reach` m on its side of the organ, without those that are
+/// held against it. Throws InputError when there are none.
+std::vector<int> touchable_nodes(const Scenario& scenario, const topology::Domain& domain,
+                                 const solvers::NodeCloud& nodes, const topology::SurfaceContact& centre, double reach);
+
+/// Nodes for `options` in place of `previous`, as solvers::resprinkle. A fixed region that would be left without a
+/// surface node keeps those that it had. Throws as that does.
+solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Domain& domain,
+                                    const solvers::SprinkleOptions& options, const solvers::NodeCloud& previous);
+
+/// What a body on the nodes and the incision of a model is made of: regions held and loads, as the scenario has them.
+solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                            const BodyModel& model);
+
+/// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead the body
+/// is one that can follow it. Throws as solvers::discretise does.
+void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
+              const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
+
+/// Reason not to follow: the window would hold more of the body than pays.
+inline constexpr const char* too_much_of_body = "the cut concerns too much of the body";
+
+/// Nodes that updates may add before a body is condensed anew.
+inline constexpr int growth_room = 150;
+
+/// Whether the window of a body that follows its cut along that way is worth its while.
+bool can_follow(const Scenario& scenario, const BodyModel& model, const topology::SurfaceMesh& way_ahead);
+
+/// Begins to condense the model's body anew on a thread of its own, as assemble() would for that way ahead. `in_one`,
+/// `after`: as Recondensing.
+std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyModel& model,
+                                         const topology::SurfaceMesh& way_ahead, int in_one,
+                                         std::unique_ptr<Recondensing> after);
+
+/// Why no body of this scenario on the nodes of `model` can follow its cut; empty: one can.
+std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model, bool severed);
+
+/// What a cut changes in the nodes of `before`: those beside the new part of the cut are exchanged, the others keep
+/// their order. Throws as solvers::extend_sprinkling does.
+solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const solvers::SprinkleOptions& options,
+                                          const BodyModel& before, solvers::Sprinkling& after);
+
+/// The body of `before` follows the cut to the nodes and incision of `after` and goes over to it; only what the cut
+/// touched is computed. Where it cannot (with `only_update`: not by an update alone), both models stay as they are and
+/// the growth says why. Throws as solvers::Growable::grow does, and all stays as it was.
+solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                               const solvers::SprinkleIncrement& change,
+                               const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
+                               BodyModel& after, bool only_update = false);
+
+/// Condenses the model onto tool candidates; none: the tool is far. Forgets the state. `for_few_presses`: without the
+/// fields of the patch where the method can do without (contact_solver.hpp).
+void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
+
+/// Finds, for a condensed model, the means over lips that every solve of it takes, so that the first does not have to.
+/// Throws NumericalError where no sound support covers a lip: the model cannot be solved.
+void find_lips(BodyModel& model);
+
+/// Presses on a patch without fields after which they are made, a few candidates a press.
+inline constexpr int few_presses = 20;
+
+/// Solves for tool and lips in contact; `tool` null: the tool is far, and candidates there are none. Starts from the
+/// model's state where it has one. With `grasped`, one displacement (m) a node of the patch, the tool does not press:
+/// it holds the patch there. A model without state goes on from the `memory` of friction on other nodes, if there is
+/// one. `lips_touch`: lips have to be held as a rule, and are condensed without being tried apart.
+void solve_contact(const ToolSettings* tool, const topology::ToolPose* pose, const Scenario& scenario, BodyModel& model,
+                   const std::vector<Vector3>* grasped = nullptr,
+                   const std::optional<solvers::GripMemory>& memory = std::nullopt, bool lips_touch = false);
+
+/// Largest unbalanced force over the largest force.
+double residual(const BodyModel& model);
+
+/// Openings of the pairs along their normals, m.
+std::vector<double> normal_openings(const BodyModel& model);
+
+} // namespace spherecut::app

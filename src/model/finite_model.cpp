@@ -1,0 +1,192 @@
+#include "src/model/finite_model.hpp"
+
+#include "src/scenario/law_reader.hpp"
+#include "topology/base/errors.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+namespace spherecut::app {
+namespace {
+
+/// Of the spacing: what is left of a share's middle in the tool.
+constexpr double most_penetration = 1e-3;
+/// Of the acting forces, gravity among them: a small force of contact is to be told from what is left.
+constexpr double most_unbalanced = 1e-4;
+
+solvers::EquilibriumOptions equilibrium_options() {
+  solvers::EquilibriumOptions options;
+  options.penetration = most_penetration;
+  options.tolerance = most_unbalanced;
+  return options;
+}
+
+struct Hindrance {
+  std::string what; // empty: none
+  int line = 0;
+};
+
+Hindrance hindrance_of(const Scenario& scenario) {
+  const int line = scenario.law.line;
+  if (!scenario.law.spec.prony.empty())
+    return {"material.prony", line};
+  if (scenario.method.method != solvers::Method::galerkin)
+    return {fmt::format("method.name = \"{}\"", solvers::to_string(scenario.method.method)), line};
+  if (!scenario.pretension.isZero(0))
+    return {"material.pretension", line};
+  if (!scenario.precuts.empty())
+    return {"[[precut]]", scenario.precuts.front().line};
+  if (scenario.blade)
+    return {"[blade]", scenario.blade->line};
+  if (scenario.tearing.enabled)
+    return {"[tearing]", line};
+  if (scenario.tool && scenario.tool->grasp)
+    return {"tool.shape = \"grasper\"", scenario.tool->line};
+  if (scenario.contact.condition != solvers::ContactCondition::frictionless)
+    return {fmt::format("contact.condition = \"{}\"",
+                        scenario.contact.condition == solvers::ContactCondition::bonded ? "bonded" : "frictional"),
+            line};
+  return {};
+}
+
+std::function<solvers::FibreFrame(const Vector3&)> fibre_field(const LawSettings& law) {
+  const auto* fibres = std::get_if<solvers::HolzapfelLaw>(&law.spec.law);
+  if (law.own || fibres == nullptr || fibres->same_everywhere)
+    return nullptr;
+  return [law](const Vector3& x) { return law.fibres_at(x); };
+}
+
+solvers::Problem checked_problem(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                                 const BodyModel& nodes) {
+  require_run(scenario);
+  return problem_of(scenario, domain, nodes);
+}
+
+/// Free nodes of the organ's own surface.
+std::vector<int> free_surface(const solvers::Problem& problem) {
+  const std::vector<std::array<bool, 3>> held = held_axes(problem.prescribed, problem.nodes.size());
+  std::vector<int> free;
+  for (int i = 0; i < problem.nodes.size(); ++i)
+    if (on_surface(problem.nodes.kinds[i]) && gives_way(held[i], problem.nodes.normals[i]))
+      free.push_back(i);
+  return free;
+}
+
+} // namespace
+
+void require_run(const Scenario& scenario) {
+  if (!is_nonlinear(scenario.law)) {
+    require_linear(scenario.file, scenario.law);
+    return;
+  }
+  const Hindrance hindrance = hindrance_of(scenario);
+  if (hindrance.what.empty())
+    return;
+  throw InputError(fmt::format("{}:{}: {} does not go with material.law = \"{}\"; possible with it: fixed regions, "
+                               "gravity, and a tool that presses without friction, by method galerkin",
+                               scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
+}
+
+bool can_run(const Scenario& scenario) {
+  return scenario.law.spec.prony.empty() && (!is_nonlinear(scenario.law) || hindrance_of(scenario).what.empty());
+}
+
+FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                         const BodyModel& nodes, bool touched)
+    : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), {}, fibre_field(scenario.law)),
+      equilibrium_(body_, equilibrium_options()) {
+  if (!touched)
+    return;
+  tool_ = scenario.tool->shape;
+  candidates_ = free_surface(body_.problem());
+  equilibrium_.set_contact(*tool_, candidates_);
+  for (const int node : candidates_)
+    rest_.push_back(body_.contact_mean(node).centroid);
+  lay_skin();
+}
+
+void FiniteModel::lay_skin() {
+  const topology::SurfaceMesh& surface = body_.problem().domain->surface();
+  std::vector<Vector3> points = surface.vertices;
+  for (const auto& triangle : surface.triangles)
+    points.emplace_back(
+        (surface.vertices[triangle[0]] + surface.vertices[triangle[1]] + surface.vertices[triangle[2]]) / 3);
+  solvers::ShapeFunctions shape;
+  for (const Vector3& x : points) {
+    if (!solvers::evaluate(body_.spheres(), x, shape))
+      continue;
+    skin_.rest.push_back(x);
+    for (int k = 0; k < shape.size(); ++k) {
+      skin_.nodes.push_back(shape.nodes[k]);
+      skin_.values.push_back(shape.value[k]);
+    }
+    skin_.start.push_back(static_cast<int>(skin_.nodes.size()));
+  }
+}
+
+double FiniteModel::deepest(const topology::ToolPose& pose) const {
+  const VectorX& coefficients = equilibrium_.coefficients();
+  double depth = 0;
+  for (std::size_t p = 0; p < skin_.rest.size(); ++p) {
+    Vector3 x = skin_.rest[p];
+    for (int k = skin_.start[p]; k < skin_.start[p + 1]; ++k)
+      x += skin_.values[k] * coefficients.segment<3>(3 * static_cast<Eigen::Index>(skin_.nodes[k]));
+    depth = std::max(depth, -topology::tool_distance(*tool_, pose, x));
+  }
+  return depth;
+}
+
+void FiniteModel::summarise_contact(FiniteStep& step) const {
+  const std::vector<Vector3> forces = equilibrium_.contact()->forces();
+  Vector3 centre = Vector3::Zero();
+  double weight = 0;
+  for (std::size_t c = 0; c < forces.size(); ++c) {
+    centre += forces[c].norm() * rest_[c];
+    weight += forces[c].norm();
+  }
+  for (std::size_t c = 0; c < forces.size(); ++c)
+    if (forces[c].norm() > 0)
+      step.contact_radius = std::max(step.contact_radius, (rest_[c] - centre / weight).norm() +
+                                                              0.5 * body_.problem().nodes.spacings[candidates_[c]]);
+}
+
+FiniteStep FiniteModel::solve(const std::optional<topology::ToolPose>& pose) {
+  solvers::FiniteLoading loading;
+  if (tool_)
+    loading.tool = pose;
+  const solvers::EquilibriumStatus status = equilibrium_.solve(loading);
+  FiniteStep step;
+  step.force = status.tool_force;
+  step.torque = status.tool_torque;
+  step.active_nodes = status.touching;
+  step.iterations = status.iterations;
+  step.residual = status.residual;
+  step.least_jacobian = status.least_jacobian;
+  if (loading.tool) {
+    summarise_contact(step);
+    step.penetration = deepest(*pose);
+  }
+  return step;
+}
+
+solvers::PointState FiniteModel::at(const Vector3& x) const {
+  const solvers::FiniteState state = body_.at(x, equilibrium_.coefficients());
+  const Matrix3& f = state.deformation;
+  return {state.displacement, f - Matrix3::Identity(), 0.5 * (f.transpose() * f - Matrix3::Identity()), state.cauchy};
+}
+
+VectorX FiniteModel::nodal_displacements() const {
+  return body_.nodal_displacements(equilibrium_.coefficients());
+}
+
+double rotation_degrees(const Matrix3& deformation) {
+  const Eigen::JacobiSVD<Matrix3> svd(deformation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Matrix3 rotation = svd.matrixU() * svd.matrixV().transpose();
+  const Vector3 axis(rotation(2, 1) - rotation(1, 2), rotation(0, 2) - rotation(2, 0), rotation(1, 0) - rotation(0, 1));
+  return std::atan2(axis.norm(), rotation.trace() - 1) * 180 / std::numbers::pi;
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,65 @@
+// The body of a scenario whose law is not linear: at finite strain, in equilibrium with its weight and a tool that
+// presses without friction.
+#pragma once
+
+#include "solvers/finite/equilibrium.hpp"
+#include "src/model/body_model.hpp"
+
+namespace spherecut::app {
+
+/// Throws InputError naming file, line, what a run cannot compute with the scenario's law and what it can.
+void require_run(const Scenario& scenario);
+[[nodiscard]] bool can_run(const Scenario& scenario);
+
+/// One equilibrium.
+struct FiniteStep {
+  Vector3 force = Vector3::Zero();  // N, of the body on the tool
+  Vector3 torque = Vector3::Zero(); // N m, of the same about the tool's point
+  double contact_radius = 0;        // m, as ContactState::contact_radius
+  int active_nodes = 0, iterations = 0;
+  double residual = 0; // norm of the unbalanced forces over that of the acting ones
+  double least_jacobian = 1;
+  double penetration = 0; // m, deepest that corners and middles of the surface's triangles lie in the tool
+};
+
+class FiniteModel {
+ public:
+  /// The body on the nodes of `nodes`. `touched`: whether a tool may come to it. Throws as require_run() and
+  /// solvers::FiniteBody.
+  FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, const BodyModel& nodes,
+              bool touched);
+
+  /// Goes on to equilibrium with the loads and the tool, which is nowhere when it has no pose. Throws NumericalError:
+  /// the state is then what it was before.
+  FiniteStep solve(const std::optional<topology::ToolPose>& pose);
+
+  /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
+  /// from the volume ratio there. Throws InputError where no sphere covers it.
+  [[nodiscard]] solvers::PointState at(const Vector3& x) const;
+  [[nodiscard]] VectorX nodal_displacements() const; // 3 a node, m
+  [[nodiscard]] int candidates() const { return static_cast<int>(candidates_.size()); }
+  [[nodiscard]] int held() const { return held_nodes(body_.problem().prescribed); }
+
+ private:
+  /// Points of the organ's surface as sums over nodes, in compressed rows.
+  struct Skin {
+    std::vector<Vector3> rest; // m
+    std::vector<int> start{0}, nodes;
+    std::vector<double> values;
+  };
+  void lay_skin();
+  [[nodiscard]] double deepest(const topology::ToolPose& pose) const;
+  void summarise_contact(FiniteStep& step) const;
+
+  solvers::FiniteBody body_;
+  solvers::Equilibrium equilibrium_;
+  std::vector<int> candidates_; // free nodes of the surface
+  std::vector<Vector3> rest_;   // m, of each the middle of its share
+  std::optional<topology::ToolShape> tool_;
+  Skin skin_;
+};
+
+/// Angle of the rotation of F = R U, degrees.
+double rotation_degrees(const Matrix3& deformation);
+
+} // namespace spherecut::app

@@ -1,9 +1,0 @@
-#include "src/version.hpp"
-
-namespace spherecut::app {
-
-std::string_view version() {
-  return SPHERECUT_VERSION;
-}
-
-} // namespace spherecut::app

@@ -1,0 +1,2 @@
+#pragma once
+#include "solvers/galerkin/galerkin.hpp"

@@ -1,0 +1,54 @@
+// Cholesky factors of dense matrices, definite and semidefinite.
+#include "solvers/algebra/dense_cholesky.hpp"
+
+#include <Eigen/Cholesky>
+#include <catch2/catch.hpp>
+#include <random>
+
+using namespace spherecut;
+using namespace spherecut::solvers;
+
+namespace {
+
+MatrixX random_rows(int rows, int columns) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  return MatrixX::NullaryExpr(rows, columns, [&] { return normal(random); });
+}
+
+VectorX solution_by(const MatrixX& lower, const VectorX& right) {
+  const VectorX half = lower.triangularView<Eigen::Lower>().solve(right);
+  return lower.transpose().triangularView<Eigen::Upper>().solve(half);
+}
+
+} // namespace
+
+TEST_CASE("The semidefinite factor of a definite matrix is its Cholesky factor") {
+  const MatrixX rows = random_rows(12, 7), matrix = rows.transpose() * rows;
+  MatrixX lower = matrix, plain = matrix;
+  CHECK(factor_lower_semidefinite(lower, matrix.diagonal()) == -1);
+  CHECK(factor_lower(plain) == -1);
+  CHECK((lower - plain).norm() == 0);
+  CHECK((lower * lower.transpose() - matrix).norm() < 1e-13 * matrix.norm());
+}
+
+TEST_CASE("Unknowns that repeat others stay zero, and the solution is one all the same") {
+  MatrixX rows = random_rows(12, 7);
+  rows.col(3) = rows.col(0) - 2 * rows.col(1);
+  rows.col(6) = rows.col(5);
+  const MatrixX matrix = rows.transpose() * rows;
+  MatrixX lower = matrix;
+  CHECK(factor_lower_semidefinite(lower, matrix.diagonal()) == -1);
+  const VectorX right = matrix * VectorX::LinSpaced(7, 1, 2), x = solution_by(lower, right);
+  CHECK((matrix * x - right).norm() < 1e-11 * right.norm());
+  CHECK(std::abs(x[3]) < 1e-12);
+  CHECK(std::abs(x[6]) < 1e-12);
+}
+
+TEST_CASE("A matrix that is not semidefinite is told by its column") {
+  MatrixX matrix = MatrixX::Identity(4, 4);
+  matrix(2, 2) = -0.5;
+  MatrixX lower = matrix;
+  CHECK(factor_lower_semidefinite(lower, VectorX::Ones(4)) == 2);
+  CHECK(factor_lower(matrix) == 2);
+}

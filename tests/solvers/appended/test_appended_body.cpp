@@ -1,0 +1,293 @@
+#include "experiments/analytic/cracks.hpp"
+#include "experiments/support/straight_crack.hpp"
+#include "solvers/appended/appended_body.hpp"
+#include "tests/solvers/growing_scene.hpp"
+#include "topology/incision/cut_sheets.hpp"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <numbers>
+
+using namespace spherecut;
+using namespace spherecut::solvers;
+
+namespace {
+
+DiscretisationOptions appending(UnheldPieces unheld = UnheldPieces::refuse) {
+  DiscretisationOptions options;
+  options.sight = SightRule::appended;
+  options.unheld = unheld;
+  options.estimate_condition = false;
+  return options;
+}
+
+const experiments::CutFrame appended_plane = experiments::tilted_frame({0.02, -0.03, 0.04}, {0.15, -0.1, 0.2});
+
+bool is_above_cut(const Vector3& x) {
+  return appended_plane.local(x)[1] > 0;
+}
+
+/// A cube of 1 m that a tilted plane cuts in two.
+experiments::CutBody appended_cube(int nodes = 350) {
+  experiments::CutBodyCase cut;
+  cut.domain = topology::make_box_domain({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}, 0.2);
+  cut.sheets = {
+      topology::make_rectangle_sheet(appended_plane.origin, appended_plane.normal, appended_plane.ahead, 2, 2, 0.25)};
+  cut.coarse = 1;
+  cut.nodes = nodes;
+  cut.sight = SightRule::appended;
+  experiments::CutBody body = experiments::cut_body(cut);
+  body.problem.material = {1, 0.3, 0};
+  return body;
+}
+
+Vector3 total_of(const std::vector<Vector3>& forces) {
+  Vector3 total = Vector3::Zero();
+  for (const Vector3& force : forces)
+    total += force;
+  return total;
+}
+
+/// Block with a growing cut whose lip nodes are places.
+struct AppendingScene : tests::GrowingScene {
+  AppendingScene() : GrowingScene() {
+    sprinkling.lips_apart = true;
+    nodes = sprinkle(*domain, sprinkling).nodes;
+  }
+};
+
+std::vector<int> nodes_on_top(const NodeCloud& nodes, int count) {
+  std::vector<int> top;
+  for (int i = 0; i < nodes.size() && std::ssize(top) < count; ++i)
+    if (nodes.kinds[i] == NodeKind::surface && nodes.normals[i].z() > 0.9)
+      top.push_back(i);
+  return top;
+}
+
+} // namespace
+
+TEST_CASE("A cut that appends parts a body completely") {
+  experiments::CutBody body = appended_cube();
+  const auto motion = [](const Vector3& x) -> Vector3 {
+    return is_above_cut(x) ? Vector3(Vector3(0.1, -0.2, 0.3) + Vector3(0.4, 0.1, -0.5).cross(x))
+                           : Vector3(Vector3::Zero());
+  };
+  experiments::hold_surface(
+      body.problem, [](const Vector3& x, const Vector3& n) { return std::abs(n.z()) > 0.5 && std::abs(x.z()) > 0.49; },
+      motion);
+  const auto cut = discretise(body.problem, appending());
+  REQUIRE(cut->report().pieces.size() == 2);
+  const VectorX u = cut->nodal_displacements(cut->solve());
+  double moved = 0, still = 0;
+  for (int i = 0; i < body.problem.nodes.size(); ++i) {
+    const Vector3& x = body.problem.nodes.positions[i];
+    double& error = is_above_cut(x) ? moved : still;
+    error = std::max(error, (u.segment<3>(3 * i) - motion(x)).norm());
+  }
+  CHECK(moved < 1e-9);
+  CHECK(still < 1e-10);
+
+  // A force on one half does nothing to the other.
+  std::vector<int> above, below;
+  for (int i = 0; i < body.problem.nodes.size(); ++i)
+    if (body.problem.nodes.kinds[i] == NodeKind::surface && std::abs(body.problem.nodes.normals[i].z()) < 0.5)
+      (is_above_cut(body.problem.nodes.positions[i]) ? above : below).push_back(i);
+  REQUIRE(above.size() > 20);
+  REQUIRE(below.size() > 20);
+  const MatrixX own = cut->contact_compliance(above);
+  const MatrixX across = cut->compliance_between(below, above);
+  CHECK(across.cwiseAbs().maxCoeff() < 1e-14 * own.cwiseAbs().maxCoeff());
+}
+
+TEST_CASE("A straight crack that is appended opens as it should") {
+  const experiments::CutFrame& crack = experiments::straight_crack_frame();
+  experiments::CutBody body = experiments::straight_crack_body(1, 0.3, Method::galerkin, SightRule::appended);
+  const Material material = body.problem.material;
+  Intensities acting = Vector3::Zero();
+  experiments::hold_whole_surface(body.problem, [&](const Vector3& x) {
+    return experiments::straight_crack_displacement(material, crack, acting, x);
+  });
+  const auto cut = discretise(body.problem, appending());
+  const auto& appended = dynamic_cast<const AppendedBody&>(*cut);
+  const std::array<int, 3> component{1, 0, 2};            // in the axes ahead, normal, along
+  const std::array<double, 3> bound{0.012, 0.018, 0.014}; // twice what the median of ten node sets may be
+  for (int mode = 0; mode < 3; ++mode) {
+    acting = Vector3::Unit(mode);
+    const Field field = cut->solve();
+    CHECK(cut->residual(field) < 1e-9);
+    double error = 0, size = 0;
+    for (int i = 0; i < 30; ++i)
+      for (const double along : {-0.3, 0.0, 0.3}) {
+        const double s = 0.8 * std::pow((i + 0.5) / 30, 2);
+        const Vector3 x = crack.origin - s * crack.ahead + along * crack.tangent;
+        const double opening = crack.local(
+            crack.origin + experiments::opening_at(*cut, field, x, crack.normal, body.fine))[component[mode]];
+        const double exact = 2 * tip_field(material, acting, -s, 1e-15 * s).displacement[component[mode]];
+        error += (opening - exact) * (opening - exact);
+        size += exact * exact;
+      }
+    CHECK(std::sqrt(error / size) < bound[mode]);
+    Intensities integral = Vector3::Zero(), read = Vector3::Zero();
+    const auto fronts = front_samples(*body.problem.incision, 0.2, 0.25);
+    for (const topology::FrontFrame& front : fronts) {
+      integral += interaction_integral(*cut, field, front) / static_cast<double>(fronts.size());
+      read += appended.front_intensities(field, front) / static_cast<double>(fronts.size());
+      // The rule is the same as a linear function of the field.
+      CHECK((interaction_rule(*cut, false, front)(field) - interaction_integral(*cut, field, front)).norm() < 1e-9);
+    }
+    CHECK((integral - acting).norm() < 0.03);
+    CHECK((read - acting).norm() < 0.08);
+  }
+}
+
+TEST_CASE("A pressurised penny that is appended opens by the right volume") {
+  const double nu = GENERATE(0.3, 0.49);
+  const experiments::CutFrame crack = experiments::tilted_frame({0.03, -0.05, 0.04}, {0.22, -0.17, 0.1});
+  experiments::CutBodyCase cut;
+  cut.domain = topology::make_box_domain(Vector3(-2, -2, -2), Vector3(2, 2, 2), 0.5);
+  cut.sheets = {topology::make_disc_sheet(crack.origin, crack.normal, 1, 0.1)};
+  cut.slope = 0.25 * std::cbrt(2400.0 / 800);
+  cut.nodes = 800;
+  cut.sight = SightRule::appended;
+  experiments::CutBody body = experiments::cut_body(cut);
+  body.problem.material = {1, nu, 0};
+  const Material material = body.problem.material;
+  experiments::hold_whole_surface(
+      body.problem, [&](const Vector3& x) { return experiments::penny_displacement(material, crack, 1, 1, x); });
+  body.problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -n; };
+  const auto penny = discretise(body.problem, appending());
+  const Field field = penny->solve();
+  double volume = 0;
+  constexpr int rings = 20, sectors = 12;
+  for (int a = 0; a < rings; ++a)
+    for (int b = 0; b < sectors; ++b) {
+      const double t = 0.5 * std::numbers::pi * (a + 0.5) / rings, w = 2 * std::numbers::pi * (b + 0.5) / sectors,
+                   r = std::sin(t);
+      const double area = r * std::cos(t) * (0.5 * std::numbers::pi / rings) * (2 * std::numbers::pi / sectors);
+      const Vector3 x = crack.origin + r * (std::cos(w) * crack.ahead + std::sin(w) * crack.tangent);
+      volume += area * experiments::opening_at(*penny, field, x, crack.normal, body.fine).dot(crack.normal);
+    }
+  CHECK(volume == Approx(experiments::penny_opening_volume(material, 1, 1)).epsilon(0.015));
+}
+
+TEST_CASE("A body whose cut has grown by appending equals one that was cut at once") {
+  AppendingScene scene;
+  const auto follows = discretise(scene.problem(), appending());
+  auto& body = dynamic_cast<AppendedBody&>(*follows);
+  for (int increment = 0; increment < 4; ++increment) {
+    const SprinkleIncrement change = scene.grow();
+    CHECK(change.removed.empty());
+    CHECK(change.added.size() > 0);
+    const BodyGrowth growth = body.grow(change, scene.problem(), {}, true);
+    REQUIRE(std::string(growth.uncovered).empty());
+    REQUIRE(body.problem().nodes.positions == scene.nodes.positions);
+    const Field field = body.solve();
+    CHECK(body.residual(field, {}, {}) < 1e-9);
+    const AppendedBody at_once(scene.problem(), appending(), body.uncut());
+    const Field expected = at_once.solve();
+    const VectorX grown = body.nodal_displacements(field), fresh = at_once.nodal_displacements(expected);
+    CHECK((grown - fresh).norm() < 1e-3 * fresh.norm());
+    const std::vector<int> top = nodes_on_top(scene.nodes, 12);
+    const MatrixX compliance = body.contact_compliance(top);
+    CHECK((compliance - at_once.contact_compliance(top)).norm() < 1e-3 * compliance.norm());
+  }
+}
+
+TEST_CASE("Forces on an appended cut's body act as they should") {
+  AppendingScene scene;
+  const auto body = discretise(scene.problem(), appending());
+  std::vector<int> nodes = nodes_on_top(scene.nodes, 4);
+  nodes.push_back(scene.first(NodeKind::lip));
+  const std::vector<Field> responses = body->force_responses(nodes);
+  const MatrixX compliance = body->contact_compliance(nodes);
+  CHECK((compliance - compliance.transpose()).norm() < 1e-12 * compliance.norm());
+  CHECK((compliance - body->contact_displacements(nodes, responses)).norm() < 1e-8 * compliance.norm());
+  for (std::size_t c = 0; c < nodes.size(); ++c)
+    for (int axis = 0; axis < 3; ++axis) {
+      const Field& field = responses[3 * c + axis];
+      CHECK(body->residual(field, {nodes[c]}, {Vector3::Unit(axis)}) < 1e-8);
+      CHECK((total_of(body->constraint_forces(field)) + Vector3::Unit(axis)).norm() < 1e-6);
+    }
+  MatrixX cases = MatrixX::Zero(15, 2);
+  cases.col(0).segment<3>(3) = Vector3(1, -2, 0.5);
+  cases.col(1).segment<3>(12) = Vector3(0.3, 0.1, -1);
+  const CaseResponses condensed = body->condense_cases(nodes, cases, nodes);
+  CHECK((condensed.at - compliance * cases).norm() < 1e-10 * compliance.norm());
+  CHECK((condensed.among - cases.transpose() * compliance * cases).norm() < 1e-10 * compliance.norm());
+  // Work that the loads do is twice the energy of the field, and the field that a point's shape functions make is that
+  // of at().
+  const Field field = body->solve();
+  const Vector3 x(0.002, 0.003, -0.004);
+  ShapeFunctions shape;
+  body->shape_at(x, shape);
+  Vector3 displacement = Vector3::Zero();
+  for (int k = 0; k < shape.size(); ++k)
+    displacement += shape.value[k] * field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k]));
+  for (const VectorTerm& term : shape.vectors)
+    displacement += term.value * field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(term.group));
+  CHECK((displacement - body->at(x, field).displacement).norm() < 1e-14);
+  // Its gradient is the derivative.
+  const PointState state = body->at(x, field);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double h = 1e-7;
+    const Vector3 slope = (body->at(x + h * Vector3::Unit(axis), field).displacement -
+                           body->at(x - h * Vector3::Unit(axis), field).displacement) /
+                          (2 * h);
+    CHECK((slope - state.gradient.col(axis)).norm() < 1e-5 * state.gradient.norm());
+  }
+}
+
+TEST_CASE("Pieces that an appended cut frees are refused, held or dropped") {
+  experiments::CutBody body = appended_cube(250);
+  experiments::hold_surface(
+      body.problem, [](const Vector3& x, const Vector3& n) { return x.z() < 0 && n.z() < -0.5; },
+      [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
+  CHECK_THROWS_AS(discretise(body.problem, appending()), InputError);
+
+  // Loads in balance leave the springs alone: the free half stretches as it would anywhere.
+  Loads balanced;
+  balanced.initial_strain = Vector3(0.01, 0.02, -0.01).asDiagonal();
+  body.problem.loads = balanced;
+  const auto held = discretise(body.problem, appending(UnheldPieces::hold));
+  const Field field = held->solve();
+  CHECK(held->residual(field) < 1e-9);
+  double stress = 0, largest = 0;
+  for (int i = 0; i < body.problem.nodes.size(); ++i)
+    if (const Vector3& x = body.problem.nodes.positions[i]; is_above_cut(x)) {
+      const PointState state = held->at(x, field);
+      stress = std::max(stress, state.stress.norm());
+      largest = std::max(largest, (state.strain - balanced.initial_strain).norm());
+    }
+  CHECK(stress < 1e-8);
+  CHECK(largest < 1e-8);
+
+  body.problem.loads = {};
+  body.problem.loads.body_force = [](const Vector3&) { return Vector3(0, 0, -1); };
+  const auto dropped = discretise(body.problem, appending(UnheldPieces::drop));
+  const VectorX u = dropped->nodal_displacements(dropped->solve());
+  double above = 0, below = 0;
+  for (int i = 0; i < body.problem.nodes.size(); ++i) {
+    double& most = is_above_cut(body.problem.nodes.positions[i]) ? above : below;
+    most = std::max(most, u.segment<3>(3 * i).norm());
+  }
+  CHECK(below > 0.1);
+  CHECK(above < 1e-9);
+}
+
+TEST_CASE("What an appended cut cannot have is refused") {
+  AppendingScene scene;
+  Problem problem = scene.problem();
+  DiscretisationOptions options = appending();
+  options.method = Method::collocation;
+  CHECK_THROWS_AS(discretise(problem, options), InputError);
+  // Nodes behind the lip nodes.
+  problem.nodes.add(Vector3(0.01, 0.01, -0.02), 0.006, NodeKind::interior);
+  CHECK_THROWS_AS(discretise(problem, appending()), InputError);
+  // An exchange of nodes is not covered, and the body stays as it was.
+  const auto body = discretise(scene.problem(), appending());
+  const VectorX before = body->solve().coefficients;
+  SprinkleIncrement change = scene.grow();
+  change.removed.push_back(0);
+  CHECK_FALSE(std::string(dynamic_cast<Growable&>(*body).grow(change, scene.problem(), {}, true).uncovered).empty());
+  CHECK(body->solve().coefficients == before);
+}

@@ -1,0 +1,263 @@
+// Bodies at finite strain: derivatives by differences, rotations, the patch test, equilibria by two methods, contact,
+// words for what has no equilibrium, bits against threads.
+#include "experiments/analytic/finite_strain.hpp"
+#include "experiments/support/finite_block.hpp"
+#include "solvers/algebra/parallel.hpp"
+#include "tests/support/cut_block.hpp"
+
+#include <Eigen/Geometry>
+#include <catch2/catch.hpp>
+#include <numbers>
+
+using namespace spherecut;
+using namespace spherecut::solvers;
+using experiments::face_force;
+using experiments::finite_block;
+using experiments::FiniteBlock;
+
+namespace {
+
+FiniteBlock held_block(int divisions, std::initializer_list<int> faces) {
+  FiniteBlock block{.spacing = 1.0 / divisions};
+  for (const int face : faces)
+    block.held[face].fill(true);
+  return block;
+}
+
+/// A stretched, sheared and disturbed state.
+VectorX disturbed(const FiniteBody& body) {
+  std::srand(7);
+  VectorX u = 0.02 * VectorX::Random(3 * body.size());
+  for (int i = 0; i < body.size(); ++i) {
+    const Vector3& x = body.problem().nodes.positions[i];
+    u.segment<3>(3 * i) += Vector3(0.3 * x.x() + 0.2 * x.y(), -0.1 * x.y(), 0.1 * x.x());
+  }
+  return u;
+}
+
+VectorX by_rank(const FiniteBody& body, const VectorX& v) {
+  VectorX ordered(v.size());
+  for (int i = 0; i < body.size(); ++i)
+    ordered.segment<3>(3 * body.rank()[i]) = v.segment<3>(3 * i);
+  return ordered;
+}
+
+std::vector<Vector3> pressed_top(const FiniteBody& body, double depth) {
+  return body.prescribed_values([&](const Vector3& x) { return Vector3(0, 0, x.z() > 1 - 1e-9 ? -depth : 0); });
+}
+
+} // namespace
+
+TEST_CASE("Forces are the slope of the energy, the tangent that of the forces") {
+  for (const double nu : {0.3, 0.49}) {
+    const FiniteBody body(finite_block(held_block(3, {4})), experiments::neo_hookean(2, nu));
+    CHECK((nu > 0.4) == (body.blocks().size() > 0));
+    const VectorX u = disturbed(body), d = VectorX::Random(u.size());
+    constexpr double small = 1e-6;
+    FiniteForces at, plus, minus;
+    body.evaluate(u, at);
+    body.evaluate(u + small * d, plus);
+    body.evaluate(u - small * d, minus);
+    CHECK((plus.energy - minus.energy) / (2 * small) == Approx(at.forces.dot(d)).epsilon(1e-6));
+    SparseMatrix lower;
+    body.tangent(u, 0, lower);
+    const VectorX product = lower.selfadjointView<Eigen::Lower>() * by_rank(body, d);
+    const VectorX difference = by_rank(body, (plus.forces - minus.forces) / (2 * small));
+    CHECK((product - difference).norm() < 1e-7 * difference.norm());
+  }
+}
+
+TEST_CASE("A rotation by 90 degrees bears no forces") {
+  const FiniteBody body(finite_block(held_block(3, {4})), experiments::neo_hookean(2, 0.49));
+  const Matrix3 turn =
+      Eigen::AngleAxisd(std::numbers::pi / 2, Vector3(1, 2, 3).normalized()).toRotationMatrix() - Matrix3::Identity();
+  VectorX u(3 * body.size());
+  for (int i = 0; i < body.size(); ++i)
+    u.segment<3>(3 * i) = turn * body.problem().nodes.positions[i];
+  FiniteForces rotation, reference;
+  body.evaluate(u, rotation);
+  body.evaluate(disturbed(body), reference);
+  CHECK(rotation.forces.norm() < 1e-10 * reference.forces.norm());
+  CHECK(rotation.least_jacobian == Approx(1).epsilon(1e-12));
+}
+
+TEST_CASE("Forces and energy have the same bits with any number of threads") {
+  const FiniteBody body(finite_block(held_block(6, {4})), experiments::neo_hookean(2, 0.49));
+  const VectorX u = disturbed(body);
+  FiniteForces one, four;
+  body.evaluate(u, one);
+  set_thread_count(4);
+  body.evaluate(u, four);
+  set_thread_count(1);
+  CHECK(one.energy == four.energy);
+  CHECK(one.forces == four.forces);
+  CHECK(one.least_jacobian == four.least_jacobian);
+}
+
+TEST_CASE("Gradients that fit the quadrature reproduce linear functions and surface integrals") {
+  const FiniteBody body(finite_block(held_block(4, {4})), experiments::neo_hookean(1, 0.3));
+  CHECK(body.consistency().before > 1e-3);
+  CHECK(body.consistency().after < 2e-7);
+  CHECK(body.consistency().change < 0.02);
+  const PointTable& points = body.points();
+  for (int group = 0; group < points.groups(); ++group)
+    for (int lane = 0; lane < points.count[group]; ++lane) {
+      Vector3 sum = Vector3::Zero();
+      Matrix3 moment = Matrix3::Zero();
+      for (int slot = points.start[group]; slot < points.start[group + 1]; ++slot) {
+        sum += points.gradient(slot, lane);
+        moment += body.problem().nodes.positions[points.nodes[slot]] * points.gradient(slot, lane).transpose();
+      }
+      REQUIRE(sum.norm() < 1e-10);
+      REQUIRE((moment - Matrix3::Identity()).norm() < 1e-10);
+    }
+}
+
+TEST_CASE("Quasi-Newton and Newton find the same compressed block, and forces balance") {
+  const FiniteBody body(finite_block(held_block(4, {4, 5})), experiments::neo_hookean(1, 0.49));
+  EquilibriumOptions options;
+  options.tolerance = 1e-7;
+  Equilibrium quasi(body, options);
+  options.method = FiniteMethod::newton;
+  Equilibrium newton(body, options);
+  for (const double depth : {0.1, 0.2, 0.3}) {
+    const EquilibriumStatus a = quasi.solve({pressed_top(body, depth), 1, {}});
+    const EquilibriumStatus b = newton.solve({pressed_top(body, depth), 1, {}});
+    CHECK(a.converged);
+    CHECK(a.factorisations == 0);
+    CHECK(b.iterations < a.iterations);
+    CHECK(a.energy == Approx(b.energy).epsilon(1e-9));
+    CHECK(a.least_jacobian > 0.3);
+  }
+  CHECK((quasi.coefficients() - newton.coefficients()).norm() < 1e-5 * newton.coefficients().norm());
+  const Vector3 top = face_force(body, quasi.constraint_forces(), 2, 1),
+                base = face_force(body, quasi.constraint_forces(), 2, 0);
+  CHECK(top.z() < -0.3);
+  CHECK((top + base).norm() < 1e-5 * top.norm());
+}
+
+TEST_CASE("A confined block and one that stretches freely follow the closed forms to twice the length") {
+  for (const bool confined : {true, false}) {
+    FiniteBlock block{.spacing = 1.0 / 3};
+    for (int axis = 0; axis < 3; ++axis) {
+      block.held[2 * axis][axis] = true;
+      block.held[2 * axis + 1][axis] = confined || axis == 2;
+    }
+    const auto law = experiments::neo_hookean(1, 0.45);
+    const FiniteBody body(finite_block(block), law);
+    EquilibriumOptions options;
+    options.tolerance = 1e-6;
+    Equilibrium equilibrium(body, options);
+    for (const double stretch : {1.25, 1.5, 1.75, 2.0})
+      equilibrium.solve(
+          {body.prescribed_values([&](const Vector3& x) { return Vector3(0, 0, (stretch - 1) * x.z()); }), 1, {}});
+    const auto exact = experiments::block_state(*law, {1, 1, 2}, {confined, confined, true});
+    CHECK(face_force(body, equilibrium.constraint_forces(), 2, 1).z() == Approx(exact.stress.z()).epsilon(1e-4));
+    const FiniteState middle = body.at({0.5, 0.5, 0.5}, equilibrium.coefficients());
+    CHECK(middle.deformation(0, 0) == Approx(exact.stretch.x()).epsilon(1e-4));
+    CHECK(middle.first_piola(2, 2) == Approx(exact.stress.z()).epsilon(1e-3));
+  }
+}
+
+TEST_CASE("A ball pressed into a block bears what the base bears and stays outside") {
+  Problem problem = finite_block(held_block(6, {4}));
+  problem.touched_from = Vector3::UnitZ();
+  std::vector<int> candidates;
+  for (int i = 0; i < problem.nodes.size(); ++i) {
+    const Vector3& x = problem.nodes.positions[i];
+    if (x.z() > 1 - 1e-9 && (x - Vector3(0.5, 0.5, 1)).norm() < 0.5)
+      candidates.push_back(i);
+  }
+  const FiniteBody body(std::move(problem), experiments::neo_hookean(1, 0.45));
+  Equilibrium equilibrium(body);
+  const topology::SphereTip ball{0.4};
+  equilibrium.set_contact(ball, candidates);
+  double before = 0;
+  for (const double depth : {0.05, 0.1, 0.15, 0.2}) {
+    FiniteLoading loading;
+    loading.tool = topology::ToolPose{{0.5, 0.5, 1 - depth}, Vector3::UnitZ()};
+    const EquilibriumStatus status = equilibrium.solve(loading);
+    CHECK(status.tool_force.z() > before);
+    before = status.tool_force.z();
+    CHECK(status.penetration < 1e-3);
+    CHECK(status.touching > 0);
+    const Vector3 base = face_force(body, equilibrium.constraint_forces(), 2, 0);
+    CHECK((base - status.tool_force).norm() < 0.01 * status.tool_force.norm());
+    CHECK(std::abs(status.tool_force.x()) < 0.1 * before);
+    // Without friction the ball has no torque about its centre.
+    const Vector3 arm = ball.radius * loading.tool->axis;
+    CHECK((status.tool_torque - arm.cross(status.tool_force)).norm() < 1e-6 * ball.radius * before);
+  }
+  FiniteLoading away;
+  away.tool = topology::ToolPose{{0.5, 0.5, 1.2}, Vector3::UnitZ()};
+  const EquilibriumStatus released = equilibrium.solve(away);
+  CHECK(released.touching == 0);
+  CHECK(equilibrium.coefficients().lpNorm<Eigen::Infinity>() < 0.01);
+}
+
+TEST_CASE("A block cut through comes apart without force, one cut in part opens and balances") {
+  for (const bool through : {true, false}) {
+    const tests::CutBlock block = tests::cut_block(6, through, 2);
+    Problem problem = tests::problem_of(block, {1, 0.45, 0});
+    problem.prescribed.clear();
+    for (int i = 0; i < problem.nodes.size(); ++i)
+      if (problem.nodes.kinds[i] != NodeKind::lip && std::abs(problem.nodes.positions[i].z()) > 0.5 - 1e-9)
+        problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+    problem.prescribed_region = [](const Vector3& x, const Vector3& normal) {
+      return std::abs(normal.z()) > 0.5 && std::abs(x.z()) > 0.5 - 1e-9;
+    };
+    const FiniteBody body(problem, experiments::neo_hookean(1, 0.45));
+    CHECK(body.consistency().after < 0.1 * body.consistency().before);
+    Equilibrium equilibrium(body);
+    EquilibriumStatus status;
+    for (const double pull : {0.1, 0.2, 0.3})
+      status = equilibrium.solve(
+          {body.prescribed_values([&](const Vector3& x) { return Vector3(0, 0, x.z() > 0 ? pull : 0); }), 1, {}});
+    const Vector3 top = face_force(body, equilibrium.constraint_forces(), 2, 0.5),
+                  base = face_force(body, equilibrium.constraint_forces(), 2, -0.5);
+    if (through) {
+      CHECK(top.norm() < 1e-6);
+      CHECK(status.least_jacobian == Approx(1).epsilon(1e-3));
+    } else {
+      CHECK(top.z() > 0.2);
+      CHECK((top + base).norm() < 1e-3 * top.norm());
+    }
+  }
+}
+
+TEST_CASE("What has no equilibrium is refused in words and leaves the state as it was") {
+  const FiniteBody body(finite_block(held_block(3, {4, 5})), experiments::neo_hookean(1, 0.45));
+  EquilibriumOptions options;
+  options.halvings = 3;
+  options.maximum_iterations = 20;
+  Equilibrium equilibrium(body, options);
+  equilibrium.solve({pressed_top(body, 0.1), 1, {}});
+  const VectorX before = equilibrium.coefficients();
+  CHECK_THROWS_AS(equilibrium.solve({pressed_top(body, 1.5), 1, {}}), NumericalError); // the top through the base
+  CHECK(equilibrium.coefficients() == before);
+  CHECK(equilibrium.solve({pressed_top(body, 0.15), 1, {}}).converged);
+}
+
+TEST_CASE("Bodies at finite strain refuse what they cannot use") {
+  const auto law = experiments::neo_hookean(1, 0.45);
+  CHECK_THROWS_AS(FiniteBody(finite_block(held_block(3, {4})), nullptr), InputError);
+  CHECK_THROWS_AS(FiniteBody(finite_block(held_block(3, {})), law), InputError);
+  FiniteOptions options;
+  options.support_radius = 0.5;
+  CHECK_THROWS_AS(FiniteBody(finite_block(held_block(3, {4})), law, options), InputError);
+  options = {};
+  options.pointwise_modulus = -1;
+  CHECK_THROWS_AS(FiniteBody(finite_block(held_block(3, {4})), law, options), InputError);
+  Problem strained = finite_block(held_block(3, {4}));
+  strained.loads.initial_strain = 0.1 * Matrix3::Identity();
+  CHECK_THROWS_AS(FiniteBody(strained, law), InputError);
+  const FiniteBody body(finite_block(held_block(3, {4})), law);
+  Equilibrium equilibrium(body);
+  FiniteLoading loading;
+  loading.prescribed = {Vector3::Zero()};
+  CHECK_THROWS_AS(equilibrium.solve(loading), InputError);
+  loading = {};
+  loading.tool = topology::ToolPose{};
+  CHECK_THROWS_AS(equilibrium.solve(loading), InputError);
+  CHECK_THROWS_AS(finite_method_from_string("secant"), InputError);
+}
