@@ -2,6 +2,7 @@
 
 #include "solvers/algebra/parallel.hpp"
 #include "solvers/elasticity/function_law.hpp"
+#include "solvers/elasticity/prestrained_law.hpp"
 #include "solvers/finite/held_shares.hpp"
 #include "solvers/finite/point_kernels.hpp"
 #include "solvers/finite/tangent.hpp"
@@ -29,8 +30,6 @@ Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) 
   problem.material.poisson_ratio = moduli.poisson_ratio();
   check_problem(problem);
   require_domain(problem);
-  if (!problem.loads.initial_strain.isZero(0))
-    throw InputError("a body at finite strain takes no initial strain of small strains; prescribe what stretches it");
   if (!(options.support_radius >= 1 && options.support_radius <= 4))
     throw InputError(fmt::format("support radius of {} spacings; allowed: 1 to 4", options.support_radius));
   if (!(options.pointwise_modulus >= 0))
@@ -39,6 +38,12 @@ Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) 
     throw InputError("a body at finite strain has spheres that end or bend at a cut, no appended functions; allowed: "
                      "visibility, diffraction, enriched");
   return problem;
+}
+
+std::shared_ptr<const Law> with_initial_strain(std::shared_ptr<const Law> law, const Loads& loads) {
+  if (loads.initial_strain.isZero(0))
+    return law;
+  return prestrained(std::move(law), Matrix3::Identity() - loads.initial_strain);
 }
 
 /// The cofactor matrix J F^-T, column-major, and J.
@@ -70,8 +75,8 @@ FiniteBody::~FiniteBody() = default;
 
 FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options,
                        const std::function<FibreFrame(const Vector3& x)>& fibres)
-    : problem_(with_law(std::move(problem), law.get(), options)), law_(std::move(law)), options_(options),
-      fibre_field_(fibres),
+    : problem_(with_law(std::move(problem), law.get(), options)), law_(with_initial_strain(law, problem_.loads)),
+      options_(options), fibre_field_(fibres),
       spheres_(problem_.nodes.positions, problem_.nodes.spacings, options.support_radius, Basis::linear,
                worst_moment_condition, sight_about_cut(problem_, Method::galerkin, options.sight)),
       work_(std::make_unique<Work>()) {

@@ -48,8 +48,10 @@ struct FiniteForces {
 class FiniteBody {
  public:
   /// The problem's material is replaced by the small-strain constants of the law. `fibres` gives the directions of a
-  /// fibrous law point by point; null: its own. Throws InputError for a problem that discretise() refuses, initial
-  /// strain, options out of their range and a missing law; NumericalError where a support is not sound.
+  /// fibrous law point by point; null: its own. An initial strain e0 of the loads means that the body at rest is
+  /// strained elastically by F_0 = I - e0 everywhere (prestrained_law.hpp); law() then is the law with it. Throws
+  /// InputError for a problem that discretise() refuses, a pre-strain that prestrained() refuses, options out of their
+  /// range and a missing law; NumericalError where a support is not sound.
   FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options = {},
              const std::function<FibreFrame(const Vector3& x)>& fibres = nullptr);
   ~FiniteBody();

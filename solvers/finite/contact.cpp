@@ -2,7 +2,6 @@
 
 #include "topology/base/errors.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -76,42 +75,19 @@ std::vector<Vector3> FiniteContact::forces() const {
   return result;
 }
 
-void FiniteContact::correct(const RestOperator& rest, const std::vector<Matrix3>& maps, Responses& responses,
-                            VectorX& y) const {
-  const auto count = static_cast<Eigen::Index>(active_.size());
-  if (count == 0)
-    return;
-  std::vector<Vector3> direction(active_.size());
-  std::vector<const MatrixX*> columns(active_.size());
-  VectorX gaps(count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const Active& active = active_[i];
-    const DisplacementMean& mean = means_[active.candidate];
-    direction[i] = maps.empty() ? active.normal : Vector3(maps[nodes_[active.candidate]].transpose() * active.normal);
-    auto known = responses.find(active.candidate);
-    if (known == responses.end()) {
-      MatrixX unit = MatrixX::Zero(y.size(), 3);
-      for (std::size_t k = 0; k < mean.nodes.size(); ++k)
-        unit.middleRows<3>(3 * mean.nodes[k]) += mean.weights[k] * Matrix3::Identity();
-      known = responses.emplace(active.candidate, rest.solve(unit)).first;
-    }
-    columns[i] = &known->second;
-    gaps[i] = direction[i].dot(mean.of(y));
-  }
-  MatrixX compliance(count, count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const DisplacementMean& mean = means_[active_[i].candidate];
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      Matrix3 between = Matrix3::Zero();
-      for (std::size_t k = 0; k < mean.nodes.size(); ++k)
-        between += mean.weights[k] * columns[j]->middleRows<3>(3 * mean.nodes[k]);
-      compliance(i, j) = compliance(j, i) = direction[i].dot(between * direction[j]);
-    }
-    compliance(i, i) += 1 / stiffness_[active_[i].candidate];
-  }
-  const VectorX forces = compliance.ldlt().solve(gaps);
-  for (Eigen::Index i = 0; i < count; ++i)
-    y -= *columns[i] * (forces[i] * direction[i]);
+void FiniteContact::release() {
+  active_.clear();
+  deepest_ = force_norm_ = 0;
+}
+
+void FiniteContact::append_active(const std::vector<Matrix3>& maps, std::vector<ActiveConstraint>& constraints) const {
+  for (const Active& active : active_)
+    constraints.push_back({.key = active.candidate,
+                           .mean = &means_[active.candidate],
+                           .direction = maps.empty()
+                                            ? active.normal
+                                            : Vector3(maps[nodes_[active.candidate]].transpose() * active.normal),
+                           .stiffness = stiffness_[active.candidate]});
 }
 
 } // namespace spherecut::solvers

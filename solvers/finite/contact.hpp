@@ -3,14 +3,11 @@
 //
 //   E = sum_c (<l_c - k_c g_c>^2 - l_c^2) / (2 k_c),   g_c the distance of the tool, l_c the force known so far,
 //
-// whose minimum has forces <l_c - k_c g_c> along the tool's normals. Its stiffness is passed to the preconditioner by
-// the condensed compliance of the candidates in touch (Woodbury).
+// whose minimum has forces <l_c - k_c g_c> along the tool's normals.
 #pragma once
 
-#include "solvers/finite/rest_operator.hpp"
+#include "solvers/finite/active_constraints.hpp"
 #include "topology/tool/tool.hpp"
-
-#include <map>
 
 namespace spherecut::solvers {
 
@@ -24,6 +21,8 @@ class FiniteContact {
   [[nodiscard]] const topology::ToolShape& tool() const { return tool_; }
   [[nodiscard]] const std::vector<int>& candidates() const { return nodes_; }
   void set_pose(const topology::ToolPose& pose) { pose_ = pose; }
+  /// The tool is nowhere: nothing touches.
+  void release();
   [[nodiscard]] const topology::ToolPose& pose() const { return pose_; }
 
   /// Adds the slope of the energy to `forces` and returns the energy, J. Remembers what touches.
@@ -43,10 +42,8 @@ class FiniteContact {
   /// Force on the body of every candidate, N.
   [[nodiscard]] std::vector<Vector3> forces() const;
 
-  /// Turns y = K^-1 q into (K + M^T D M)^-1 q of the shares in touch, M their normal displacements carried back by
-  /// `maps` (may be empty) and D their stiffness. `responses` keeps K^-1 of unit forces on candidates.
-  using Responses = std::map<int, MatrixX>;
-  void correct(const RestOperator& rest, const std::vector<Matrix3>& maps, Responses& responses, VectorX& y) const;
+  /// Adds the shares in touch, their normals carried back by `maps` (may be empty); their keys are from 0 on.
+  void append_active(const std::vector<Matrix3>& maps, std::vector<ActiveConstraint>& constraints) const;
 
  private:
   struct Active {

@@ -65,6 +65,15 @@ void Equilibrium::set_contact(const topology::ToolShape& tool, const std::vector
   has_before_ = false;
 }
 
+void Equilibrium::set_lips(std::vector<LipPair> pairs) {
+  FiniteLips lips(body_, std::move(pairs));
+  lips_.emplace(std::move(lips));
+  responses_.clear();
+  memory_.clear();
+  state_.lip_forces.assign(lips_->pairs().size(), 0);
+  has_before_ = false;
+}
+
 void Equilibrium::set_coefficients(const VectorX& coefficients) {
   if (coefficients.size() != 3 * static_cast<Eigen::Index>(body_.size()) || !coefficients.allFinite())
     throw InputError(fmt::format("{} coefficients for {} nodes; 3 finite numbers a node are wanted",
@@ -96,6 +105,7 @@ Equilibrium::State Equilibrium::target_of(const FiniteLoading& loading) const {
     target.tool = loading.tool;
   }
   target.contact_forces = state_.contact_forces;
+  target.lip_forces = state_.lip_forces;
   return target;
 }
 
@@ -158,8 +168,10 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
         "stiffness is {:.3g}",
         reached, status.iterations, status.halvings, last_residual_, options_.tolerance, least_seen_,
         least_seen_ <= options_.least_jacobian ? ": the body is about to be inverted" : "",
-        contact_ && last_residual_ < options_.tolerance
-            ? fmt::format(", the surface {:.3g} spacings deep in the tool (limit {:.3g})", contact_->deepest(),
+        last_residual_ < options_.tolerance && deepest(target) > options_.penetration
+            ? fmt::format(", the surface {:.3g} spacings deep in {} (limit {:.3g})", deepest(target),
+                          contact_ && target.tool && contact_->deepest() > options_.penetration ? "the tool"
+                                                                                                : "itself at a cut",
                           options_.penetration)
             : "",
         rest_.condition()));
@@ -188,12 +200,17 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
   const double ahead = extrapolation(target);
   const VectorX prediction =
       ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
-  if (contact_) {
-    std::vector<double> known = state_.contact_forces;
-    if (ahead != 0 && before_.contact_forces.size() == known.size())
+  const auto expected = [ahead](std::vector<double> known, const std::vector<double>& before) {
+    if (ahead != 0 && before.size() == known.size())
       for (std::size_t c = 0; c < known.size(); ++c)
-        known[c] = std::max(0.0, known[c] + ahead * (known[c] - before_.contact_forces[c]));
-    contact_->set_known_forces(known);
+        known[c] = std::max(0.0, known[c] + ahead * (known[c] - before[c]));
+    return known;
+  };
+  if (contact_)
+    contact_->set_known_forces(expected(state_.contact_forces, before_.contact_forces));
+  if (lips_) {
+    lips_->turn(maps_);
+    lips_->set_known_forces(expected(state_.lip_forces, before_.lip_forces));
   }
   Trial now;
   double part = 1;
@@ -206,12 +223,17 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
   if (!now.usable)
     return false;
   bool converged = iterate(target, method, now, status);
-  for (int round = 0; converged && contact_ && target.tool && contact_->deepest() > options_.penetration; ++round) {
+  for (int round = 0; converged && deepest(target) > options_.penetration; ++round) {
     if (round == most_contact_rounds) {
       converged = false;
       break;
     }
-    contact_->accept_forces();
+    if (contact_)
+      contact_->accept_forces();
+    if (lips_) {
+      lips_->accept_forces();
+      lips_->turn(body_.piola_maps(now.coefficients));
+    }
     evaluate(now.coefficients, target, now, status);
     converged = iterate(target, method, now, status);
   }
@@ -226,10 +248,15 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     contact_->accept_forces();
     next.contact_forces = contact_->known_forces();
     status.touching = contact_->touching();
-    status.penetration = contact_->deepest();
     status.tool_force = contact_->tool_force();
     status.tool_torque = contact_->tool_torque();
   }
+  if (lips_) {
+    lips_->accept_forces();
+    next.lip_forces = lips_->known_forces();
+    status.closed = lips_->touching();
+  }
+  status.penetration = deepest(target);
   before_ = std::move(state_);
   has_before_ = true;
   state_ = std::move(next);
@@ -263,6 +290,12 @@ void Equilibrium::evaluate(const VectorX& coefficients, const State& target, Tri
     contact_->set_pose(*target.tool);
     trial.energy += contact_->add(trial.coefficients, residual);
     trial.acting = contact_->force_norm();
+  } else if (contact_) {
+    contact_->release();
+  }
+  if (lips_) {
+    trial.energy += lips_->add(trial.coefficients, residual);
+    trial.acting = std::max(trial.acting, lips_->force_norm());
   }
   residual -= target.load_factor * body_.loads();
   trial.energy -= target.load_factor * body_.loads().dot(trial.coefficients);
@@ -312,13 +345,25 @@ VectorX Equilibrium::predict(const State& target) {
   return prediction;
 }
 
+double Equilibrium::deepest(const State& target) const {
+  return std::max(contact_ && target.tool ? contact_->deepest() : 0.0, lips_ ? lips_->deepest() : 0.0);
+}
+
+std::vector<ActiveConstraint> Equilibrium::active_constraints(const std::vector<Matrix3>& maps) const {
+  std::vector<ActiveConstraint> constraints;
+  if (contact_)
+    contact_->append_active(maps, constraints);
+  if (lips_)
+    lips_->append_active(maps, constraints);
+  return constraints;
+}
+
 VectorX Equilibrium::precondition(const VectorX& residual) {
   VectorX carried(residual.size()), answer;
   for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
     carried.segment<3>(3 * i) = maps_[i].transpose() * residual.segment<3>(3 * i);
   rest_.solve(carried, answer);
-  if (contact_)
-    contact_->correct(rest_, maps_, responses_, answer);
+  correct(rest_, active_constraints(maps_), responses_, answer);
   for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
     answer.segment<3>(3 * i) = (maps_[i] * answer.segment<3>(3 * i)).eval();
   body_.held().complete(answer, {});
@@ -333,9 +378,8 @@ VectorX Equilibrium::newton_direction(const Trial& now, EquilibriumStatus& statu
       const RestOperator tangent(body_, now.coefficients, &rest_, shift);
       VectorX direction;
       tangent.solve(VectorX(-now.residual), direction);
-      FiniteContact::Responses responses;
-      if (contact_)
-        contact_->correct(tangent, {}, responses, direction);
+      ConstraintResponses responses;
+      correct(tangent, active_constraints({}), responses, direction);
       body_.held().complete(direction, {});
       return direction;
     } catch (const NumericalError&) { // not positive definite: the rest stiffness helps

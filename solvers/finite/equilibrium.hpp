@@ -7,6 +7,7 @@
 #pragma once
 
 #include "solvers/finite/contact.hpp"
+#include "solvers/finite/lips.hpp"
 #include "solvers/finite/step_memory.hpp"
 
 #include <optional>
@@ -26,7 +27,7 @@ struct EquilibriumOptions {
   int halvings = 6;             // of a step, before Newton's method is asked
   int memory = 20;              // steps that are remembered
   double least_jacobian = 0.01; // the line search stops short of it
-  double penetration = 1e-3;    // of the tool into the middles of shares, in spacings
+  double penetration = 1e-3;    // of the tool into the middles of shares, and of lips into each other, in spacings
   bool fall_back = true;        // whether Newton's method is asked at all
 };
 
@@ -45,7 +46,8 @@ struct EquilibriumStatus {
   double least_jacobian = 1;             // of all points
   double energy = 0;                     // J, strain energy
   int touching = 0;                      // shares that touch the tool
-  double penetration = 0;                // in spacings
+  int closed = 0;                        // pairs of lips that touch each other
+  double penetration = 0;                // in spacings, of the tool or of lips
   Vector3 tool_force = Vector3::Zero();  // N, of the body on the tool
   Vector3 tool_torque = Vector3::Zero(); // N m, of the same about the tool's point
 };
@@ -57,6 +59,8 @@ class Equilibrium {
 
   /// The tool that presses, and the nodes that it may touch; as FiniteContact.
   void set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates);
+  /// Faces of a cut that do not go through each other; as FiniteLips.
+  void set_lips(std::vector<LipPair> pairs);
 
   /// Goes from the present state to equilibrium with the loading. Throws NumericalError in words when there is none to
   /// be found (with residual, least J, the part of the step reached and the condition of the rest operator), InputError
@@ -70,6 +74,7 @@ class Equilibrium {
   /// Force of the constraint of every prescribed entry on the body, N.
   [[nodiscard]] const std::vector<Vector3>& constraint_forces() const { return reactions_; }
   [[nodiscard]] const FiniteContact* contact() const { return contact_ ? &*contact_ : nullptr; }
+  [[nodiscard]] const FiniteLips* lips() const { return lips_ ? &*lips_ : nullptr; }
 
  private:
   struct State {
@@ -77,7 +82,7 @@ class Equilibrium {
     std::vector<Vector3> prescribed;
     double load_factor = 0;
     std::optional<topology::ToolPose> tool;
-    std::vector<double> contact_forces;
+    std::vector<double> contact_forces, lip_forces;
   };
   struct Trial { // an evaluation
     VectorX coefficients, residual;
@@ -95,6 +100,9 @@ class Equilibrium {
   [[nodiscard]] double extrapolation(const State& target) const;
   [[nodiscard]] VectorX predict(const State& target);
   [[nodiscard]] VectorX precondition(const VectorX& residual);
+  [[nodiscard]] std::vector<ActiveConstraint> active_constraints(const std::vector<Matrix3>& maps) const;
+  /// Deepest that the tool lies in the body or lips in each other at the last evaluation, spacings.
+  [[nodiscard]] double deepest(const State& target) const;
   [[nodiscard]] VectorX newton_direction(const Trial& now, EquilibriumStatus& status);
   [[nodiscard]] VectorX motion(const State& from, const State& to) const;
 
@@ -102,7 +110,8 @@ class Equilibrium {
   EquilibriumOptions options_;
   RestOperator rest_;
   std::optional<FiniteContact> contact_;
-  FiniteContact::Responses responses_; // of the candidates, to the rest operator
+  std::optional<FiniteLips> lips_;
+  ConstraintResponses responses_; // of the rest operator
   StepMemory memory_;
   State state_, before_;
   bool has_before_ = false;

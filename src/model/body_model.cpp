@@ -2,6 +2,7 @@
 
 #include "solvers/appended/appended_body.hpp"
 #include "solvers/contact/bank_pairs.hpp"
+#include "src/model/finite_model.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/incision/gap_walls.hpp"
@@ -135,13 +136,24 @@ int BodyModel::nearest_seen(const Vector3& x) const {
   return static_cast<int>(nearest);
 }
 
+bool BodyModel::solved() const {
+  return finite != nullptr ? finite->solved() : state.has_value();
+}
+
+VectorX BodyModel::nodal_displacements() const {
+  return finite != nullptr ? finite->nodal_displacements() : body->nodal_displacements(field);
+}
+
 solvers::PointState BodyModel::at(const Vector3& x) const {
-  if (!state)
+  if (!solved())
     return {};
+  const auto there = [this](const Vector3& place) {
+    return finite != nullptr ? finite->at(place) : body->at(place, field);
+  };
   try {
-    return body->at(x, field);
+    return there(x);
   } catch (const InputError&) {
-    return body->at(sprinkling.nodes.positions[nearest_seen(x)], field);
+    return there(sprinkling.nodes.positions[nearest_seen(x)]);
   }
 }
 
@@ -520,6 +532,8 @@ double residual(const BodyModel& model) {
 }
 
 std::vector<double> normal_openings(const BodyModel& model) {
+  if (model.finite != nullptr)
+    return model.finite->openings();
   std::vector<double> openings;
   if (model.pairs.empty())
     return openings;

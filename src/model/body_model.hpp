@@ -24,6 +24,8 @@ namespace spherecut::app {
 /// Spacings: banks of the surface that come so near to each other are looked at together.
 inline constexpr double near_banks = 0.25;
 
+class FiniteModel; // src/model/finite_model.hpp
+
 /// Whether a cut of this scenario's body only appends unknowns (cut.sight = "appended").
 bool cut_appends(const Scenario& scenario);
 
@@ -41,7 +43,8 @@ struct BodyModel {
     double spacing = 0;              // m, of the node there
   };
   PassedThrough passed_through;
-  std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut
+  std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut, and at finite strain
+  std::shared_ptr<FiniteModel> finite;             // in place of the body where the law is not linear
   std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
   const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
   topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
@@ -53,10 +56,14 @@ struct BodyModel {
   int presses = 0;                                 // since it was condensed
   std::optional<solvers::LipPatch> lips;           // pairs, then banks; empty: none has had to be held yet
   std::optional<solvers::CutContactState> state;   // empty: not solved yet
-  solvers::Field field;                            // solution
+  solvers::Field field;                            // solution; at finite strain of that body's shape functions
   mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
   mutable RestMemo rest_memo{};                    // of the solution, likewise
 
+  /// Whether there is a solution.
+  [[nodiscard]] bool solved() const;
+  /// Displacement of every node, 3 a node, m; of a model that is solved.
+  [[nodiscard]] VectorX nodal_displacements() const;
   /// Displacement and stress at a point of the body; beyond every sphere those at the nearest node that sees it. At
   /// rest before the first solution.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const;

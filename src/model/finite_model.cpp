@@ -24,6 +24,12 @@ solvers::EquilibriumOptions equilibrium_options() {
   return options;
 }
 
+solvers::FiniteOptions body_options(const Scenario& scenario) {
+  solvers::FiniteOptions options;
+  options.sight = scenario.cut.sight.value_or(options.sight);
+  return options;
+}
+
 struct Hindrance {
   std::string what; // empty: none
   int line = 0;
@@ -35,12 +41,13 @@ Hindrance hindrance_of(const Scenario& scenario) {
     return {"material.prony", line};
   if (scenario.method.method != solvers::Method::galerkin)
     return {fmt::format("method.name = \"{}\"", solvers::to_string(scenario.method.method)), line};
-  if (!scenario.pretension.isZero(0))
-    return {"material.pretension", line};
-  if (!scenario.precuts.empty())
-    return {"[[precut]]", scenario.precuts.front().line};
-  if (scenario.blade)
-    return {"[blade]", scenario.blade->line};
+  if (scenario.blade && scenario.toughness > 0)
+    return {"[blade] with material.toughness", scenario.blade->line};
+  const bool cuts = scenario.blade || !scenario.precuts.empty();
+  if (cuts && scenario.cut.lips == solvers::LipCondition::sticking)
+    return {"cut.lips = \"sticking\"", line};
+  if (cuts && scenario.cut.sight == solvers::SightRule::appended)
+    return {"cut.sight = \"appended\"", line};
   if (scenario.tearing.enabled)
     return {"[tearing]", line};
   if (scenario.tool && scenario.tool->grasp)
@@ -86,7 +93,8 @@ void require_run(const Scenario& scenario) {
   if (hindrance.what.empty())
     return;
   throw InputError(fmt::format("{}:{}: {} does not go with material.law = \"{}\"; possible with it: fixed regions, "
-                               "gravity, and a tool that presses without friction, by method galerkin",
+                               "gravity, pre-tension, precuts, a blade that nothing resists, and a tool that presses "
+                               "without friction, by method galerkin",
                                scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
 }
 
@@ -96,8 +104,12 @@ bool can_run(const Scenario& scenario) {
 
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                          const BodyModel& nodes, bool touched)
-    : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), {}, fibre_field(scenario.law)),
-      equilibrium_(body_, equilibrium_options()) {
+    : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario),
+            fibre_field(scenario.law)),
+      equilibrium_(body_, equilibrium_options()), lips_open_(scenario.cut.lips == solvers::LipCondition::open),
+      pairs_(body_, nodes.pairs) {
+  if (!nodes.pairs.empty() && !lips_open_)
+    equilibrium_.set_lips(nodes.pairs);
   if (!touched)
     return;
   tool_ = scenario.tool->shape;
@@ -153,6 +165,26 @@ void FiniteModel::summarise_contact(FiniteStep& step) const {
                                                               0.5 * body_.problem().nodes.spacings[candidates_[c]]);
 }
 
+void FiniteModel::go_on_from(const BodyModel& before) {
+  const solvers::NodeCloud& nodes = body_.problem().nodes;
+  VectorX start(3 * static_cast<Eigen::Index>(nodes.size()));
+  for (int i = 0; i < nodes.size(); ++i)
+    start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(nodes.positions[i]).displacement;
+  equilibrium_.set_coefficients(start);
+}
+
+void FiniteModel::begin_anew() {
+  equilibrium_.set_coefficients(VectorX::Zero(equilibrium_.coefficients().size()));
+}
+
+std::vector<double> FiniteModel::openings() const {
+  if (const solvers::FiniteLips* lips = equilibrium_.lips())
+    return lips->openings(equilibrium_.coefficients());
+  solvers::FiniteLips lips = pairs_;
+  lips.turn(body_.piola_maps(equilibrium_.coefficients()));
+  return lips.openings(equilibrium_.coefficients());
+}
+
 FiniteStep FiniteModel::solve(const std::optional<topology::ToolPose>& pose) {
   solvers::FiniteLoading loading;
   if (tool_)
@@ -162,6 +194,7 @@ FiniteStep FiniteModel::solve(const std::optional<topology::ToolPose>& pose) {
   step.force = status.tool_force;
   step.torque = status.tool_torque;
   step.active_nodes = status.touching;
+  step.closed_pairs = status.closed;
   step.iterations = status.iterations;
   step.residual = status.residual;
   step.least_jacobian = status.least_jacobian;
@@ -169,6 +202,7 @@ FiniteStep FiniteModel::solve(const std::optional<topology::ToolPose>& pose) {
     summarise_contact(step);
     step.penetration = deepest(*pose);
   }
+  last_ = step;
   return step;
 }
 

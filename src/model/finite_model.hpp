@@ -1,5 +1,5 @@
-// The body of a scenario whose law is not linear: at finite strain, in equilibrium with its weight and a tool that
-// presses without friction.
+// The body of a scenario whose law is not linear: at finite strain, in equilibrium with its weight, its pre-strain, the
+// pressure in its cuts and a tool that presses without friction. The faces of its cuts do not go through each other.
 #pragma once
 
 #include "solvers/finite/equilibrium.hpp"
@@ -17,17 +17,23 @@ struct FiniteStep {
   Vector3 torque = Vector3::Zero(); // N m, of the same about the tool's point
   double contact_radius = 0;        // m, as ContactState::contact_radius
   int active_nodes = 0, iterations = 0;
-  double residual = 0; // norm of the unbalanced forces over that of the acting ones
+  int closed_pairs = 0; // of lips that touch each other
+  double residual = 0;  // norm of the unbalanced forces over that of the acting ones
   double least_jacobian = 1;
   double penetration = 0; // m, deepest that corners and middles of the surface's triangles lie in the tool
 };
 
 class FiniteModel {
  public:
-  /// The body on the nodes of `nodes`. `touched`: whether a tool may come to it. Throws as require_run() and
+  /// The body on nodes, cut and lips of `nodes`. `touched`: whether a tool may come to it. Throws as require_run() and
   /// solvers::FiniteBody.
   FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, const BodyModel& nodes,
               bool touched);
+
+  /// Begins where another body of the same organ, on other nodes or with less of the cut, has come to.
+  void go_on_from(const BodyModel& before);
+  /// Begins at rest again.
+  void begin_anew();
 
   /// Goes on to equilibrium with the loads and the tool, which is nowhere when it has no pose. Throws NumericalError:
   /// the state is then what it was before.
@@ -36,6 +42,12 @@ class FiniteModel {
   /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
   /// from the volume ratio there. Throws InputError where no sphere covers it.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const;
+  [[nodiscard]] bool solved() const { return last_.has_value(); }
+  /// Of the last solution.
+  [[nodiscard]] const FiniteStep& last() const { return *last_; }
+  [[nodiscard]] const VectorX& coefficients() const { return equilibrium_.coefficients(); } // 3 a node, m
+  /// Gap of every pair of lips along its normal, m.
+  [[nodiscard]] std::vector<double> openings() const;
   [[nodiscard]] VectorX nodal_displacements() const; // 3 a node, m
   [[nodiscard]] int candidates() const { return static_cast<int>(candidates_.size()); }
   [[nodiscard]] int held() const { return held_nodes(body_.problem().prescribed); }
@@ -55,6 +67,9 @@ class FiniteModel {
   solvers::Equilibrium equilibrium_;
   std::vector<int> candidates_; // free nodes of the surface
   std::vector<Vector3> rest_;   // m, of each the middle of its share
+  bool lips_open_ = false;      // they may go through each other
+  solvers::FiniteLips pairs_;   // then for their gaps alone
+  std::optional<FiniteStep> last_;
   std::optional<topology::ToolShape> tool_;
   Skin skin_;
 };

@@ -25,6 +25,10 @@ bool is_any_closed(const solvers::LipState& lips) {
 } // namespace
 
 void Session::solve(const StepSample& sample, BodyModel& model) {
+  if (model.finite != nullptr) {
+    solve_finite(sample.tool, model);
+    return;
+  }
   displaced_body_ = nullptr;
   if (tool_in_reach() && model.patch.nodes.empty())
     condense(candidates(model), model);

@@ -1,5 +1,6 @@
 // The cuts of a session: the blade carried to the tissue at rest, the incision it makes, and the body that follows it.
 #include "src/base/stage_timer.hpp"
+#include "src/scenario/law_reader.hpp"
 #include "src/session/session.hpp"
 #include "topology/base/errors.hpp"
 
@@ -71,9 +72,9 @@ std::optional<Vector3> step_outside(const Vector3& x, const Vector3& start, cons
 // The rest positions of the nodes that are now nearest to x, nearest first.
 std::vector<Vector3> Session::nearest_moved(const Vector3& x, const BodyModel& model) const {
   constexpr std::size_t most = 4;
-  if (!model.state)
+  if (!model.solved())
     return {};
-  const VectorX displacements = model.body->nodal_displacements(model.field);
+  const VectorX displacements = model.nodal_displacements();
   const std::vector<Vector3>& nodes = model.sprinkling.nodes.positions;
   std::vector<std::pair<double, std::size_t>> away;
   for (std::size_t i = 0; i < nodes.size(); ++i)
@@ -88,7 +89,7 @@ std::vector<Vector3> Session::nearest_moved(const Vector3& x, const BodyModel& m
 
 Vector3 Session::rest_position(const Vector3& x, const BodyModel& model) const {
   RestMemo& memo = model.rest_memo;
-  memo.turn_to(model.body.get(), model.incision, model.state.has_value(), model.field, zone_.spacing.fine);
+  memo.turn_to(model.body.get(), model.incision, model.solved(), model.field, zone_.spacing.fine);
   const RestMemo::Found* found = memo.find(x);
   if (found == nullptr)
     try {
@@ -259,7 +260,7 @@ bool Session::move_blade(const StepSample& sample, CutReport& report) {
     if (advance() > 0) {
       put_off_ += way;
       topology::RestMap to_rest;
-      if (model_.state)
+      if (model_.solved())
         to_rest = [this](const Vector3& x) { return rest_position(x); };
       const bool is_outside = incisions_->is_outside(*sample.blade, to_rest);
       if (cuts_aside() ? is_outside || put_off_ < most_advances * advance()
@@ -287,7 +288,7 @@ void Session::refuse_cut(double time, const char* why, CutReport& report) {
 // body, incision and wound as they were.
 bool Session::cut(const StepSample& sample, CutReport& report) {
   topology::RestMap to_rest;
-  if (model_.state)
+  if (model_.solved())
     to_rest = [this](const Vector3& x) { return rest_position(x); };
   topology::SweepResult swept;
   const solvers::Discretisation* const body = model_.body.get();
@@ -366,12 +367,15 @@ void Session::check_held(double time) {
   const double volume = wound.pieces[static_cast<std::size_t>(unheld.front())].volume;
   const std::string what = fmt::format("{} of {} pieces ({:.3g} m3) {} severed and held by no fixed region",
                                        unheld.size(), wound.pieces.size(), volume, unheld.size() == 1 ? "is" : "are");
-  if (scenario_.cut.unheld == solvers::UnheldPieces::refuse)
-    throw InputError(fmt::format("{}{}; cut.unheld = \"refuse\" allows none",
+  const bool none_with_law = is_nonlinear(scenario_.law);
+  if (none_with_law || scenario_.cut.unheld == solvers::UnheldPieces::refuse)
+    throw InputError(fmt::format("{}{}; {} allows none",
                                  scenario_.blade || scenario_.precuts.empty()
                                      ? std::string() // a motion or a tear is refused, not a line
                                      : fmt::format("{}:{}: ", scenario_.file.string(), scenario_.precuts.front().line),
-                                 what));
+                                 what,
+                                 none_with_law ? fmt::format("material.law = \"{}\"", name_of(scenario_.law))
+                                               : std::string("cut.unheld = \"refuse\"")));
   warn(fmt::format("unheld {}", unheld.size()),
        fmt::format("t = {:g} s: {}: {}", time, what,
                    scenario_.cut.unheld == solvers::UnheldPieces::hold ? "soft springs hold it"
@@ -416,7 +420,10 @@ void Session::report_cut(CutReport& report) const {
   report.unheld = static_cast<int>(unheld_pieces(wound, scenario_.fixed).size());
   report.nodes = model_.sprinkling.nodes.size();
   report.lip_pairs = static_cast<int>(model_.pairs.size());
-  if (model_.state) {
+  if (model_.finite != nullptr && model_.solved()) {
+    report_opening(wound, report);
+    report.closed_pairs = model_.finite->last().closed_pairs;
+  } else if (model_.state) {
     report_opening(wound, report);
     for (std::size_t p = 0; p < std::min(model_.pairs.size(), model_.state->lips.closed.size()); ++p)
       report.closed_pairs += model_.state->lips.closed[p];

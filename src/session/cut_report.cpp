@@ -13,9 +13,12 @@ namespace spherecut::app {
 namespace {
 
 // Half the cross product of two sides: area times outward normal, m2.
+Vector3 area_vector(const std::array<Vector3, 3>& corners) {
+  return 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+}
+
 Vector3 area_vector(const topology::SurfaceMesh& surface, const Triangle& triangle) {
-  const Vector3& corner = surface.vertices[triangle[0]];
-  return 0.5 * (surface.vertices[triangle[1]] - corner).cross(surface.vertices[triangle[2]] - corner);
+  return area_vector({surface.vertices[triangle[0]], surface.vertices[triangle[1]], surface.vertices[triangle[2]]});
 }
 
 } // namespace
@@ -92,6 +95,8 @@ Vector3 mean_moved(const std::array<Vector3, 3>& moved, const std::array<bool, 3
 
 } // namespace
 
+// At finite strain the faces have turned and been stretched: what they sweep is measured on the mean of their area over
+// the way from rest (Simpson's rule is exact for it), and how far they are apart along their normals as they are.
 Opening opening_of(const topology::Wound& wound, const BodyModel& model) {
   std::vector<std::optional<Vector3>> displacement(wound.surface.vertices.size());
   const auto moved = [&](int vertex) {
@@ -113,10 +118,20 @@ Opening opening_of(const topology::Wound& wound, const BodyModel& model) {
       at_corners[corner] = moved(vertex);
       on_front[corner] = wound.evaluation[vertex] == wound.surface.vertices[vertex];
     }
-    opening.volume -= mean_moved(at_corners, on_front).dot(area); // outward is into the cut
+    Vector3 swept = area, now = area;
+    if (model.finite != nullptr) {
+      const auto moved_by = [&](double part) {
+        return area_vector({wound.surface.vertices[triangle[0]] + part * at_corners[0],
+                            wound.surface.vertices[triangle[1]] + part * at_corners[1],
+                            wound.surface.vertices[triangle[2]] + part * at_corners[2]});
+      };
+      now = moved_by(1);
+      swept = (area + 4 * moved_by(0.5) + now) / 6;
+    }
+    opening.volume -= mean_moved(at_corners, on_front).dot(swept); // outward is into the cut
     if (wound.part[t] == topology::WoundPart::wall_plus)
       for (const int vertex : triangle)
-        into_plus[vertex] -= area;
+        into_plus[vertex] -= now;
   }
   for (const topology::LipPair& pair : topology::lip_pairs(wound))
     if (const Vector3& normal = into_plus[pair.plus]; !normal.isZero(0))

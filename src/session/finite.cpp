@@ -1,4 +1,4 @@
-// Steps of a session whose law is not linear: its body is one at finite strain, on nodes that stay.
+// Steps of a session whose law is not linear: its body is one at finite strain, on nodes that stay until a blade cuts.
 #include "solvers/contact/bank_pairs.hpp"
 #include "src/base/stage_timer.hpp"
 #include "src/scenario/law_reader.hpp"
@@ -32,55 +32,90 @@ std::vector<Vector3> Session::places_of_contact() const {
   return places;
 }
 
-void Session::make_finite() {
+void Session::make_finite(BodyModel& model, const BodyModel* before) {
   interruption_point();
   const StageTimer timer(profile_.discretise);
-  finite_ = std::make_unique<FiniteModel>(scenario_, organ_.domain, model_, touches());
-  const solvers::SprinkleReport& report = model_.sprinkling.report;
-  say_(fmt::format("{} nodes, {} of them on the surface, {} fixed; law {}", model_.sprinkling.nodes.size(),
-                   report.surface_nodes + report.edge_nodes, finite_->held(), name_of(scenario_.law)));
+  model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
+  model.finite = std::make_shared<FiniteModel>(scenario_, organ_.domain, model, touches());
+  if (before != nullptr && before->solved())
+    model.finite->go_on_from(*before);
+  if (before != nullptr && !before->pairs.empty()) // what an increment changes is told in cuts.csv
+    return;
+  const solvers::SprinkleReport& report = model.sprinkling.report;
+  say_(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed; law {}",
+                   model.sprinkling.nodes.size(), report.surface_nodes + report.edge_nodes, 2 * model.pairs.size(),
+                   model.finite->held(), name_of(scenario_.law)));
 }
 
-FiniteStep Session::solve_finite(double time, const std::optional<topology::ToolPose>& pose) {
+// Where the way from the last state does not lead to equilibrium, the one from rest may.
+void Session::solve_finite(const std::optional<topology::ToolPose>& pose, BodyModel& model) {
   const StageTimer timer(profile_.press);
   try {
-    return finite_->solve(pose);
+    model.finite->solve(pose);
+  } catch (const NumericalError&) {
+    model.finite->begin_anew();
+    model.finite->solve(pose);
+  }
+  model.field.coefficients = model.finite->coefficients();
+}
+
+// A body on the nodes of the new cut, which goes on from where the one before has come to.
+void Session::build_finite_cut(BodyModel& next, BodyUpdate& report) {
+  report.update = SystemUpdate::rebuilt;
+  report.update_reason = "the law is not linear";
+  {
+    const StageTimer timer(report.seconds.sprinkling);
+    sprinkle(&model_.sprinkling.nodes, next);
+  }
+  const StageTimer timer(report.seconds.assembly);
+  make_finite(next, &model_);
+  report.nodes = next.sprinkling.nodes.size();
+  const std::vector<int>& from = next.sprinkling.kept_from;
+  report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+}
+
+void Session::step_finite(const StepSample& sample, StepResult& result) {
+  if (cuts())
+    result.cut = CutReport{};
+  const bool was_cut = incisions_ != nullptr && move_blade(sample, *result.cut);
+  if (sample.blade)
+    last_blade_ = sample.blade;
+  const bool begins = has_loads() || (touches() && result.contact.depth > 0) || model_.incision != nullptr;
+  if (model_.finite == nullptr && !begins) {
+    free_pose_ = sample.tool;
+    return;
+  }
+  interruption_point();
+  try {
+    if (model_.finite == nullptr) {
+      make_finite(model_);
+      if (touches() && free_pose_ && !has_loads()) // from there a step goes, should it have to be halved
+        solve_finite(free_pose_, model_);
+    }
+    if (!was_cut)
+      solve_finite(sample.tool, model_);
   } catch (const NumericalError& error) {
     throw NumericalError(fmt::format("t = {:g} s: {}. The rows up to then are kept. What a law cannot bear does that, "
                                      "or steps too long for it (tool.step), or nodes too coarse for the tool "
                                      "(nodes.fine_spacing)",
-                                     time, error.what()));
+                                     sample.time, error.what()));
   }
-}
-
-void Session::step_finite(const StepSample& sample, StepResult& result) {
-  const bool begins = has_loads() || (touches() && result.contact.depth > 0);
-  if (finite_ == nullptr && !begins) {
-    free_pose_ = sample.tool;
-    return;
-  }
-  if (finite_ == nullptr) {
-    make_finite();
-    if (touches() && free_pose_ && !has_loads()) // from there a step goes, should it have to be halved
-      static_cast<void>(solve_finite(sample.time, free_pose_));
-  }
-  interruption_point();
-  const FiniteStep step = solve_finite(sample.time, sample.tool);
+  const FiniteStep& step = model_.finite->last();
   result.force = step.force;
   result.torque = step.torque;
   result.contact_radius = step.contact_radius;
   result.active_nodes = step.active_nodes;
-  result.candidates = finite_->candidates();
+  result.candidates = model_.finite->candidates();
   result.nodes = model_.sprinkling.nodes.size();
   result.iterations = step.iterations;
   result.residual = step.residual;
   result.largest_penetration = step.penetration;
   result.least_jacobian = step.least_jacobian;
   const StageTimer timer(profile_.evaluate);
-  node_displacements_ = finite_->nodal_displacements();
+  node_displacements_ = model_.finite->nodal_displacements();
   node_states_.clear();
   for (const Vector3& x : model_.sprinkling.nodes.positions) {
-    node_states_.push_back(finite_->at(x));
+    node_states_.push_back(model_.at(x));
     result.rotation_degrees =
         std::max(result.rotation_degrees, rotation_degrees(Matrix3::Identity() + node_states_.back().gradient));
   }

@@ -3,6 +3,7 @@
 #include "solvers/nodes/sheets.hpp"
 #include "solvers/shapes/cut_sight.hpp"
 #include "src/base/stage_timer.hpp"
+#include "src/scenario/law_reader.hpp"
 #include "src/session/session.hpp"
 #include "topology/base/errors.hpp"
 
@@ -112,6 +113,10 @@ topology::SurfaceMesh Session::way_of_front(const topology::Incision* before, co
 
 // Nodes and system of the body with the new cut: of what was there, what the cut did not touch stays.
 void Session::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report) {
+  if (is_nonlinear(scenario_.law)) {
+    build_finite_cut(next, report);
+    return;
+  }
   const std::string unfollowed =
       growth.beside
           ? "the blade is resisted"

@@ -129,8 +129,8 @@ void Session::approach_hanging() {
   if (!is_loaded || !can_run(scenario_) || !touch_ || !std::holds_alternative<Approach>(scenario_.tool->motion))
     return;
   if (is_nonlinear(scenario_.law)) {
-    make_finite();
-    static_cast<void>(solve_finite(steps_.front().time, std::nullopt));
+    make_finite(model_);
+    solve_finite(std::nullopt, model_);
   } else {
     assemble(model_, {}, candidates(model_));
     app::condense({}, model_);
@@ -250,6 +250,9 @@ StepResult Session::step(const StepSample& sample) {
   }
   if (is_nonlinear(scenario_.law)) {
     step_finite(sample, result);
+    passed_.clear();
+    if (result.cut)
+      report_cut(*result.cut);
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return result;
   }
@@ -339,8 +342,8 @@ std::optional<solvers::GripMemory> Session::remembered_grip() const {
 
 void Session::prepare(const StepSample& sample) {
   if (is_nonlinear(scenario_.law)) {
-    if (computes() && finite_ == nullptr)
-      make_finite();
+    if (computes() && model_.finite == nullptr)
+      make_finite(model_);
     return;
   }
   if (!computes() || (model_.body != nullptr && !std::exchange(seen_hanging_, false)))
@@ -580,13 +583,7 @@ void Session::judge_fineness(const StepResult& result) {
 }
 
 solvers::PointState Session::at(const Vector3& x) const {
-  if (finite_ == nullptr)
-    return model_.at(x);
-  try {
-    return finite_->at(x);
-  } catch (const InputError&) {
-    return finite_->at(model_.sprinkling.nodes.positions[model_.nearest_seen(x)]);
-  }
+  return model_.at(x);
 }
 
 void Session::evaluate_nodes(StepResult& result) {

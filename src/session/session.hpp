@@ -324,8 +324,9 @@ class Session {
   void evaluate_nodes(StepResult& result);
   void judge_fineness(const StepResult& result);
   [[nodiscard]] std::vector<Vector3> places_of_contact() const;
-  void make_finite();
-  FiniteStep solve_finite(double time, const std::optional<topology::ToolPose>& pose);
+  void make_finite(BodyModel& model, const BodyModel* before = nullptr);
+  void solve_finite(const std::optional<topology::ToolPose>& pose, BodyModel& model);
+  void build_finite_cut(BodyModel& next, BodyUpdate& report);
   void step_finite(const StepSample& sample, StepResult& result);
   void watch_banks(StepResult& result);
   void warn(const std::string& key, const std::string& text);
@@ -389,7 +390,6 @@ class Session {
   std::optional<topology::SurfaceContact> first_zone_;   // the first of these
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
   BodyModel model_;
-  std::unique_ptr<FiniteModel> finite_;         // in place of the body of model_; null: the law is linear, or not yet
   std::optional<topology::ToolPose> free_pose_; // of the tool before it touched
   std::unique_ptr<BladeForce> blade_force_;     // null: nothing resists the blade
   std::optional<IncisionBuilder::Mark> mark_;   // the cut without the blade's proposal

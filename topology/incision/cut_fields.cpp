@@ -1,6 +1,7 @@
 #include "topology/incision/cut_fields.hpp"
 
 #include "topology/base/errors.hpp"
+#include "topology/domain/voxel_centre.inl"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -20,10 +21,10 @@ using Leaf = Tree::LeafNodeType;
 constexpr int leaf_side = 8;
 
 /// Indices of the voxels whose centres lie in a box.
-struct VoxelBox {
+struct LeafBox {
   openvdb::Coord lower, upper; // inclusive
 
-  VoxelBox(const Vector3& lower_corner, const Vector3& upper_corner, double voxel) {
+  LeafBox(const Vector3& lower_corner, const Vector3& upper_corner, double voxel) {
     for (int d = 0; d < 3; ++d) {
       lower[d] = static_cast<int>(std::ceil(lower_corner[d] / voxel));
       upper[d] = static_cast<int>(std::floor(upper_corner[d] / voxel));
@@ -31,13 +32,9 @@ struct VoxelBox {
   }
 };
 
-Vector3 centre(const openvdb::Coord& voxel, double size) {
-  return {voxel.x() * size, voxel.y() * size, voxel.z() * size};
-}
-
 /// Calls visit(origin, from, to) for every leaf that the box meets, with the part of the box in it.
 template <class Visit>
-void for_leaves(const VoxelBox& box, const Visit& visit) {
+void for_leaves(const LeafBox& box, const Visit& visit) {
   constexpr int mask = ~(leaf_side - 1);
   openvdb::Coord origin;
   for (origin.x() = box.lower.x() & mask; origin.x() <= box.upper.x(); origin.x() += leaf_side)
@@ -152,7 +149,7 @@ struct CutFields::Impl {
   Impl(double voxel_in, double band_in)
       : voxel(voxel_in), band(band_in), distances(static_cast<float>(band_in)), aheads(static_cast<float>(band_in)) {}
 
-  [[nodiscard]] VoxelBox around(const Vector3& lower, const Vector3& upper) const {
+  [[nodiscard]] LeafBox around(const Vector3& lower, const Vector3& upper) const {
     const Vector3 margin = Vector3::Constant(band);
     return {lower - margin, upper + margin, voxel};
   }
@@ -162,7 +159,7 @@ struct CutFields::Impl {
     using Row = TriangleRows::Row;
     const float widest = static_cast<float>(band);
     TriangleRows rows(p, voxel);
-    const VoxelBox box = around(p[0].cwiseMin(p[1]).cwiseMin(p[2]), p[0].cwiseMax(p[1]).cwiseMax(p[2]));
+    const LeafBox box = around(p[0].cwiseMin(p[1]).cwiseMin(p[2]), p[0].cwiseMax(p[1]).cwiseMax(p[2]));
     for_leaves(box, [&](const openvdb::Coord& origin, const openvdb::Coord& from, const openvdb::Coord& to) {
       Leaf* leaf = distance_cache.probeLeaf(origin);
       Leaf* ahead_leaf = leaf ? ahead_cache.probeLeaf(origin) : nullptr;

@@ -1,5 +1,6 @@
 #include "topology/wound/voxel_pieces.hpp"
 
+#include "topology/domain/voxel_centre.inl"
 #include "topology/search/disjoint_sets.hpp"
 #include "topology/search/proximity.hpp"
 
@@ -12,10 +13,6 @@
 namespace spherecut::topology {
 
 namespace {
-
-Vector3 centre(const openvdb::Coord& voxel, double size) {
-  return {voxel.x() * size, voxel.y() * size, voxel.z() * size};
-}
 
 /// Voxels inside the body within `reach` m of a sheet.
 std::vector<openvdb::Coord> near_sheets(const openvdb::BoolTree& inside, const Incision& incision, double voxel,
