@@ -61,10 +61,18 @@ void PronyState::apply(std::span<const Matrix3> gradients, std::span<double> ene
   check(gradients.size(), "gradients");
   check(energy.size(), "energies");
   check(stress.size(), "stresses");
-  for (std::size_t point = 0; point < points_; ++point) {
+  apply(0, gradients, energy, stress);
+}
+
+void PronyState::apply(std::size_t first, std::span<const Matrix3> gradients, std::span<double> energy,
+                       std::span<Matrix3> stress) const {
+  if (gradients.size() != energy.size() || gradients.size() != stress.size() || first + gradients.size() > points_)
+    throw InputError(fmt::format("Prony series: {} gradients, {} energies and {} stresses from point {} of {} on",
+                                 gradients.size(), energy.size(), stress.size(), first, points_));
+  for (std::size_t point = 0; point < gradients.size(); ++point) {
     if (!std::isfinite(energy[point]))
       continue;
-    const Matrix3 h = history(point);
+    const Matrix3 h = history(first + point);
     const Matrix3& f = gradients[point];
     if (small_strain_) {
       energy[point] = factor_ * energy[point] + h.cwiseProduct(f - Matrix3::Identity()).sum();

@@ -33,6 +33,9 @@ class PronyState {
 
   /// Makes the energy and stress of `Law::evaluate_isochoric` at the gradients those of the step.
   void apply(std::span<const Matrix3> gradients, std::span<double> energy, std::span<Matrix3> stress) const;
+  /// The same for consecutive points from `first` on; throws InputError where there are not so many.
+  void apply(std::size_t first, std::span<const Matrix3> gradients, std::span<double> energy,
+             std::span<Matrix3> stress) const;
   /// Makes a tangent of `Law::tangent_isochoric` at a point that of the step.
   void apply(std::size_t point, Matrix9& tangent) const;
 

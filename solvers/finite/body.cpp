@@ -8,6 +8,7 @@
 #include "solvers/finite/tangent.hpp"
 #include "solvers/galerkin/galerkin.hpp"
 #include "topology/base/errors.hpp"
+#include "topology/search/point_tree.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -34,16 +35,15 @@ Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) 
     throw InputError(fmt::format("support radius of {} spacings; allowed: 1 to 4", options.support_radius));
   if (!(options.pointwise_modulus >= 0))
     throw InputError(fmt::format("pointwise modulus of {} mu; it must not be negative", options.pointwise_modulus));
+  check_prony_terms(options.prony);
   if (options.sight == SightRule::appended && problem.incision != nullptr)
     throw InputError("a body at finite strain has spheres that end or bend at a cut, no appended functions; allowed: "
                      "visibility, diffraction, enriched");
   return problem;
 }
 
-std::shared_ptr<const Law> with_initial_strain(std::shared_ptr<const Law> law, const Loads& loads) {
-  if (loads.initial_strain.isZero(0))
-    return law;
-  return prestrained(std::move(law), Matrix3::Identity() - loads.initial_strain);
+std::shared_ptr<const Law> with_prestrain(std::shared_ptr<const Law> law, const Matrix3& elastic) {
+  return elastic == Matrix3::Identity() ? std::move(law) : prestrained(std::move(law), elastic);
 }
 
 /// The cofactor matrix J F^-T, column-major, and J.
@@ -75,7 +75,8 @@ FiniteBody::~FiniteBody() = default;
 
 FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options,
                        const std::function<FibreFrame(const Vector3& x)>& fibres)
-    : problem_(with_law(std::move(problem), law.get(), options)), law_(with_initial_strain(law, problem_.loads)),
+    : problem_(with_law(std::move(problem), law.get(), options)),
+      prestrain_(Matrix3::Identity() - problem_.loads.initial_strain), law_(with_prestrain(law, prestrain_)),
       options_(options), fibre_field_(fibres),
       spheres_(problem_.nodes.positions, problem_.nodes.spacings, options.support_radius, Basis::linear,
                worst_moment_condition, sight_about_cut(problem_, Method::galerkin, options.sight)),
@@ -85,6 +86,14 @@ FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const Fi
   tabulate();
   assemble_loads();
   supports_ = nodal_supports(spheres_);
+  if (!options_.prony.empty()) {
+    std::vector<Vector3> places;
+    for (int group = 0; group < table_.groups(); ++group)
+      for (int lane = 0; lane < table_.count[group]; ++lane)
+        places.push_back(table_.positions[static_cast<std::size_t>(point_lanes) * group + lane]);
+    prony_ = std::make_unique<PronyState>(options_.prony, places.size(), law_->small_strain_only());
+    places_ = std::make_unique<topology::PointTree>(places);
+  }
   tangent_ = std::make_unique<FiniteTangent>(*this);
 }
 
@@ -244,21 +253,18 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
     constexpr int most = groups_of_a_sum * point_lanes;
     std::array<Matrix3, most> gradient, stress;
     std::array<double, most> density;
-    int count = 0;
-    for (int group = begin; group < end; ++group) {
-      const LaneValues* f = work.deformation.data() + 9 * static_cast<std::size_t>(group);
-      for (int lane = 0; lane < table_.count[group]; ++lane, ++count)
-        for (int k = 0; k < 9; ++k)
-          gradient[count].data()[k] = f[k].value[lane];
-    }
-    const auto fibres =
-        fibres_.empty() ? std::span<const FibreFrame>() : std::span(fibres_).subspan(point_start_[begin], count);
+    const int count = count_from(begin, end);
+    gradients_of(begin, end, gradient.data());
+    const auto gradients = std::span<const Matrix3>(gradient).first(count);
+    const auto densities = std::span(density).first(count);
+    const auto stresses = std::span(stress).first(count);
     try {
-      law_->evaluate_isochoric(std::span(gradient).first(count), fibres, std::span(density).first(count),
-                               std::span(stress).first(count));
+      law_->evaluate_isochoric(gradients, fibres_of(begin, count), densities, stresses);
     } catch (const LawValueError& error) {
       throw_with_place(error, place_of(begin, error.point()));
     }
+    if (prony_ != nullptr)
+      prony_->apply(static_cast<std::size_t>(point_start_[begin]), gradients, densities, stresses);
     double sum = 0;
     int point = 0;
     std::vector<double> local;
@@ -304,6 +310,51 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
   for (const double part : work.chunk_energy)
     energy += part;
   out.energy = energy;
+}
+
+VectorX FiniteBody::stress_free() const {
+  VectorX coefficients(3 * static_cast<Eigen::Index>(size()));
+  const Matrix3 gradient = prestrain_.inverse() - Matrix3::Identity();
+  for (int i = 0; i < size(); ++i)
+    coefficients.segment<3>(3 * static_cast<Eigen::Index>(i)) = gradient * problem_.nodes.positions[i];
+  return coefficients;
+}
+
+int FiniteBody::count_from(int begin, int end) const {
+  int count = 0;
+  for (int group = begin; group < end; ++group)
+    count += table_.count[group];
+  return count;
+}
+
+void FiniteBody::gradients_of(int begin, int end, Matrix3* gradients) const {
+  for (int group = begin; group < end; ++group) {
+    const LaneValues* f = work_->deformation.data() + 9 * static_cast<std::size_t>(group);
+    for (int lane = 0; lane < table_.count[group]; ++lane, ++gradients)
+      for (int k = 0; k < 9; ++k)
+        gradients->data()[k] = f[k].value[lane];
+  }
+}
+
+std::span<const FibreFrame> FiniteBody::fibres_of(int begin, int count) const {
+  return fibres_.empty() ? std::span<const FibreFrame>() : std::span(fibres_).subspan(point_start_[begin], count);
+}
+
+void FiniteBody::begin_step(double seconds) {
+  if (prony_ != nullptr)
+    prony_->begin(seconds);
+}
+
+void FiniteBody::accept_step(const VectorX& coefficients) {
+  if (prony_ == nullptr)
+    return;
+  deform(coefficients);
+  const std::size_t points = prony_->points();
+  std::vector<Matrix3> gradients(points), stresses(points);
+  std::vector<double> densities(points);
+  gradients_of(0, table_.groups(), gradients.data());
+  law_->evaluate_isochoric(gradients, fibres_of(0, static_cast<int>(points)), densities, stresses);
+  prony_->accept(gradients, stresses);
 }
 
 void FiniteBody::tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const {
@@ -367,12 +418,22 @@ FiniteState FiniteBody::at(const Vector3& x, const VectorX& coefficients) const 
   std::vector<FibreFrame> frame;
   if (fibre_field_)
     frame.push_back(fibre_field_(x));
+  state.jacobian = state.deformation.determinant();
   try {
-    law_->evaluate({&state.deformation, 1}, frame, {&state.energy, 1}, {&state.first_piola, 1});
+    if (prony_ == nullptr) {
+      law_->evaluate({&state.deformation, 1}, frame, {&state.energy, 1}, {&state.first_piola, 1});
+    } else {
+      law_->evaluate_isochoric({&state.deformation, 1}, frame, {&state.energy, 1}, {&state.first_piola, 1});
+      prony_->apply(static_cast<std::size_t>(places_->nearest(x).index), {&state.deformation, 1}, {&state.energy, 1},
+                    {&state.first_piola, 1});
+      state.energy += law_->volumetric_energy(state.jacobian);
+      double cofactor[9];
+      cofactor_of(state.deformation.data(), cofactor);
+      state.first_piola += law_->pressure(state.jacobian) * Eigen::Map<const Matrix3>(cofactor);
+    }
   } catch (const LawValueError& error) {
     throw_with_place(error, x);
   }
-  state.jacobian = state.deformation.determinant();
   state.cauchy = state.first_piola * state.deformation.transpose() / state.jacobian;
   return state;
 }

@@ -9,10 +9,14 @@
 #pragma once
 
 #include "solvers/body/elastic_body.hpp"
-#include "solvers/elasticity/law.hpp"
+#include "solvers/elasticity/prony.hpp"
 #include "solvers/finite/consistent_gradients.hpp"
 #include "solvers/finite/dilatation_blocks.hpp"
 #include "solvers/finite/held_means.hpp"
+
+namespace spherecut::topology {
+class PointTree;
+}
 
 namespace spherecut::solvers {
 
@@ -25,7 +29,8 @@ struct FiniteOptions {
   /// Modulus of the pointwise part of the pressure over mu: s = that times mu over the bulk modulus, at most 1. 0: the
   /// mean over blocks alone; infinity: every point has a pressure of its own.
   double pointwise_modulus = 2.5;
-  bool consistent = true;                // whether the gradients are made consistent with the quadrature
+  std::vector<PronyTerm> prony{}; // of a viscoelastic body: its isochoric stress fades (solvers/elasticity/prony.hpp)
+  bool consistent = true;         // whether the gradients are made consistent with the quadrature
   SightRule sight = SightRule::enriched; // only where there is an incision; not `appended`
 };
 
@@ -67,11 +72,24 @@ class FiniteBody {
   [[nodiscard]] const DilatationBlocks& blocks() const { return blocks_; } // none where every point has its pressure
   [[nodiscard]] const ConsistencyReport& consistency() const { return consistency_; }
   [[nodiscard]] const HeldMeans& held() const { return *held_; }
+  /// F_0, the elastic deformation of the body at rest, the same everywhere.
+  [[nodiscard]] const Matrix3& prestrain() const { return prestrain_; }
+  /// Coefficients of the stress-free body, with F = F_0^-1 everywhere, 3 a node, m.
+  [[nodiscard]] VectorX stress_free() const;
   /// Share s of the volumetric energy that is taken point by point.
   [[nodiscard]] double pointwise_share() const { return share_; }
   [[nodiscard]] double volume() const { return volume_; } // m3, of the points
   /// Whether the law has a volumetric part: states with J <= 0 are then refused.
   [[nodiscard]] bool minds_volume() const { return law_->bulk_slope(1) > 0; }
+
+  /// Begins a step of that many seconds from the last state that was accepted; at first one without stress, and a step
+  /// of no time. Energy, forces and tangent are those of the step from then on. Nothing where the body does not fade.
+  /// Throws InputError for a duration that is negative or not finite.
+  void begin_step(double seconds);
+  /// The state at the end of the step.
+  void accept_step(const VectorX& coefficients);
+  /// A state that has been held for ever is a step of as many of its longest times: nothing more than this fades.
+  static constexpr double for_ever = 1e9;
 
   /// Forces of the problem's loads at factor 1 on the coefficients, dead, N.
   [[nodiscard]] const VectorX& loads() const { return loads_; }
@@ -97,8 +115,8 @@ class FiniteBody {
 
   /// Displacement of every node, u_h(x_i), 3N, m.
   [[nodiscard]] VectorX nodal_displacements(const VectorX& coefficients) const;
-  /// Everything at a place of the stress-free body, with the pressure of that place's own J. Throws InputError when no
-  /// support covers x.
+  /// Everything at a place of the stress-free body, with the pressure of that place's own J and what has faded at the
+  /// nearest point of the quadrature. Throws InputError when no support covers x.
   [[nodiscard]] FiniteState at(const Vector3& x, const VectorX& coefficients) const;
 
  private:
@@ -108,10 +126,14 @@ class FiniteBody {
   /// F of all groups, and the mean J of all blocks; returns the least J.
   double deform(const VectorX& coefficients) const;
   [[nodiscard]] const Vector3& place_of(int group, std::size_t point) const; // m
+  [[nodiscard]] int count_from(int begin, int end) const;          // points that weigh something, of these groups
+  void gradients_of(int begin, int end, Matrix3* gradients) const; // as deform() found them
+  [[nodiscard]] std::span<const FibreFrame> fibres_of(int begin, int count) const;
 
   struct Work;
 
   Problem problem_;
+  Matrix3 prestrain_;
   std::shared_ptr<const Law> law_;
   FiniteOptions options_;
   std::function<FibreFrame(const Vector3& x)> fibre_field_;
@@ -126,6 +148,8 @@ class FiniteBody {
   double volume_ = 0, share_ = 1;
   VectorX loads_;
   NodalSupports supports_;
+  std::unique_ptr<PronyState> prony_;           // null: nothing fades
+  std::unique_ptr<topology::PointTree> places_; // of all points, where something does
   std::unique_ptr<FiniteTangent> tangent_;
   std::unique_ptr<Work> work_;
 };

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::solvers {
 
@@ -18,7 +19,7 @@ namespace {
 /// A vector of three a node, node-major.
 using NodeVectors = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
-constexpr int groups_together = 64;
+constexpr int groups_together = 64, rows_together = 64;
 
 /// The operator v -> sum_q w_q S_q^T P_q S_q v: S_q takes the nodes that reach q, P_q takes the nearest linear function
 /// away.
@@ -40,26 +41,20 @@ class LeastChange {
     std::vector<int> next(incident_start_.begin(), incident_start_.end() - 1);
     for (int slot = 0; slot < std::ssize(table_.nodes); ++slot)
       incident_[next[table_.nodes[slot]]++] = slot;
+    lay_rows();
+    fill_rows();
   }
 
   /// y = A v.
-  void apply(const NodeVectors& v, NodeVectors& y) {
-    parallel_ranges(table_.groups(), groups_together, [&](int begin, int end) {
-      std::vector<LaneValues> change;
-      for (int group = begin; group < end; ++group) {
-        changes(group, v, change);
-        const int first = table_.start[group], count = table_.start[group + 1] - first;
-        const LaneValues& weight = table_.weights[group];
-        for (int k = 0; k < count; ++k)
-          for (int axis = 0; axis < 3; ++axis) {
-            double sum = 0;
-            for (int lane = 0; lane < point_lanes; ++lane)
-              sum += weight.value[lane] * change[3 * k + axis].value[lane];
-            slots_[3 * static_cast<std::size_t>(first + k) + axis] = sum;
-          }
+  void apply(const NodeVectors& v, NodeVectors& y) const {
+    parallel_ranges(static_cast<int>(y.rows()), rows_together, [&](int begin, int end) {
+      for (int i = begin; i < end; ++i) {
+        Vector3 sum = Vector3::Zero();
+        for (std::size_t k = row_start_[i]; k < row_start_[i + 1]; ++k)
+          sum += values_[k] * Eigen::Map<const Vector3>(v.data() + 3 * static_cast<std::ptrdiff_t>(columns_[k]));
+        y.row(i) = sum;
       }
     });
-    gather(y);
   }
 
   /// Adds the change that belongs to v to the gradients; returns the sum of w |change|^2.
@@ -116,6 +111,55 @@ class LeastChange {
     }
   }
 
+  /// Nodes that reach a point with each node, in ascending order.
+  void lay_rows() {
+    std::vector<int> group_of(table_.nodes.size());
+    for (int group = 0; group < table_.groups(); ++group)
+      std::fill(group_of.begin() + table_.start[group], group_of.begin() + table_.start[group + 1], group);
+    row_start_.assign(nodes_.size() + 1, 0);
+    std::vector<int> seen(nodes_.size(), -1), row;
+    for (int i = 0; i < std::ssize(nodes_); ++i) {
+      row.clear();
+      for (int k = incident_start_[i]; k < incident_start_[i + 1]; ++k)
+        for (const int other : table_.nodes_of(group_of[incident_[k]]))
+          if (std::exchange(seen[other], i) != i)
+            row.push_back(other);
+      std::sort(row.begin(), row.end());
+      columns_.insert(columns_.end(), row.begin(), row.end());
+      row_start_[i + 1] = columns_.size();
+    }
+    values_.assign(columns_.size(), 0);
+  }
+
+  /// Group after group, so that the sums do not depend on threads.
+  void fill_rows() {
+    std::vector<std::vector<double>> matrices(groups_together);
+    std::vector<int> place(nodes_.size());
+    for (int first = 0; first < table_.groups(); first += groups_together) {
+      const int last = std::min(first + groups_together, table_.groups());
+      parallel_ranges(last - first, 8, [&](int begin, int end) {
+        for (int group = first + begin; group < first + end; ++group) {
+          const std::span<const int> nodes = table_.nodes_of(group);
+          std::vector<double>& matrix = matrices[group - first];
+          matrix.resize(nodes.size() * nodes.size());
+          linear_leftover(nodes.data(), static_cast<int>(nodes.size()), table_.gradients_of(group), nodes_.data(),
+                          table_.positions.data() + static_cast<std::size_t>(point_lanes) * group, scale_[group],
+                          inverse_.data() + 10 * static_cast<std::size_t>(group), table_.weights[group], matrix.data());
+        }
+      });
+      for (int group = first; group < last; ++group) {
+        const std::span<const int> nodes = table_.nodes_of(group);
+        const double* value = matrices[group - first].data();
+        for (const int i : nodes) {
+          for (std::size_t k = row_start_[i]; k < row_start_[i + 1]; ++k)
+            place[columns_[k]] = static_cast<int>(k - row_start_[i]);
+          for (const int j : nodes)
+            values_[row_start_[i] + place[j]] += *value++;
+        }
+      }
+    }
+  }
+
   /// P_q S_q v at the points of a group: [slot][axis].
   void changes(int group, const NodeVectors& v, std::vector<LaneValues>& change) const {
     const std::span<const int> nodes = table_.nodes_of(group);
@@ -141,6 +185,9 @@ class LeastChange {
   std::vector<double> scale_; // 1/m, of every group
   std::vector<double> slots_;
   std::vector<int> incident_start_, incident_;
+  std::vector<std::size_t> row_start_; // the operator in compressed rows
+  std::vector<int> columns_;
+  std::vector<double> values_;
 };
 
 /// Nodes that groups of points join, piece by piece: a body that is cut apart has several.

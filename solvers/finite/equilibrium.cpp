@@ -41,8 +41,7 @@ FiniteMethod finite_method_from_string(std::string_view name) {
 }
 
 Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& options)
-    : body_(body), options_(options), rest_(body, VectorX::Zero(3 * static_cast<Eigen::Index>(body.size()))),
-      memory_(options.memory) {
+    : body_(body), options_(options), rest_(body, body.stress_free()), memory_(options.memory) {
   if (!(options.tolerance > 0 && options.tolerance < 1))
     throw InputError(
         fmt::format("tolerance {} of the unbalanced forces; allowed: above 0, below 1", options.tolerance));
@@ -196,7 +195,12 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
 }
 
 bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
-  maps_ = body_.piola_maps(state_.coefficients);
+  const std::vector<Matrix3> maps = body_.piola_maps(state_.coefficients);
+  maps_ = maps;
+  const Matrix3 from_stress_free = body_.prestrain() / body_.prestrain().determinant();
+  if (from_stress_free != Matrix3::Identity())
+    for (Matrix3& map : maps_)
+      map *= from_stress_free;
   const double ahead = extrapolation(target);
   const VectorX prediction =
       ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
@@ -209,7 +213,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
   if (contact_)
     contact_->set_known_forces(expected(state_.contact_forces, before_.contact_forces));
   if (lips_) {
-    lips_->turn(maps_);
+    lips_->turn(maps);
     lips_->set_known_forces(expected(state_.lip_forces, before_.lip_forces));
   }
   Trial now;

@@ -1,9 +1,9 @@
 // Equilibria of a body at finite strain, step by step along a path of prescribed displacements, loads and tool poses.
 //
-// Quasi-Newton: L-BFGS preconditioned by the factor of the rest stiffness, carried by nodal Piola maps that are fixed
-// during a solve, with the memory of steps kept from solve to solve. A line search on the energy refuses states that
-// are inverted. Start: the last two states extrapolated, or the response of the rest operator. A step that does not
-// converge is halved; where that does not help, Newton's method takes over.
+// Quasi-Newton: L-BFGS preconditioned by the factor of the stress-free stiffness, carried by nodal Piola maps that are
+// fixed during a solve, with the memory of steps kept from solve to solve. A line search on the energy refuses states
+// that are inverted. Start: the last two states extrapolated, or the response of the rest operator. A step that does
+// not converge is halved; where that does not help, Newton's method takes over.
 #pragma once
 
 #include "solvers/finite/contact.hpp"
@@ -115,7 +115,7 @@ class Equilibrium {
   StepMemory memory_;
   State state_, before_;
   bool has_before_ = false;
-  std::vector<Matrix3> maps_;
+  std::vector<Matrix3> maps_; // from the stress-free state, a node each
   FiniteForces forces_;
   std::vector<Vector3> reactions_;
   double least_seen_ = 1, last_residual_ = 0;

@@ -128,4 +128,49 @@ take_linear(const int* nodes, int count, const LaneValues* gradients, const Vect
   }
 }
 
+__attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
+linear_leftover(const int* nodes, int count, const LaneValues* gradients, const Vector3* places, const Vector3* points,
+                double scale, const LaneValues* inverse, const LaneValues& weights, double* matrix) {
+  PointPack x{}, y{}, z{};
+  for (int lane = 0; lane < point_lanes; ++lane) {
+    x[lane] = points[lane].x();
+    y[lane] = points[lane].y();
+    z[lane] = points[lane].z();
+  }
+  const auto* g = reinterpret_cast<const PointPack*>(gradients);
+  const auto* m = reinterpret_cast<const PointPack*>(inverse);
+  const PointPack w = *reinterpret_cast<const PointPack*>(&weights);
+  const PointPack none{}, one = none + 1.0;
+  const auto sum = [](const PointPack& pack) {
+    double all = 0;
+    for (int lane = 0; lane < point_lanes; ++lane)
+      all += pack[lane];
+    return all;
+  };
+  for (int k = 0; k < count; ++k) {
+    const auto polynomial = [&](int of, PointPack* p) {
+      const PointPack in = ((g[3 * of] != none) | (g[3 * of + 1] != none) | (g[3 * of + 2] != none)) ? one : none;
+      const Vector3& at = places[nodes[of]];
+      p[0] = in;
+      p[1] = in * scale * (at.x() - x);
+      p[2] = in * scale * (at.y() - y);
+      p[3] = in * scale * (at.z() - z);
+    };
+    PointPack p[4], q[4];
+    polynomial(k, p);
+    q[0] = w * (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3] * p[3]);
+    q[1] = w * (m[1] * p[0] + m[4] * p[1] + m[5] * p[2] + m[6] * p[3]);
+    q[2] = w * (m[2] * p[0] + m[5] * p[1] + m[7] * p[2] + m[8] * p[3]);
+    q[3] = w * (m[3] * p[0] + m[6] * p[1] + m[8] * p[2] + m[9] * p[3]);
+    const PointPack own = w * p[0] - q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3];
+    matrix[count * k + k] = sum(own);
+    for (int l = 0; l < k; ++l) {
+      PointPack other[4];
+      polynomial(l, other);
+      const PointPack both = q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3];
+      matrix[count * k + l] = matrix[count * l + k] = -sum(both);
+    }
+  }
+}
+
 } // namespace spherecut::solvers

@@ -19,4 +19,10 @@ void group_forces(int count, const LaneValues* gradients, const LaneValues* stre
 void take_linear(const int* nodes, int count, const LaneValues* gradients, const Vector3* places, const Vector3* points,
                  double scale, const LaneValues* inverse, const double* vectors, LaneValues* change);
 
+/// The matrix of the same, summed over the points of a group with their weights: matrix[count k + l] = sum_q w_q (d_kl
+/// - p_k . M^-1 p_l) over the points that both reach.
+void linear_leftover(const int* nodes, int count, const LaneValues* gradients, const Vector3* places,
+                     const Vector3* points, double scale, const LaneValues* inverse, const LaneValues& weights,
+                     double* matrix);
+
 } // namespace spherecut::solvers

@@ -26,6 +26,7 @@ solvers::EquilibriumOptions equilibrium_options() {
 
 solvers::FiniteOptions body_options(const Scenario& scenario) {
   solvers::FiniteOptions options;
+  options.prony = scenario.law.spec.prony;
   options.sight = scenario.cut.sight.value_or(options.sight);
   return options;
 }
@@ -37,8 +38,8 @@ struct Hindrance {
 
 Hindrance hindrance_of(const Scenario& scenario) {
   const int line = scenario.law.line;
-  if (!scenario.law.spec.prony.empty())
-    return {"material.prony", line};
+  if (!scenario.law.spec.prony.empty() && scenario.blade)
+    return {"[blade] with material.prony", scenario.blade->line};
   if (scenario.method.method != solvers::Method::galerkin)
     return {fmt::format("method.name = \"{}\"", solvers::to_string(scenario.method.method)), line};
   if (scenario.blade && scenario.toughness > 0)
@@ -99,15 +100,15 @@ void require_run(const Scenario& scenario) {
 }
 
 bool can_run(const Scenario& scenario) {
-  return scenario.law.spec.prony.empty() && (!is_nonlinear(scenario.law) || hindrance_of(scenario).what.empty());
+  return is_nonlinear(scenario.law) ? hindrance_of(scenario).what.empty() : scenario.law.spec.prony.empty();
 }
 
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                          const BodyModel& nodes, bool touched)
     : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario),
             fibre_field(scenario.law)),
-      equilibrium_(body_, equilibrium_options()), lips_open_(scenario.cut.lips == solvers::LipCondition::open),
-      pairs_(body_, nodes.pairs) {
+      equilibrium_(body_, equilibrium_options()), is_prestrained_(!scenario.pretension.isZero(0)),
+      lips_open_(scenario.cut.lips == solvers::LipCondition::open), pairs_(body_, nodes.pairs) {
   if (!nodes.pairs.empty() && !lips_open_)
     equilibrium_.set_lips(nodes.pairs);
   if (!touched)
@@ -185,11 +186,25 @@ std::vector<double> FiniteModel::openings() const {
   return lips.openings(equilibrium_.coefficients());
 }
 
-FiniteStep FiniteModel::solve(const std::optional<topology::ToolPose>& pose) {
+// What acts before the tool comes, weight and pre-tension, has acted for ever.
+FiniteStep FiniteModel::solve(double time, const std::optional<topology::ToolPose>& pose) {
+  if (!body_.options().prony.empty()) {
+    double longest = 0;
+    for (const solvers::PronyTerm& term : body_.options().prony)
+      longest = std::max(longest, term.time);
+    if (!time_ && (!body_.loads().isZero(0) || is_prestrained_)) {
+      body_.begin_step(solvers::FiniteBody::for_ever * longest);
+      static_cast<void>(equilibrium_.solve({}));
+      body_.accept_step(equilibrium_.coefficients());
+    }
+    body_.begin_step(time_ ? std::max(0.0, time - *time_) : 0);
+  }
   solvers::FiniteLoading loading;
   if (tool_)
     loading.tool = pose;
   const solvers::EquilibriumStatus status = equilibrium_.solve(loading);
+  body_.accept_step(equilibrium_.coefficients());
+  time_ = time;
   FiniteStep step;
   step.force = status.tool_force;
   step.torque = status.tool_torque;

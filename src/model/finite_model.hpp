@@ -35,9 +35,9 @@ class FiniteModel {
   /// Begins at rest again.
   void begin_anew();
 
-  /// Goes on to equilibrium with the loads and the tool, which is nowhere when it has no pose. Throws NumericalError:
-  /// the state is then what it was before.
-  FiniteStep solve(const std::optional<topology::ToolPose>& pose);
+  /// Goes on to equilibrium at `time`, s, with the loads and the tool, which is nowhere when it has no pose. Throws
+  /// NumericalError: the state is then what it was before.
+  FiniteStep solve(double time, const std::optional<topology::ToolPose>& pose);
 
   /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
   /// from the volume ratio there. Throws InputError where no sphere covers it.
@@ -67,8 +67,10 @@ class FiniteModel {
   solvers::Equilibrium equilibrium_;
   std::vector<int> candidates_; // free nodes of the surface
   std::vector<Vector3> rest_;   // m, of each the middle of its share
-  bool lips_open_ = false;      // they may go through each other
-  solvers::FiniteLips pairs_;   // then for their gaps alone
+  std::optional<double> time_;  // s, of the last solution
+  bool is_prestrained_ = false;
+  bool lips_open_ = false;    // they may go through each other
+  solvers::FiniteLips pairs_; // then for their gaps alone
   std::optional<FiniteStep> last_;
   std::optional<topology::ToolShape> tool_;
   Skin skin_;

@@ -147,9 +147,10 @@ void require_linear(const std::filesystem::path& file, const LawSettings& law) {
                                  "material.law = \"linear\" without material.prony",
                                  file.string(), law.line, name_of(law)));
   if (!law.spec.prony.empty())
-    throw InputError(fmt::format("{}:{}: material.prony: it can be checked, but no body is computed with it; possible: "
-                                 "a material without it",
-                                 file.string(), law.line));
+    throw InputError(
+        fmt::format("{}:{}: material.prony does not go with material.law = \"linear\"; possible: a law of finite "
+                    "strain off line, or a material without it",
+                    file.string(), law.line));
 }
 
 } // namespace spherecut::app

@@ -26,7 +26,7 @@ bool is_any_closed(const solvers::LipState& lips) {
 
 void Session::solve(const StepSample& sample, BodyModel& model) {
   if (model.finite != nullptr) {
-    solve_finite(sample.tool, model);
+    solve_finite(sample.time, sample.tool, model);
     return;
   }
   displaced_body_ = nullptr;

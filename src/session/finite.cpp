@@ -48,13 +48,13 @@ void Session::make_finite(BodyModel& model, const BodyModel* before) {
 }
 
 // Where the way from the last state does not lead to equilibrium, the one from rest may.
-void Session::solve_finite(const std::optional<topology::ToolPose>& pose, BodyModel& model) {
+void Session::solve_finite(double time, const std::optional<topology::ToolPose>& pose, BodyModel& model) {
   const StageTimer timer(profile_.press);
   try {
-    model.finite->solve(pose);
+    model.finite->solve(time, pose);
   } catch (const NumericalError&) {
     model.finite->begin_anew();
-    model.finite->solve(pose);
+    model.finite->solve(time, pose);
   }
   model.field.coefficients = model.finite->coefficients();
 }
@@ -83,6 +83,7 @@ void Session::step_finite(const StepSample& sample, StepResult& result) {
   const bool begins = has_loads() || (touches() && result.contact.depth > 0) || model_.incision != nullptr;
   if (model_.finite == nullptr && !begins) {
     free_pose_ = sample.tool;
+    free_time_ = sample.time;
     return;
   }
   interruption_point();
@@ -90,10 +91,10 @@ void Session::step_finite(const StepSample& sample, StepResult& result) {
     if (model_.finite == nullptr) {
       make_finite(model_);
       if (touches() && free_pose_ && !has_loads()) // from there a step goes, should it have to be halved
-        solve_finite(free_pose_, model_);
+        solve_finite(free_time_, free_pose_, model_);
     }
     if (!was_cut)
-      solve_finite(sample.tool, model_);
+      solve_finite(sample.time, sample.tool, model_);
   } catch (const NumericalError& error) {
     throw NumericalError(fmt::format("t = {:g} s: {}. The rows up to then are kept. What a law cannot bear does that, "
                                      "or steps too long for it (tool.step), or nodes too coarse for the tool "

@@ -130,7 +130,7 @@ void Session::approach_hanging() {
     return;
   if (is_nonlinear(scenario_.law)) {
     make_finite(model_);
-    solve_finite(std::nullopt, model_);
+    solve_finite(steps_.front().time, std::nullopt, model_);
   } else {
     assemble(model_, {}, candidates(model_));
     app::condense({}, model_);

@@ -325,7 +325,7 @@ class Session {
   void judge_fineness(const StepResult& result);
   [[nodiscard]] std::vector<Vector3> places_of_contact() const;
   void make_finite(BodyModel& model, const BodyModel* before = nullptr);
-  void solve_finite(const std::optional<topology::ToolPose>& pose, BodyModel& model);
+  void solve_finite(double time, const std::optional<topology::ToolPose>& pose, BodyModel& model);
   void build_finite_cut(BodyModel& next, BodyUpdate& report);
   void step_finite(const StepSample& sample, StepResult& result);
   void watch_banks(StepResult& result);
@@ -391,6 +391,7 @@ class Session {
   std::unique_ptr<IncisionBuilder> incisions_;           // null in a scenario without cuts
   BodyModel model_;
   std::optional<topology::ToolPose> free_pose_; // of the tool before it touched
+  double free_time_ = 0;                        // s, then
   std::unique_ptr<BladeForce> blade_force_;     // null: nothing resists the blade
   std::optional<IncisionBuilder::Mark> mark_;   // the cut without the blade's proposal
   std::optional<topology::Wound> shown_wound_;  // of the body while the cut is ahead of it; empty: that of the cut

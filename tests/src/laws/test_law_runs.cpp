@@ -210,15 +210,133 @@ TEST_CASE("What a law other than linear does not go with is refused with its lin
   refused(small + "[method]\nname = \"collocation\"\n", "method.name = \"collocation\"");
   refused(small + "[contact]\ncondition = \"bonded\"\n", "contact.condition = \"bonded\"");
   refused(small + "[contact]\ncondition = \"frictional\"\nfriction = 0.3\n", "contact.condition = \"frictional\"");
-  refused(block + disc_precut, "[[precut]]");
-  refused(block + incision_at_end, "[blade]");
-  refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.05, 0, 0]"),
-          "material.pretension");
-  refused(replaced(small, "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\n[[material.prony]]\nshare = 0.3\ntime = 2\n"),
-          "material.prony");
+  refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 100") + incision_at_end,
+          "[blade] with material.toughness");
+  refused(block + disc_precut + "[cut]\nlips = \"sticking\"\n", "cut.lips = \"sticking\"");
+  refused(block + disc_precut + "[cut]\nsight = \"appended\"\n", "cut.sight = \"appended\"");
+  refused(replaced(block, "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\n[[material.prony]]\nshare = 0.3\ntime = 2\n") +
+              incision_at_end,
+          "[blade] with material.prony");
   CHECK_THROWS_WITH(Session(
                         scenario_of(small), [](const std::string&) {}, Leader::device),
                     Contains("material.law = \"neo_hookean\": runs off line alone compute it"));
+}
+
+TEST_CASE("A confined cube that is held pressed relaxes as its Prony series") {
+  const std::string cube = replaced(with_law(pressed_cube(true, 0.004)), "[[fixed]]",
+                                    "[[material.prony]]\nshare = 0.5\ntime = 2\n[[fixed]]");
+  const auto at = cube.find("[tool.approach]"), end = cube.find("[output]");
+  const std::string text = cube.substr(0, at) + R"([[tool.path]]
+time = 0
+position = [0, 0, 0.0201]
+[[tool.path]]
+time = 0.001
+position = [0, 0, 0.016]
+[[tool.path]]
+time = 4
+position = [0, 0, 0.016]
+)" + cube.substr(end);
+  Session session = session_of(replaced(text, "step = 0.25", "step = 0.5"));
+  const std::vector<StepResult> steps = run(session);
+  solvers::LawSpec spec = scenario_of(text).law.spec;
+  spec.prony.clear();
+  const std::unique_ptr<solvers::Law> law = solvers::make_law(spec);
+  Matrix3 f = Matrix3::Identity(), all, shape;
+  f(2, 2) = 0.8;
+  double energy = 0;
+  law->evaluate({&f, 1}, {}, {&energy, 1}, {&all, 1});
+  law->evaluate_isochoric({&f, 1}, {}, {&energy, 1}, {&shape, 1});
+  int seen = 0;
+  for (const StepResult& step : steps)
+    if (step.time >= 0.001) {
+      const double left = 0.5 + 0.5 * std::exp(-(step.time - 0.001) / 2);
+      CHECK(step.force.z() == Approx(-(all - shape + left * shape)(2, 2) * 4e-4).epsilon(0.02));
+      ++seen;
+    }
+  CHECK(seen > 5);
+  CHECK(steps.back().force.z() < 0.95 * steps[1].force.z());
+}
+
+TEST_CASE("At small pre-tension a cut opens as that of the linear law, at a large one it does not") {
+  // Held at two opposite sides, drawn between them, cut across from the top.
+  const auto text = [](double pretension) {
+    return replaced(replaced(cut_block, "poisson_ratio = 0.3",
+                             fmt::format("poisson_ratio = 0.3\npretension = [{}, 0, 0]", pretension)),
+                    R"(region = "box"
+lower = [-1, -1, -0.001]
+upper = [1, 1, 0.001]
+)",
+                    R"(region = "half_space"
+point = [-0.0299, 0, 0]
+normal = [1, 0, 0]
+[[fixed]]
+region = "half_space"
+point = [0.0299, 0, 0]
+normal = [-1, 0, 0]
+)") + rectangle_precut("[0.001, 0, 0.03]", "[1, 0, 0]", "[0, 0, 1]", "0.08", "0.03");
+  };
+  const auto opening = [](const std::string& scenario) {
+    Session session = session_of(scenario);
+    const StepResult step = run(session).back();
+    for (const std::string& warning : session.warnings())
+      UNSCOPED_INFO(warning);
+    CHECK(session.warnings().empty());
+    CHECK(step.cut->pieces == 1);
+    return std::pair(step.cut->opening, step.cut->opening_volume);
+  };
+  const auto linear = opening(text(0.002)), finite = opening(with_law(text(0.002)));
+  REQUIRE(linear.first > 1e-5);
+  CHECK(finite.first == Approx(linear.first).epsilon(0.03));
+  CHECK(finite.second == Approx(linear.second).epsilon(0.03));
+  // The nominal stress of a neo-Hookean body rises less than its strain, and the tissue thins.
+  const auto drawn = opening(with_law(text(0.3)));
+  CHECK(drawn.second / finite.second > 100);
+  CHECK(std::abs(drawn.second / (150 * linear.second) - 1) > 0.05);
+}
+
+TEST_CASE("A blade's cut in pre-tensioned tissue of a law opens as the same cut that was there before") {
+  const std::string block =
+      replaced(with_law(cut_block), "poisson_ratio = 0.3", "poisson_ratio = 0.45\npretension = [0.0, 0.2, 0]");
+  Session grown = session_of(replaced(block, node_spacings("0.005", "0.012"), node_spacings("0.004", "0.008")) +
+                             R"([blade]
+edge = [[0, 0, 0], [0, 0, 0.03]]
+step = 0.1
+[[blade.path]]
+time = 0
+position = [-0.04, 0.0005, 0.018]
+[[blade.path]]
+time = 1
+position = [0.0, 0.0005, 0.018]
+)");
+  const std::vector<StepResult> steps = run(grown);
+  double volume = 0;
+  for (const StepResult& step : steps) {
+    REQUIRE_FALSE(step.cut->refused);
+    CHECK(step.cut->opening_volume >= volume); // it only opens on
+    volume = step.cut->opening_volume;
+  }
+  CHECK(steps.back().cut->area > 3e-4);
+  CHECK(steps.back().cut->opening > 5e-4);
+  CHECK(steps.back().cut->update == SystemUpdate::none);
+  CHECK(steps.back().least_jacobian > 0.5);
+}
+
+TEST_CASE("Lips of a law are pressed together and do not go through each other") {
+  // A slanted cut below the ball.
+  const std::string cut = rectangle_precut("[0, 0, 0.022]", "[0.3, 0, 1]", "[1, 0, -0.3]", "0.03", "0.03");
+  const std::string text = with_law(replaced(small_scenario, "depth = 0.002", "depth = 0.004")) + cut;
+  Session closed = session_of(text), open = session_of(text + "[cut]\nlips = \"open\"\n");
+  const StepResult held = run(closed).back(), free = run(open).back();
+  const auto overlap = [](const Session& session) {
+    double least = 0;
+    for (const double opening : session.model().finite->openings())
+      least = std::min(least, opening);
+    return -least;
+  };
+  CHECK(held.cut->closed_pairs > 0);
+  CHECK(overlap(closed) < 2e-3 * 0.004);
+  CHECK(overlap(open) > 0.02 * 0.004);
+  CHECK(held.force.z() > 1.02 * free.force.z()); // what is above the cut rests on what is below
 }
 
 TEST_CASE("A run of a law has the same bits with one thread and with two") {
