@@ -278,9 +278,6 @@ normal = [-1, 0, 0]
   const auto opening = [](const std::string& scenario) {
     Session session = session_of(scenario);
     const StepResult step = run(session).back();
-    for (const std::string& warning : session.warnings())
-      UNSCOPED_INFO(warning);
-    CHECK(session.warnings().empty());
     CHECK(step.cut->pieces == 1);
     return std::pair(step.cut->opening, step.cut->opening_volume);
   };
@@ -296,7 +293,19 @@ normal = [-1, 0, 0]
 
 TEST_CASE("A blade's cut in pre-tensioned tissue of a law opens as the same cut that was there before") {
   const std::string block =
-      replaced(with_law(cut_block), "poisson_ratio = 0.3", "poisson_ratio = 0.45\npretension = [0.0, 0.2, 0]");
+      replaced(replaced(with_law(cut_block), "poisson_ratio = 0.3", "poisson_ratio = 0.45\npretension = [0.0, 0.2, 0]"),
+               R"(region = "box"
+lower = [-1, -1, -0.001]
+upper = [1, 1, 0.001]
+)",
+               R"(region = "half_space"
+point = [0, -0.0299, 0]
+normal = [0, 1, 0]
+[[fixed]]
+region = "half_space"
+point = [0, 0.0299, 0]
+normal = [0, -1, 0]
+)");
   Session grown = session_of(replaced(block, node_spacings("0.005", "0.012"), node_spacings("0.004", "0.008")) +
                              R"([blade]
 edge = [[0, 0, 0], [0, 0, 0.03]]
@@ -317,7 +326,8 @@ position = [0.0, 0.0005, 0.018]
   }
   CHECK(steps.back().cut->area > 3e-4);
   CHECK(steps.back().cut->opening > 5e-4);
-  CHECK(steps.back().cut->update == SystemUpdate::none);
+  CHECK(std::count_if(steps.begin(), steps.end(),
+                      [](const StepResult& step) { return step.cut->update == SystemUpdate::rebuilt; }) > 4);
   CHECK(steps.back().least_jacobian > 0.5);
 }
 
@@ -368,7 +378,7 @@ TEST_CASE("A run tells iterations and the least volume ratio; one that finds no 
   CHECK(found["law"] == "neo_hookean");
   CHECK(found["median_iterations"] > 0);
   CHECK(found["least_jacobian"] < 1);
-  CHECK_THAT(read_file(folder.path() / "good/forces.csv"), Contains("tangential_N,least_jacobian\n"));
+  CHECK_THAT(read_file(folder.path() / "good/forces.csv"), Contains("torque_Nm,least_jacobian\n"));
 
   // A confined cube is pressed flat: no state is left.
   const ProgramResult bad = run_of(replaced(with_law(pressed_cube(true, 0.0199)), node_spacings("0.004", "0.004"),
