@@ -71,6 +71,8 @@ const std::vector<Experiment>& all_experiments() {
       {"finite_exact", "blocks stretched to twice and half their length and bent by 120 degrees", run_finite_exact},
       {"finite_locking", "a bonded block nearly incompressible is compressed by 30 % and does not lock",
        run_finite_locking},
+      {"tissue_fuzz", "random runs of every law of finite strain: does every step find a sound state?",
+       run_tissue_fuzz},
       {"truth_cube", "a silicone cube under plate and ball: fitted at the smallest compression, the others predicted",
        run_truth_cube},
   };

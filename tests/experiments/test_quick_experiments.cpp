@@ -200,6 +200,10 @@ TEST_CASE("Quick finite locking: a bonded block does not lock") {
   require_quick_run_passes("finite_locking");
 }
 
+TEST_CASE("Quick tissue fuzz: every step of random laws, cuts and motions finds a sound state") {
+  require_quick_run_passes("tissue_fuzz");
+}
+
 TEST_CASE("Quick truth cube: plates that slip give the closed form, forces settle with the nodes") {
   require_quick_run_passes("truth_cube");
 }
