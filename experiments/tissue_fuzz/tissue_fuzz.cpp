@@ -9,6 +9,7 @@
 #include "experiments/experiment.hpp"
 #include "experiments/registered.hpp"
 #include "src/base/output_file.hpp"
+#include "src/output/figure.hpp"
 #include "src/session/session.hpp"
 #include "topology/base/errors.hpp"
 
@@ -197,17 +198,27 @@ std::vector<Check> run_tissue_fuzz(const ExperimentContext& context) {
   table.write("law,runs,refused,steps,increments_of_cuts,unsolved,unsound,median_iterations,p95_iterations,"
               "worst_residual,worst_overlap_spacings\n");
   int unsolved = 0, unsound = 0, refused = 0, steps = 0;
+  app::Figure figure{"Random runs at finite strain", "iterations a step", "share of the steps", false, false, {}};
   for (int law = 0; law < laws; ++law) {
     const Tally& tally = of_law[law];
     table.write(fmt::format("{},{},{},{},{},{},{},{},{},{:.3g},{:.3g}\n", law_names[law], tally.runs, tally.refused,
                             tally.steps, tally.cuts, tally.unsolved, tally.unsound, percentile(tally.iterations, 0.5),
                             percentile(tally.iterations, 0.95), tally.residual, tally.overlap));
+    app::Series series{law_names[law], {}, {}, app::SeriesStyle::lines};
+    std::vector<int> sorted = tally.iterations;
+    std::sort(sorted.begin(), sorted.end());
+    for (std::size_t k = 0; k < sorted.size(); ++k) {
+      series.x.push_back(sorted[k]);
+      series.y.push_back(static_cast<double>(k + 1) / static_cast<double>(sorted.size()));
+    }
+    figure.series.push_back(std::move(series));
     unsolved += tally.unsolved;
     unsound += tally.unsound;
     refused += tally.refused;
     steps += tally.steps;
   }
   table.close();
+  app::write_png(figure, context.out / "iterations.png");
   return {{"steps", static_cast<double>(steps), ">=", context.quick ? 50.0 : 5000.0},
           {"steps_without_equilibrium", static_cast<double>(unsolved), "<=", 0},
           {"states_that_are_not_sound", static_cast<double>(unsound), "<=", 0},

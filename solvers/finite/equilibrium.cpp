@@ -51,6 +51,12 @@ Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& optio
   if (!(options.penetration > 0))
     throw InputError(fmt::format("penetration {} spacings; it must be positive", options.penetration));
   set_coefficients(VectorX::Zero(3 * static_cast<Eigen::Index>(body.size())));
+  if (body.prestrain() != Matrix3::Identity()) {
+    body.evaluate(state_.coefficients, forces_);
+    VectorX free = forces_.forces;
+    body.held().clear_held(free);
+    prestrain_forces_ = free.norm();
+  }
   reactions_.assign(body.held().entries().size(), Vector3::Zero());
 }
 
@@ -289,11 +295,11 @@ void Equilibrium::evaluate(const VectorX& coefficients, const State& target, Tri
   VectorX& residual = trial.residual;
   residual = forces_.forces;
   trial.energy = forces_.energy;
-  trial.acting = 0;
+  trial.acting = prestrain_forces_;
   if (contact_ && target.tool) {
     contact_->set_pose(*target.tool);
     trial.energy += contact_->add(trial.coefficients, residual);
-    trial.acting = contact_->force_norm();
+    trial.acting = std::max(trial.acting, contact_->force_norm());
   } else if (contact_) {
     contact_->release();
   }

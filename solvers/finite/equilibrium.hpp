@@ -21,7 +21,7 @@ FiniteMethod finite_method_from_string(std::string_view name);
 
 struct EquilibriumOptions {
   FiniteMethod method = FiniteMethod::quasi_newton;
-  /// Norm of the unbalanced forces over that of the forces that act: of loads, held surface and tool.
+  /// Norm of the unbalanced forces over that of the forces that act: of loads, pre-strain, held surface and tool.
   double tolerance = 1e-3;
   int maximum_iterations = 100; // of one step; then it is halved
   int halvings = 6;             // of a step, before Newton's method is asked
@@ -119,6 +119,7 @@ class Equilibrium {
   FiniteForces forces_;
   std::vector<Vector3> reactions_;
   double least_seen_ = 1, last_residual_ = 0;
+  double prestrain_forces_ = 0; // N, norm of those that the pre-strain of the body at rest exerts
 };
 
 } // namespace spherecut::solvers

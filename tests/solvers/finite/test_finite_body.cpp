@@ -338,7 +338,7 @@ TEST_CASE("A cut that is pressed together bears what the uncut block does, and o
     law->evaluate({&f, 1}, {}, {&energy, 1}, {&stress, 1});
     CHECK(status.energy == Approx(energy).epsilon(0.01));
     // Drawn apart the lips do not hold each other.
-    for (const double by : {-0.05, 0.0, 0.05, 0.1})
+    for (const double by : {-0.05, 0.0, 0.005, 0.01})
       status = equilibrium.solve({squeezed(by), 1, {}});
     CHECK(status.closed == 0);
     for (const double opening : equilibrium.lips()->openings(equilibrium.coefficients()))
