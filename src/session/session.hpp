@@ -306,6 +306,7 @@ class Session {
     bool releases = false;  // a grasper has let go
     double cut_surface = 0; // J, that a blade's cut takes
   };
+  class TearLoop;
   void tear(const StepSample& sample, const Loading& loading, StepResult& result);
   void book_loading(const StepSample& sample, const Loading& loading);
   [[nodiscard]] bool follows_load(const StepSample& sample, const Loading& loading) const;

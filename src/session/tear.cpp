@@ -254,198 +254,283 @@ double moving_drive_of(const std::vector<solvers::FrontState>& states, double lo
 
 } // namespace
 
-void Session::tear(const StepSample& sample, const Loading& loading, StepResult& result) {
-  TearReport& report = result.tear.emplace();
-  const TearSettings& settings = scenario_.tearing;
-  const double fine = zone_.spacing.fine, stride = settings.step * fine;
-  const int most = tear_gradually_ ? 1 : settings.most_increments;
-  const std::size_t pieces = wound()->pieces.size();
-  const bool proposed = mark_.has_value();
+// The increments of one step's tear. `states_` is what the fronts feel with the tool at `share_` of its way in the
+// step.
+class Session::TearLoop {
+ public:
+  TearLoop(Session& session, const StepSample& sample, const Loading& loading, StepResult& result)
+      : session_(session), sample_(sample), loading_(loading), result_(result), report_(result.tear.emplace()),
+        fine_(session.zone_.spacing.fine), stride_(session.scenario_.tearing.step * fine_),
+        pieces_(session.wound()->pieces.size()), proposed_(session.mark_.has_value()) {}
+
+  void run() {
+    begin();
+    add_row();
+    start_ = states_ ? drive_of(*states_) : 0;
+    if (goes_on_) {
+      start_ = session_.tears_->start;
+      kept_ = session_.tears_->kept;
+    } else {
+      session_.tears_->told = false;
+    }
+    for (int number = 1; increment(number); ++number)
+      ;
+    end();
+  }
+
+ private:
   using States = std::optional<std::vector<solvers::FrontState>>;
-  double intensity_seconds = 0;
-  const auto find_states = [&] {
-    const StageTimer timer(intensity_seconds);
-    return known_states();
+  /// What an increment adds to the cut, and why.
+  struct Growth {
+    topology::FrontGrowth sheets;
+    std::optional<topology::SurfaceMesh> seed; // a new cut
+    bool gives_way = false;                    // what is left between the front and the surface
+    bool joins = false;                        // two fronts
+    double longest = 0;                        // m, way of the front
+    std::vector<solvers::FrontState> moving;
   };
-  States states = find_states();
-  const auto way_of = [&](double drive) { // of the front in the next increment, as far as it is known how G falls
-    if (tears_->decay > 0)
-      return stride * std::clamp(std::log(std::max(drive, 1.0)) / (tears_->decay * stride), least_step, 1.0);
-    return drive < 1.1 ? first_step * stride : stride;
-  };
-  // A tear that makes one increment a step goes on in the next where nothing has changed but the tear.
-  const bool goes_on =
-      tear_gradually_ && tears_ && tears_->grows && !loading.releases && loading.cut_surface == 0 &&
-      sample.tool.has_value() == tears_->pose.has_value() &&
-      (!sample.tool || (sample.tool->point == tears_->pose->point && sample.tool->axis == tears_->pose->axis));
-  // The tool's way in this step, and how much of it the body has been loaded by.
-  const bool follows = states && !states->empty() && drive_of(*states) >= in_balance && follows_load(sample, loading);
-  const topology::ToolPose from = follows ? *tears_->pose : topology::ToolPose{};
-  const double since = follows ? tears_->time : 0;
-  double share = follows ? 0 : 1;
-  const auto load_to = [&](double to) {
-    share = to;
-    const StepSample part = loaded(from, since, sample, share);
-    solve(part, model_);
-    book_loading(part, share < 1 ? Loading{} : loading);
-    states = find_states();
-  };
-  // On to where the largest G / G_c is `target`, if it comes to that in this step, else to its end. `states` is at
-  // `share`, `full` at its end; the solution is at either.
-  const auto load_until = [&](double target, const States& full) {
-    const double part = states && full && states->size() == full->size()
-                            ? solvers::onset_share(scenario_.material, *states, *full, target)
+
+  [[nodiscard]] TearAccount& account() { return *session_.tears_; }
+  void find_states() {
+    const StageTimer timer(intensity_seconds_);
+    states_ = session_.known_states();
+  }
+  [[nodiscard]] StepSample loaded_sample() const { return loaded(from_, since_, sample_, share_); }
+
+  // Of the front in the next increment, m, as far as it is known how G falls.
+  [[nodiscard]] double way_of(double drive) {
+    if (account().decay > 0)
+      return stride_ * std::clamp(std::log(std::max(drive, 1.0)) / (account().decay * stride_), least_step, 1.0);
+    return drive < 1.1 ? first_step * stride_ : stride_;
+  }
+
+  void load_to(double to) {
+    share_ = to;
+    const StepSample part = loaded_sample();
+    session_.solve(part, session_.model_);
+    session_.book_loading(part, share_ < 1 ? Loading{} : loading_);
+    find_states();
+  }
+
+  // On to where the largest G / G_c is `target`, if it comes to that in this step, else to its end. `full`: the states
+  // at its end; the solution is at either.
+  void load_until(double target, const States& full) {
+    const double part = states_ && full && states_->size() == full->size()
+                            ? solvers::onset_share(session_.scenario_.material, *states_, *full, target)
                             : 1;
-    load_to(share + (1 - share) * part);
-  };
-  if (follows) {
-    const States full = states;
-    solve(loaded(from, since, sample, 0), model_);
-    states = find_states();
+    load_to(share_ + (1 - share_) * part);
+  }
+
+  void begin() {
+    find_states();
+    // A tear that makes one increment a step goes on in the next where nothing has changed but the tear.
+    const std::optional<TearAccount>& tears = session_.tears_;
+    goes_on_ =
+        session_.tear_gradually_ && tears && tears->grows && !loading_.releases && loading_.cut_surface == 0 &&
+        sample_.tool.has_value() == tears->pose.has_value() &&
+        (!sample_.tool || (sample_.tool->point == tears->pose->point && sample_.tool->axis == tears->pose->axis));
+    // The tool's way in this step, and how much of it the body has been loaded by.
+    const bool follows =
+        states_ && !states_->empty() && drive_of(*states_) >= in_balance && session_.follows_load(sample_, loading_);
+    if (!follows) {
+      session_.book_loading(sample_, loading_);
+      return;
+    }
+    from_ = *tears->pose;
+    since_ = tears->time;
+    share_ = 0;
+    const States full = states_;
+    session_.solve(loaded_sample(), session_.model_);
+    find_states();
     load_until(1, full);
-  } else {
-    book_loading(sample, loading);
   }
-  EnergyLedger& ledger = tears_->ledger;
-  const auto add_row = [&] {
-    report.increments.push_back(increment_of(states.value_or(std::vector<solvers::FrontState>{}), incision()));
-    report.increments.back().time = loaded(from, since, sample, share).time;
-    report.increments.back().force = model_.state->tool.tool_force.norm();
-    report.increments.back().ledger = ledger;
-    report.increments.back().body.nodes = model_.sprinkling.nodes.size();
-    report.increments.back().intensity_seconds = intensity_seconds;
-    profile_.intensities += std::exchange(intensity_seconds, 0);
-  };
-  add_row();
-  double start = states ? drive_of(*states) : 0;
-  int kept = 0;
-  if (goes_on) {
-    start = tears_->start;
-    kept = tears_->kept;
-  } else {
-    tears_->told = false;
+
+  void add_row() {
+    report_.increments.push_back(
+        increment_of(states_.value_or(std::vector<solvers::FrontState>{}), session_.incision()));
+    TearIncrement& row = report_.increments.back();
+    row.time = loaded_sample().time;
+    row.force = session_.model_.state->tool.tool_force.norm();
+    row.ledger = account().ledger;
+    row.body.nodes = session_.model_.sprinkling.nodes.size();
+    row.intensity_seconds = intensity_seconds_;
+    session_.profile_.intensities += std::exchange(intensity_seconds_, 0);
   }
-  for (int number = 1;; ++number) {
-    interruption_point();
-    double drive = states ? drive_of(*states) : 0, ahead = drive; // now, and at the end of the step
+
+  // The tool goes on where what moves is no more in balance. Returns the largest G / G_c at the end of the step.
+  double follow_load() {
+    double drive = states_ ? drive_of(*states_) : 0, ahead = drive;
     // G falls by exp(-decay way) in the increment: half of that before, half after what moves is in balance.
-    const double moving_drive = states ? moving_drive_of(*states, way_of(drive), fine) : 0;
-    if (share < 1 && moving_drive < std::max(in_balance, std::exp(0.5 * tears_->decay * way_of(drive)))) {
-      const States now = states;
-      solve(sample, model_);
-      const States full = find_states();
+    const double moving_drive = states_ ? moving_drive_of(*states_, way_of(drive), fine_) : 0;
+    if (share_ < 1 && moving_drive < std::max(in_balance, std::exp(0.5 * account().decay * way_of(drive)))) {
+      const States now = states_;
+      session_.solve(sample_, session_.model_);
+      find_states();
+      const States full = states_;
       ahead = full ? drive_of(*full) : 0;
-      states = now;
+      states_ = now;
       const double above = moving_drive > 0 ? drive / moving_drive : 1;
       if (ahead < in_balance)
         load_to(1);
       else
-        load_until(std::max(drive, above * std::exp(0.5 * tears_->decay * way_of(ahead))), full);
-      drive = states ? drive_of(*states) : 0;
+        load_until(std::max(drive, above * std::exp(0.5 * account().decay * way_of(ahead))), full);
+      drive = states_ ? drive_of(*states_) : 0;
       ahead = std::max(ahead, drive);
-      start = drive;
-      kept = 0;
+      start_ = drive;
+      kept_ = 0;
     }
-    const bool moves = drive >= in_balance || (share < 1 && states && !states->empty());
-    const bool gives_way = !states && model_.incision->front_length() < bridge * fine;
-    std::optional<topology::SurfaceMesh> seed;
-    if (!gives_way && !moves && !(seed = seed_of_tear())) {
-      report.reason = !states           ? "the front is too near to the surface for its intensities"
-                      : states->empty() ? "there is no front"
-                                        : "less is released than a tear takes";
-      break;
+    return ahead;
+  }
+
+  // Empty: the tear ends here, and the report says why.
+  std::optional<Growth> next_growth(int number, double ahead) {
+    const TearSettings& settings = session_.scenario_.tearing;
+    const double drive = states_ ? drive_of(*states_) : 0;
+    const bool moves = drive >= in_balance || (share_ < 1 && states_ && !states_->empty());
+    Growth growth;
+    growth.gives_way = !states_ && session_.model_.incision->front_length() < bridge * fine_;
+    if (!growth.gives_way && !moves && !(growth.seed = session_.seed_of_tear())) {
+      report_.reason = !states_           ? "the front is too near to the surface for its intensities"
+                       : states_->empty() ? "there is no front"
+                                          : "less is released than a tear takes";
+      return std::nullopt;
     }
-    if (number > most) {
-      report.reason = "as many increments as are allowed in one step";
-      break;
+    if (number > (session_.tear_gradually_ ? 1 : settings.most_increments)) {
+      report_.reason = "as many increments as are allowed in one step";
+      return std::nullopt;
     }
-    if (settings.most_area > 0 && tears_->area >= settings.most_area) {
-      report.reason = "as much is torn as is allowed";
-      warn("torn", fmt::format("t = {:g} s: {:.3g} m2 are torn, as many as tearing.most_area allows", sample.time,
-                               tears_->area));
-      break;
+    if (settings.most_area > 0 && account().area >= settings.most_area) {
+      report_.reason = "as much is torn as is allowed";
+      session_.warn("torn", fmt::format("t = {:g} s: {:.3g} m2 are torn, as many as tearing.most_area allows",
+                                        sample_.time, account().area));
+      return std::nullopt;
     }
-    drop_blade_proposal();
-    const double longest = gives_way ? bridge_step * fine : way_of(ahead);
-    const std::vector<solvers::FrontState> moving = gives_way || seed ? std::vector<solvers::FrontState>{}
-                                                    : share < 1       ? acting(*states, drive)
-                                                                      : *states;
-    topology::FrontGrowth growth;
-    bool joins = false;
-    if (seed) {
-      if (model_.incision != nullptr)
-        growth.sheets = model_.incision->sheets();
-      growth.sheets.push_back(*seed);
-      growth.triangles = static_cast<int>(seed->triangles.size());
-    } else {
-      if (!gives_way)
-        growth = join_tears(moving);
-      joins = growth.triangles > 0;
-      if (!joins)
-        growth = grow_tear(moving, longest);
+    session_.drop_blade_proposal();
+    growth.longest = growth.gives_way ? bridge_step * fine_ : way_of(ahead);
+    if (!growth.gives_way && !growth.seed)
+      growth.moving = share_ < 1 ? acting(*states_, drive) : *states_;
+    lay_sheets(growth);
+    if (growth.sheets.triangles == 0) {
+      report_.reason = "the fronts have met other cuts";
+      return std::nullopt;
     }
-    if (growth.triangles == 0) {
-      report.reason = "the fronts have met other cuts";
-      break;
+    return growth;
+  }
+
+  void lay_sheets(Growth& growth) {
+    if (growth.seed) {
+      if (session_.model_.incision != nullptr)
+        growth.sheets.sheets = session_.model_.incision->sheets();
+      growth.sheets.sheets.push_back(*growth.seed);
+      growth.sheets.triangles = static_cast<int>(growth.seed->triangles.size());
+      return;
     }
-    const auto before = model_.incision;
+    if (!growth.gives_way)
+      growth.sheets = session_.join_tears(growth.moving);
+    growth.joins = growth.sheets.triangles > 0;
+    if (!growth.joins)
+      growth.sheets = session_.grow_tear(growth.moving, growth.longest);
+  }
+
+  // False: the tear has come to its end.
+  bool increment(int number) {
+    interruption_point();
+    const std::optional<Growth> growth = next_growth(number, follow_load());
+    if (!growth)
+      return false;
+    const auto before = session_.model_.incision;
     const double area_before = before == nullptr ? 0 : before->area();
-    const double toughness = before == nullptr ? toughness_(seed->vertices.front())
-                                               : mean_toughness(growth, *before, *organ_.domain, toughness_);
-    const auto grow = [&] { seed ? incisions_->seed(*seed) : incisions_->tear(growth.sheets); };
+    const double toughness =
+        before == nullptr ? session_.toughness_(growth->seed->vertices.front())
+                          : mean_toughness(growth->sheets, *before, *session_.organ_.domain, session_.toughness_);
+    const auto grow = [&] {
+      growth->seed ? session_.incisions_->seed(*growth->seed) : session_.incisions_->tear(growth->sheets.sheets);
+    };
     BodyUpdate update;
-    if (!take_tear(loaded(from, since, sample, share), grow, report, update))
-      break;
-    report.seeded = report.seeded || seed.has_value();
-    const double torn = model_.incision->area() - area_before;
-    const States next = find_states();
-    const Energies now = energies(model_);
-    const double free = tears_->last.potential() - now.potential(), surface = toughness * torn;
+    if (!session_.take_tear(loaded_sample(), grow, report_, update))
+      return false;
+    report_.seeded = report_.seeded || growth->seed.has_value();
+    book(*growth, session_.model_.incision->area() - area_before, toughness);
+    add_row();
+    TearIncrement& row = report_.increments.back();
+    row.number = number;
+    row.triangles = growth->sheets.triangles;
+    row.advance = growth->seed || growth->joins ? 0 : growth->longest;
+    row.body = std::move(update);
+    tell();
+    return true;
+  }
+
+  // Energies of the increment that has been taken, `torn` m2 of it.
+  void book(const Growth& growth, double torn, double toughness) {
+    const States was_states = states_;
+    find_states();
+    const Energies now = energies(session_.model_);
+    const double free = account().last.potential() - now.potential(), surface = toughness * torn;
     double surplus = free - surface; // of a front that is gone, or comes about, by the energies alone
-    if (!seed && !gives_way && !joins && next && !next->empty()) {
-      const std::vector<double> advance = advances(*states, moving, longest, fine);
-      const Swept was = swept(*states, *states, advance), is = swept(*next, *states, advance);
+    if (!growth.seed && !growth.gives_way && !growth.joins && states_ && !states_->empty()) {
+      const std::vector<double> advance = advances(*was_states, growth.moving, growth.longest, fine_);
+      const Swept was = swept(*was_states, *was_states, advance), is = swept(*states_, *was_states, advance);
       surplus = 0.5 * (was.surplus + is.surplus) * torn;
-      const double drive_after = drive_of(*next);
-      if (longest >= told * stride) {
-        tears_->decay = std::max(0.0, std::log(was.drive / std::max(is.drive, 1e-3)) / longest);
-        kept += drive_after >= kept_drive * start ? 1 : 0;
+      if (growth.longest >= told * stride_) {
+        account().decay = std::max(0.0, std::log(was.drive / std::max(is.drive, 1e-3)) / growth.longest);
+        kept_ += drive_of(*states_) >= kept_drive * start_ ? 1 : 0;
       }
     }
-    ledger.loads += now.loads - tears_->last.loads;
-    ledger.elastic += now.elastic() - tears_->last.elastic();
+    EnergyLedger& ledger = account().ledger;
+    ledger.loads += now.loads - account().last.loads;
+    ledger.elastic += now.elastic() - account().last.elastic();
     ledger.surface += surface;
     ledger.dissipation += std::max(0.0, surplus);
-    tears_->last = now;
-    tears_->force = model_.state->tool.tool_force;
-    tears_->area += torn;
-    result.cut->triangles += growth.triangles;
-    states = next;
-    add_row();
-    TearIncrement& row = report.increments.back();
-    row.number = number;
-    row.triangles = growth.triangles;
-    row.advance = seed || joins ? 0 : longest;
-    row.body = std::move(update);
-    if (kept >= kept_to_tell && !report.unstable) {
-      report.unstable = true;
-      if (!std::exchange(tears_->told, true))
-        say_(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample.time));
-    }
-    if (incisions_->wound().pieces.size() > pieces)
-      report.severed = true;
+    account().last = now;
+    account().force = session_.model_.state->tool.tool_force;
+    account().area += torn;
+    result_.cut->triangles += growth.sheets.triangles;
   }
-  if (share < 1)
-    load_to(1);
-  tears_->grows = report.increments.size() > 1;
-  tears_->start = start;
-  tears_->kept = kept;
-  if (blade_force_ != nullptr && (report.increments.size() > 1 || (proposed && !mark_)))
-    blade_force_->meet_again(model_);
-  report.area = tears_->area;
-  report.ledger = ledger;
-  if (report.severed)
-    say_(fmt::format("t = {:g} s: the tear has parted the organ", sample.time));
+
+  void tell() {
+    if (kept_ >= kept_to_tell && !report_.unstable) {
+      report_.unstable = true;
+      if (!std::exchange(account().told, true))
+        session_.say_(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample_.time));
+    }
+    if (session_.incisions_->wound().pieces.size() > pieces_)
+      report_.severed = true;
+  }
+
+  void end() {
+    if (share_ < 1)
+      load_to(1);
+    account().grows = report_.increments.size() > 1;
+    account().start = start_;
+    account().kept = kept_;
+    if (session_.blade_force_ != nullptr && (report_.increments.size() > 1 || (proposed_ && !session_.mark_)))
+      session_.blade_force_->meet_again(session_.model_);
+    report_.area = account().area;
+    report_.ledger = account().ledger;
+    if (report_.severed)
+      session_.say_(fmt::format("t = {:g} s: the tear has parted the organ", sample_.time));
+  }
+
+  Session& session_;
+  const StepSample& sample_;
+  const Loading& loading_;
+  StepResult& result_;
+  TearReport& report_;
+  double fine_, stride_; // m
+  std::size_t pieces_;   // of the organ at the start
+  bool proposed_;        // a blade's proposal stood then
+  double intensity_seconds_ = 0;
+  States states_;
+  bool goes_on_ = false;
+  topology::ToolPose from_; // where the tool was at `since_`, s, if its way is followed
+  double since_ = 0, share_ = 1;
+  double start_ = 0; // G / G_c when the growth at this load began
+  int kept_ = 0;
+};
+
+void Session::tear(const StepSample& sample, const Loading& loading, StepResult& result) {
+  TearLoop(*this, sample, loading, result).run();
 }
 
 } // namespace spherecut::app
