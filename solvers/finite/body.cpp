@@ -230,6 +230,62 @@ const Vector3& FiniteBody::place_of(int group, std::size_t point) const {
   return table_.positions[static_cast<std::size_t>(point_lanes) * group + point];
 }
 
+// Energy, J, and forces of consecutive groups; the forces are added, or left in the slots for several threads.
+double FiniteBody::add_chunk(int begin, int end, const std::vector<double>& pressure, bool one_thread,
+                             VectorX& forces) const {
+  const double own = pointwise_share();
+  const bool minds = minds_volume();
+  constexpr int most = groups_of_a_sum * point_lanes;
+  std::array<Matrix3, most> gradient, stress;
+  std::array<double, most> density;
+  const int count = count_from(begin, end);
+  gradients_of(begin, end, gradient.data());
+  const auto gradients = std::span<const Matrix3>(gradient).first(count);
+  const auto densities = std::span(density).first(count);
+  const auto stresses = std::span(stress).first(count);
+  try {
+    law_->evaluate_isochoric(gradients, fibres_of(begin, count), densities, stresses);
+  } catch (const LawValueError& error) {
+    throw_with_place(error, place_of(begin, error.point()));
+  }
+  if (prony_ != nullptr)
+    prony_->apply(static_cast<std::size_t>(point_start_[begin]), gradients, densities, stresses);
+  double sum = 0;
+  int point = 0;
+  std::vector<double> local;
+  for (int group = begin; group < end; ++group) {
+    LaneValues weighted[9];
+    const double of_block = blocks_.size() > 0 ? pressure[blocks_.block[group]] : 0;
+    for (int lane = 0; lane < table_.count[group]; ++lane, ++point) {
+      const double weight = table_.weights[group].value[lane];
+      double c[9], p = 0;
+      if (minds) {
+        const double j = cofactor_of(gradient[point].data(), c);
+        p = own * law_->pressure(j) + of_block;
+        density[point] += own * law_->volumetric_energy(j);
+      } else {
+        std::fill_n(c, 9, 0.0);
+      }
+      sum += weight * density[point];
+      for (int k = 0; k < 9; ++k)
+        weighted[k].value[lane] = weight * (stress[point].data()[k] + p * c[k]);
+    }
+    const std::span<const int> nodes = table_.nodes_of(group);
+    const int here = static_cast<int>(nodes.size());
+    if (one_thread) {
+      local.resize(3 * nodes.size());
+      group_forces(here, table_.gradients_of(group), weighted, local.data());
+      for (int k = 0; k < here; ++k)
+        for (int axis = 0; axis < 3; ++axis)
+          forces[3 * nodes[k] + axis] += local[3 * k + axis];
+    } else {
+      group_forces(here, table_.gradients_of(group), weighted,
+                   work_->slots.data() + 3 * static_cast<std::size_t>(table_.start[group]));
+    }
+  }
+  return sum;
+}
+
 void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const {
   Work& work = *work_;
   out.least_jacobian = deform(coefficients);
@@ -237,7 +293,7 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
     out.energy = std::numeric_limits<double>::infinity();
     return;
   }
-  const double own = pointwise_share(), shared = 1 - own;
+  const double shared = 1 - pointwise_share();
   std::vector<double> pressure(work.jacobian.size());
   double energy = 0;
   for (int b = 0; b < blocks_.size(); ++b) {
@@ -248,57 +304,8 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
   const bool one_thread = thread_count() == 1;
   if (!one_thread)
     work.slots.resize(3 * table_.nodes.size());
-  const bool minds = minds_volume();
   parallel_ranges(table_.groups(), groups_of_a_sum, [&](int begin, int end) {
-    constexpr int most = groups_of_a_sum * point_lanes;
-    std::array<Matrix3, most> gradient, stress;
-    std::array<double, most> density;
-    const int count = count_from(begin, end);
-    gradients_of(begin, end, gradient.data());
-    const auto gradients = std::span<const Matrix3>(gradient).first(count);
-    const auto densities = std::span(density).first(count);
-    const auto stresses = std::span(stress).first(count);
-    try {
-      law_->evaluate_isochoric(gradients, fibres_of(begin, count), densities, stresses);
-    } catch (const LawValueError& error) {
-      throw_with_place(error, place_of(begin, error.point()));
-    }
-    if (prony_ != nullptr)
-      prony_->apply(static_cast<std::size_t>(point_start_[begin]), gradients, densities, stresses);
-    double sum = 0;
-    int point = 0;
-    std::vector<double> local;
-    for (int group = begin; group < end; ++group) {
-      LaneValues weighted[9];
-      const double of_block = blocks_.size() > 0 ? pressure[blocks_.block[group]] : 0;
-      for (int lane = 0; lane < table_.count[group]; ++lane, ++point) {
-        const double weight = table_.weights[group].value[lane];
-        double c[9], p = 0;
-        if (minds) {
-          const double j = cofactor_of(gradient[point].data(), c);
-          p = own * law_->pressure(j) + of_block;
-          density[point] += own * law_->volumetric_energy(j);
-        } else {
-          std::fill_n(c, 9, 0.0);
-        }
-        sum += weight * density[point];
-        for (int k = 0; k < 9; ++k)
-          weighted[k].value[lane] = weight * (stress[point].data()[k] + p * c[k]);
-      }
-      const std::span<const int> nodes = table_.nodes_of(group);
-      const int here = static_cast<int>(nodes.size());
-      if (one_thread) {
-        local.resize(3 * nodes.size());
-        group_forces(here, table_.gradients_of(group), weighted, local.data());
-        for (int k = 0; k < here; ++k)
-          for (int axis = 0; axis < 3; ++axis)
-            out.forces[3 * nodes[k] + axis] += local[3 * k + axis];
-      } else {
-        group_forces(here, table_.gradients_of(group), weighted,
-                     work.slots.data() + 3 * static_cast<std::size_t>(table_.start[group]));
-      }
-    }
-    work.chunk_energy[begin / groups_of_a_sum] = sum;
+    work.chunk_energy[begin / groups_of_a_sum] = add_chunk(begin, end, pressure, one_thread, out.forces);
   });
   if (!one_thread)
     parallel_ranges(size(), 64, [&](int begin, int end) {

@@ -125,6 +125,7 @@ class FiniteBody {
   void assemble_loads();
   /// F of all groups, and the mean J of all blocks; returns the least J.
   double deform(const VectorX& coefficients) const;
+  double add_chunk(int begin, int end, const std::vector<double>& pressure, bool one_thread, VectorX& forces) const;
   [[nodiscard]] const Vector3& place_of(int group, std::size_t point) const; // m
   [[nodiscard]] int count_from(int begin, int end) const;          // points that weigh something, of these groups
   void gradients_of(int begin, int end, Matrix3* gradients) const; // as deform() found them

@@ -157,7 +157,17 @@ void FiniteTangent::point_tangents(int group, const LaneValues* deformation, dou
 
 void FiniteTangent::assemble(const std::vector<LaneValues>& deformation, const std::vector<double>& jacobian,
                              double penalty, SparseMatrix& lower) const {
-  const PointTable& table = body_.points();
+  lay_pattern(lower);
+  const bool blocks = body_.blocks().size() > 0;
+  std::vector<VectorX> swelling(blocks ? body_.points().groups() : 0);
+  add_groups(deformation, jacobian, swelling, lower);
+  if (blocks)
+    add_blocks(jacobian, swelling, lower);
+  if (penalty > 0)
+    add_penalties(penalty, lower);
+}
+
+void FiniteTangent::lay_pattern(SparseMatrix& lower) const {
   const int count = body_.size();
   lower.resize(3 * count, 3 * count);
   lower.resizeNonZeros(9 * static_cast<Eigen::Index>(rows_.size()));
@@ -171,72 +181,86 @@ void FiniteTangent::assemble(const std::vector<LaneValues>& deformation, const s
     }
   starts[3 * count] = 9 * static_cast<int>(rows_.size());
   std::fill_n(lower.valuePtr(), lower.nonZeros(), 0.0);
+}
 
-  const bool blocks = body_.blocks().size() > 0;
-  struct Local {
-    std::vector<int> ranks;
-    MatrixX matrix;
-    VectorX swelling; // d(sum of w J)/du, in node order of the group
-  };
+// Group by group in their order, so that the sums do not depend on threads.
+void FiniteTangent::add_groups(const std::vector<LaneValues>& deformation, const std::vector<double>& jacobian,
+                               std::vector<VectorX>& swelling, SparseMatrix& lower) const {
+  const int groups = body_.points().groups();
   std::vector<Local> locals(groups_at_once);
-  std::vector<VectorX> swelling(blocks ? table.groups() : 0);
-  for (int first = 0; first < table.groups(); first += groups_at_once) {
-    const int here = std::min(groups_at_once, table.groups() - first);
+  for (int first = 0; first < groups; first += groups_at_once) {
+    const int here = std::min(groups_at_once, groups - first);
     parallel_ranges(here, 4, [&](int begin, int end) {
       std::vector<LaneValues> tangent(81);
       for (int k = begin; k < end; ++k) {
         const int group = first + k;
-        Local& local = locals[k];
-        const std::span<const int> nodes = table.nodes_of(group);
-        const std::vector<int> order = sorted_by_rank(nodes, rank_);
-        const int size = static_cast<int>(nodes.size());
+        const bool blocks = !swelling.empty();
         LaneValues cofactor[9];
         std::fill(tangent.begin(), tangent.end(), LaneValues{});
         point_tangents(group, deformation.data() + 9 * static_cast<std::size_t>(group),
                        blocks ? jacobian[body_.blocks().block[group]] : 1, tangent.data(), cofactor);
-        const LaneValues* g = table.gradients_of(group);
-        if (blocks) {
-          swelling[group].resize(3 * size);
-          for (int i = 0; i < size; ++i)
-            for (int a = 0; a < 3; ++a) {
-              double sum = 0;
-              for (int c = 0; c < 3; ++c)
-                for (int lane = 0; lane < point_lanes; ++lane)
-                  sum += cofactor[a + 3 * c].value[lane] * g[3 * i + c].value[lane];
-              swelling[group][3 * i + a] = sum;
-            }
-        }
-        // left: (3 lanes) x nodes, of gradients; right for a: (3 lanes) x 3 nodes, of tangent times gradients.
-        MatrixX left(3 * point_lanes, size), right(3 * point_lanes, 3 * size), product(size, 3 * size);
-        local.ranks.resize(size);
-        local.matrix.resize(3 * size, 3 * size);
-        for (int i = 0; i < size; ++i) {
-          local.ranks[i] = rank_[nodes[order[i]]];
-          for (int c = 0; c < 3; ++c)
-            for (int lane = 0; lane < point_lanes; ++lane)
-              left(point_lanes * c + lane, i) = g[3 * order[i] + c].value[lane];
-        }
-        for (int a = 0; a < 3; ++a) {
-          for (int j = 0; j < size; ++j)
-            for (int b = 0; b < 3; ++b)
-              for (int c = 0; c < 3; ++c)
-                for (int lane = 0; lane < point_lanes; ++lane) {
-                  double sum = 0;
-                  for (int d = 0; d < 3; ++d)
-                    sum += tangent[a + 3 * c + 9 * (b + 3 * d)].value[lane] * left(point_lanes * d + lane, j);
-                  right(point_lanes * c + lane, 3 * j + b) = sum;
-                }
-          product.setZero();
-          add_product(1, left, true, right, product);
-          for (int i = 0; i < size; ++i)
-            local.matrix.row(3 * i + a) = product.row(i);
-        }
+        if (blocks)
+          swelling[group] = swelling_of(group, cofactor);
+        group_matrix(group, tangent.data(), locals[k]);
       }
     });
     for (int k = 0; k < here; ++k)
       scatter(locals[k].ranks, locals[k].matrix, lower);
   }
-  std::vector<int> nodes, place(count, -1), ranks;
+}
+
+VectorX FiniteTangent::swelling_of(int group, const LaneValues* cofactor) const {
+  const int size = static_cast<int>(body_.points().nodes_of(group).size());
+  const LaneValues* g = body_.points().gradients_of(group);
+  VectorX swelling(3 * size);
+  for (int i = 0; i < size; ++i)
+    for (int a = 0; a < 3; ++a) {
+      double sum = 0;
+      for (int c = 0; c < 3; ++c)
+        for (int lane = 0; lane < point_lanes; ++lane)
+          sum += cofactor[a + 3 * c].value[lane] * g[3 * i + c].value[lane];
+      swelling[3 * i + a] = sum;
+    }
+  return swelling;
+}
+
+// left: (3 lanes) x nodes, of gradients; right for a: (3 lanes) x 3 nodes, of tangent times gradients.
+void FiniteTangent::group_matrix(int group, const LaneValues* tangent, Local& local) const {
+  const std::span<const int> nodes = body_.points().nodes_of(group);
+  const std::vector<int> order = sorted_by_rank(nodes, rank_);
+  const int size = static_cast<int>(nodes.size());
+  const LaneValues* g = body_.points().gradients_of(group);
+  MatrixX left(3 * point_lanes, size), right(3 * point_lanes, 3 * size), product(size, 3 * size);
+  local.ranks.resize(size);
+  local.matrix.resize(3 * size, 3 * size);
+  for (int i = 0; i < size; ++i) {
+    local.ranks[i] = rank_[nodes[order[i]]];
+    for (int c = 0; c < 3; ++c)
+      for (int lane = 0; lane < point_lanes; ++lane)
+        left(point_lanes * c + lane, i) = g[3 * order[i] + c].value[lane];
+  }
+  for (int a = 0; a < 3; ++a) {
+    for (int j = 0; j < size; ++j)
+      for (int b = 0; b < 3; ++b)
+        for (int c = 0; c < 3; ++c)
+          for (int lane = 0; lane < point_lanes; ++lane) {
+            double sum = 0;
+            for (int d = 0; d < 3; ++d)
+              sum += tangent[a + 3 * c + 9 * (b + 3 * d)].value[lane] * left(point_lanes * d + lane, j);
+            right(point_lanes * c + lane, 3 * j + b) = sum;
+          }
+    product.setZero();
+    add_product(1, left, true, right, product);
+    for (int i = 0; i < size; ++i)
+      local.matrix.row(3 * i + a) = product.row(i);
+  }
+}
+
+// The pressure of a block is that of its mean volume change: one row a block.
+void FiniteTangent::add_blocks(const std::vector<double>& jacobian, const std::vector<VectorX>& swelling,
+                               SparseMatrix& lower) const {
+  const PointTable& table = body_.points();
+  std::vector<int> nodes, place(body_.size(), -1), ranks;
   for (int b = 0; b < std::ssize(block_groups_); ++b) {
     nodes.clear();
     for (const int group : block_groups_[b])
@@ -260,22 +284,25 @@ void FiniteTangent::assemble(const std::vector<LaneValues>& deformation, const s
     for (const int node : nodes)
       place[node] = -1;
   }
-  if (penalty > 0)
-    for (int e = 0; e < std::ssize(body_.held().entries()); ++e) {
-      const DisplacementMean& mean = body_.held().means()[e];
-      const std::vector<int> order = sorted_by_rank(mean.nodes, rank_);
-      MatrixX matrix = MatrixX::Zero(3 * std::ssize(order), 3 * std::ssize(order));
-      ranks.clear();
-      for (int i = 0; i < std::ssize(order); ++i) {
-        ranks.push_back(rank_[mean.nodes[order[i]]]);
-        for (int j = 0; j < std::ssize(order); ++j)
-          for (int a = 0; a < 3; ++a)
-            if (body_.held().entries()[e].components[a])
-              matrix(3 * i + a, 3 * j + a) =
-                  body_.penalty_stiffness(e, penalty) * mean.weights[order[i]] * mean.weights[order[j]];
-      }
-      scatter(ranks, matrix, lower);
+}
+
+void FiniteTangent::add_penalties(double penalty, SparseMatrix& lower) const {
+  std::vector<int> ranks;
+  for (int e = 0; e < std::ssize(body_.held().entries()); ++e) {
+    const DisplacementMean& mean = body_.held().means()[e];
+    const std::vector<int> order = sorted_by_rank(mean.nodes, rank_);
+    MatrixX matrix = MatrixX::Zero(3 * std::ssize(order), 3 * std::ssize(order));
+    ranks.clear();
+    for (int i = 0; i < std::ssize(order); ++i) {
+      ranks.push_back(rank_[mean.nodes[order[i]]]);
+      for (int j = 0; j < std::ssize(order); ++j)
+        for (int a = 0; a < 3; ++a)
+          if (body_.held().entries()[e].components[a])
+            matrix(3 * i + a, 3 * j + a) =
+                body_.penalty_stiffness(e, penalty) * mean.weights[order[i]] * mean.weights[order[j]];
     }
+    scatter(ranks, matrix, lower);
+  }
 }
 
 } // namespace spherecut::solvers

@@ -17,7 +17,19 @@ class FiniteTangent {
                 SparseMatrix& lower) const;
 
  private:
+  struct Local {
+    std::vector<int> ranks;
+    MatrixX matrix;
+  };
   void find_pattern();
+  void lay_pattern(SparseMatrix& lower) const;
+  void add_groups(const std::vector<LaneValues>& deformation, const std::vector<double>& jacobian,
+                  std::vector<VectorX>& swelling, SparseMatrix& lower) const;
+  void add_blocks(const std::vector<double>& jacobian, const std::vector<VectorX>& swelling, SparseMatrix& lower) const;
+  void add_penalties(double penalty, SparseMatrix& lower) const;
+  /// d(sum of w J)/du of a group, in its order of nodes, m2.
+  [[nodiscard]] VectorX swelling_of(int group, const LaneValues* cofactor) const;
+  void group_matrix(int group, const LaneValues* tangent, Local& local) const;
   void point_tangents(int group, const LaneValues* deformation, double block_jacobian, LaneValues* tangent,
                       LaneValues* cofactor) const;
   /// Adds a 3 x 3 block per pair of the nodes, whose ranks ascend; `matrix` has 3 rows and columns a node, in that

@@ -248,39 +248,23 @@ StepResult Session::step(const StepSample& sample) {
     result.contact = find_contact(*sample.tool);
     last_contact_ = result.contact;
   }
-  if (is_nonlinear(scenario_.law)) {
+  if (is_nonlinear(scenario_.law))
     step_finite(sample, result);
-    passed_.clear();
-    if (result.cut)
-      report_cut(*result.cut);
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    return result;
-  }
+  else
+    step_linear(sample, result);
+  passed_.clear();
+  if (result.cut)
+    report_cut(*result.cut);
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+void Session::step_linear(const StepSample& sample, StepResult& result) {
   if (cuts())
     result.cut = aside_cut_.value_or(CutReport{});
-  const auto kept = std::exchange(kept_grip_, std::nullopt);
-  grip_memory_ = model_.state ? remembered_grip() : kept;
-  if (without_blade_) {
-    model_.field = std::move(*without_blade_);
-    without_blade_.reset();
-  }
-  if (sample.blade && !cuts_aside())
-    drop_following();
-  const bool released = handle_grasper(sample);
+  Loading loading{.releases = begin_step(sample)};
   const std::optional<topology::BladePose> last_blade = last_blade_;
-  if (sample.blade &&
-      (!last_blade || edge_travel(scenario_.blade->edge, *last_blade, *sample.blade) > same_place * zone_.spacing.fine))
-    blade_moved_ = sample.time;
-  blade_rests_ = !sample.blade || sample.time - blade_moved_ >= rest_delay;
-  bool solved = false;
-  if (incisions_ != nullptr && blade_force_ == nullptr) {
-    if (model_.body != nullptr && !model_.state && (sample.blade || aside_cut_)) { // by its field a blade is carried
-      solve(sample, model_);                                                       // to the tissue at rest
-      solved = true;
-    }
-    aside_cut_.reset();
-    solved = move_blade(sample, *result.cut) || solved;
-  }
+  const bool solved = cut_freely(sample, result);
   if (sample.blade)
     last_blade_ = sample.blade;
   // Without any load the organ keeps its rest shape until the tool is on it.
@@ -293,28 +277,9 @@ StepResult Session::step(const StepSample& sample) {
       build(model_);
     if (!solved)
       solve(sample, model_);
-    if (touch_) {
-      const topology::SurfaceContact centre = centre_of(result.contact, result.pose);
-      const bool waits = cuts_aside() && !leaves_zone(centre); // nodes are made at one place at a time
-      if (must_follow(centre) && !waits) {
-        if (following_aside_ && recondensing_ == nullptr && !sample.blade && !cuts_aside()) {
-          follow_aside(sample, centre);
-        } else {
-          if (cuts_aside())
-            wait_for_cut(sample, *result.cut);
-          follow(sample, centre, result);
-        }
-      }
-    }
-    Loading loading{.releases = released};
-    if (blade_force_ != nullptr && sample.blade) {
-      loading.cut_surface = press_blade(sample, *result.cut);
-    } else if (last_blade_ && (proposing_ || (proposes_aside() && blade_force_->lags()))) {
-      StepSample left = sample; // at the end of its path, with a cut still to come
-      left.blade = last_blade_;
-      left.blade->time = sample.time;
-      loading.cut_surface = press_blade(left, *result.cut);
-    }
+    if (touch_)
+      follow_tool(sample, result);
+    loading.cut_surface = press_resisted(sample, result);
     if (tears())
       tear(sample, loading, result);
     if (renews_windows() && sample.blade)
@@ -325,11 +290,64 @@ StepResult Session::step(const StepSample& sample) {
   }
   result.resprinkled = result.resprinkled || std::exchange(followed_aside_, false);
   result.rebuild = std::exchange(rebuild_, Rebuild::none);
-  passed_.clear();
-  if (result.cut)
-    report_cut(*result.cut);
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return result;
+}
+
+// What the last step has left, the grasper, and whether the blade rests. True: the grasper has let go.
+bool Session::begin_step(const StepSample& sample) {
+  const auto kept = std::exchange(kept_grip_, std::nullopt);
+  grip_memory_ = model_.state ? remembered_grip() : kept;
+  if (without_blade_) {
+    model_.field = std::move(*without_blade_);
+    without_blade_.reset();
+  }
+  if (sample.blade && !cuts_aside())
+    drop_following();
+  const bool released = handle_grasper(sample);
+  if (sample.blade && (!last_blade_ || edge_travel(scenario_.blade->edge, *last_blade_, *sample.blade) >
+                                           same_place * zone_.spacing.fine))
+    blade_moved_ = sample.time;
+  blade_rests_ = !sample.blade || sample.time - blade_moved_ >= rest_delay;
+  return released;
+}
+
+// A blade that nothing resists cuts before the step is solved. True: it is solved already.
+bool Session::cut_freely(const StepSample& sample, StepResult& result) {
+  if (incisions_ == nullptr || blade_force_ != nullptr)
+    return false;
+  bool solved = false;
+  if (model_.body != nullptr && !model_.state && (sample.blade || aside_cut_)) { // by its field a blade is carried
+    solve(sample, model_);                                                       // to the tissue at rest
+    solved = true;
+  }
+  aside_cut_.reset();
+  return move_blade(sample, *result.cut) || solved;
+}
+
+// Fine nodes go along with the tool.
+void Session::follow_tool(const StepSample& sample, StepResult& result) {
+  const topology::SurfaceContact centre = centre_of(result.contact, result.pose);
+  const bool waits = cuts_aside() && !leaves_zone(centre); // nodes are made at one place at a time
+  if (!must_follow(centre) || waits)
+    return;
+  if (following_aside_ && recondensing_ == nullptr && !sample.blade && !cuts_aside()) {
+    follow_aside(sample, centre);
+    return;
+  }
+  if (cuts_aside())
+    wait_for_cut(sample, *result.cut);
+  follow(sample, centre, result);
+}
+
+// A blade that the tissue resists, against the solved body. Returns the energy of the surface that it cuts, J.
+double Session::press_resisted(const StepSample& sample, StepResult& result) {
+  if (blade_force_ != nullptr && sample.blade)
+    return press_blade(sample, *result.cut);
+  if (!last_blade_ || !(proposing_ || (proposes_aside() && blade_force_->lags())))
+    return 0;
+  StepSample left = sample; // at the end of its path, with a cut still to come
+  left.blade = last_blade_;
+  left.blade->time = sample.time;
+  return press_blade(left, *result.cut);
 }
 
 // What friction has to know of the solution, should the nodes change.

@@ -326,6 +326,11 @@ class Session {
   void judge_fineness(const StepResult& result);
   [[nodiscard]] std::vector<Vector3> places_of_contact() const;
   void make_finite(BodyModel& model, const BodyModel* before = nullptr);
+  void step_linear(const StepSample& sample, StepResult& result);
+  bool begin_step(const StepSample& sample);
+  bool cut_freely(const StepSample& sample, StepResult& result);
+  void follow_tool(const StepSample& sample, StepResult& result);
+  double press_resisted(const StepSample& sample, StepResult& result);
   void solve_finite(double time, const std::optional<topology::ToolPose>& pose, BodyModel& model);
   void build_finite_cut(BodyModel& next, BodyUpdate& report);
   void step_finite(const StepSample& sample, StepResult& result);
