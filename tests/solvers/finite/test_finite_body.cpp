@@ -324,21 +324,21 @@ TEST_CASE("A cut that is pressed together bears what the uncut block does, and o
     if (touch)
       equilibrium.set_lips(pairs);
     EquilibriumStatus status;
-    for (const double by : {-0.05, -0.1}) // all around: a hydrostatic pressure, the same on every plane
+    for (const double by : {-0.02, -0.04}) // all around: a hydrostatic pressure, the same on every plane
       status = equilibrium.solve({squeezed(by), 1, {}});
     error[touch ? 1 : 0] =
-        experiments::nodal_error(body, equilibrium.coefficients(), [](const Vector3& x) { return Vector3(-0.1 * x); });
+        experiments::nodal_error(body, equilibrium.coefficients(), [](const Vector3& x) { return Vector3(-0.04 * x); });
     if (!touch)
       continue;
     CHECK(status.closed == std::ssize(pairs));
     CHECK(status.penetration < 1e-3);
     double energy = 0;
     Matrix3 stress;
-    const Matrix3 f = 0.9 * Matrix3::Identity();
+    const Matrix3 f = 0.96 * Matrix3::Identity();
     law->evaluate({&f, 1}, {}, {&energy, 1}, {&stress, 1});
     CHECK(status.energy == Approx(energy).epsilon(0.01));
     // Drawn apart the lips do not hold each other.
-    for (const double by : {-0.05, 0.0, 0.005, 0.01})
+    for (const double by : {-0.02, 0.0, 0.005, 0.01})
       status = equilibrium.solve({squeezed(by), 1, {}});
     CHECK(status.closed == 0);
     for (const double opening : equilibrium.lips()->openings(equilibrium.coefficients()))
