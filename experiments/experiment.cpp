@@ -71,6 +71,8 @@ const std::vector<Experiment>& all_experiments() {
       {"finite_exact", "blocks stretched to twice and half their length and bent by 120 degrees", run_finite_exact},
       {"finite_locking", "a bonded block nearly incompressible is compressed by 30 % and does not lock",
        run_finite_locking},
+      {"pure_shear_crack", "a crack in a wide strip stretched by up to 80 %: its energy release rate",
+       run_pure_shear_crack},
       {"truth_cube", "a silicone cube under plate and ball: fitted at the smallest compression, the others predicted",
        run_truth_cube},
   };

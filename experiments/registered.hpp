@@ -39,5 +39,6 @@ std::vector<Check> run_real_world(const ExperimentContext& context);
 std::vector<Check> run_finite_patch(const ExperimentContext& context);
 std::vector<Check> run_finite_exact(const ExperimentContext& context);
 std::vector<Check> run_finite_locking(const ExperimentContext& context);
+std::vector<Check> run_pure_shear_crack(const ExperimentContext& context);
 
 } // namespace spherecut::experiments
