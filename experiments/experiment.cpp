@@ -73,6 +73,9 @@ const std::vector<Experiment>& all_experiments() {
        run_finite_locking},
       {"tissue_fuzz", "random runs of every law of finite strain: does every step find a sound state?",
        run_tissue_fuzz},
+      {"pure_shear_crack", "a crack in a wide strip stretched by up to 80 %: its energy release rate",
+       run_pure_shear_crack},
+      {"gaping", "a cut through half of a block stretched by 20 and 40 % opens as in finite elements", run_gaping},
       {"truth_cube", "a silicone cube under plate and ball: fitted at the smallest compression, the others predicted",
        run_truth_cube},
   };

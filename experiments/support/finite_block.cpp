@@ -54,10 +54,13 @@ void hold_faces(solvers::Problem& problem, const FiniteBlock& block) {
 solvers::Problem finite_block(const FiniteBlock& block) {
   solvers::Problem problem;
   problem.domain = topology::make_box_domain(block.lower, block.upper, block.spacing);
+  if (!block.cuts.empty())
+    problem.incision = std::make_shared<topology::Incision>(block.cuts, problem.domain);
   if (block.graded) {
     solvers::SprinkleOptions options;
     options.spacing = *block.graded;
     options.random_seed = block.seed;
+    options.incision = problem.incision;
     problem.nodes = solvers::sprinkle(*problem.domain, options).nodes;
     hold_faces(problem, block);
     return problem;

@@ -204,6 +204,14 @@ TEST_CASE("Quick tissue fuzz: every step of random laws, cuts and motions finds 
   require_quick_run_passes("tissue_fuzz");
 }
 
+TEST_CASE("Quick pure shear crack: its release is the energy of the strip ahead") {
+  require_quick_run_passes("pure_shear_crack");
+}
+
+TEST_CASE("Quick gaping: a cut block that is stretched opens as in finite elements") {
+  require_quick_run_passes("gaping");
+}
+
 TEST_CASE("Quick truth cube: plates that slip give the closed form, forces settle with the nodes") {
   require_quick_run_passes("truth_cube");
 }

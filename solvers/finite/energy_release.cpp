@@ -1,0 +1,394 @@
+#include "solvers/finite/energy_release.hpp"
+
+#include "solvers/finite/point_kernels.hpp"
+#include "topology/base/errors.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+
+namespace spherecut::solvers {
+
+namespace {
+
+constexpr double widest_release_turn = 0.9; // of the front's radius of curvature: the tube's outer radius
+constexpr double parallel_skin = 0.05;      // cosine between the way ahead and a normal of the surface that it is along
+constexpr int face_points = 24, front_points = 96;
+
+double spacing_at_front(const NodeCloud& nodes, const Vector3& x) {
+  int best = 0;
+  for (int i = 1; i < nodes.size(); ++i)
+    if ((nodes.positions[i] - x).squaredNorm() < (nodes.positions[best] - x).squaredNorm())
+      best = i;
+  return nodes.spacings[best];
+}
+
+const topology::Incision& incision_with_front(const FiniteBody& body) {
+  const topology::Incision* incision = body.problem().incision.get();
+  if (incision == nullptr || incision->front().empty())
+    throw InputError("energy release: the body has no cut that ends in it");
+  return *incision;
+}
+
+/// Curvature of the front in the plane of the cut, 1/m: positive where the way ahead fans out.
+double front_curvature(const topology::Incision& incision, const topology::FrontFrame& front, double h) {
+  const auto before = incision.front_frame(front.point - h * front.tangent, 2 * h);
+  const auto after = incision.front_frame(front.point + h * front.tangent, 2 * h);
+  if (!before || !after)
+    return 0;
+  const double length = (after->point - before->point).norm();
+  return length > 0.5 * h ? (after->ahead - before->ahead).dot(front.tangent) / length : 0;
+}
+
+void check_release(const ReleaseOptions& options) {
+  if (!(options.inner >= 0 && options.outer > options.inner && std::isfinite(options.outer)))
+    throw InputError(fmt::format("energy release: a shift that fades from {} to {} spacings; allowed: 0 or more, and "
+                                 "the second larger",
+                                 options.inner, options.outer));
+  if (options.half_length && !(*options.half_length > 0 && std::isfinite(*options.half_length)))
+    throw InputError(fmt::format("energy release: a tube of half a length of {} spacings; it must be positive",
+                                 *options.half_length));
+  if (!(options.inset >= 0) || !std::isfinite(options.inset))
+    throw InputError(
+        fmt::format("energy release: a shift that fades over {} spacings; it must not be negative", options.inset));
+}
+
+struct Faded {
+  double value = 0, slope = 0;
+};
+
+/// One below `inner`, none above `outer`.
+Faded faded(double r, double inner, double outer) {
+  const double t = std::clamp((outer - r) / (outer - inner), 0.0, 1.0);
+  return {t * t * (3 - 2 * t), r > inner && r < outer ? -6 * t * (1 - t) / (outer - inner) : 0};
+}
+
+struct Covered {
+  double value = 1;
+  Vector3 gradient = Vector3::Zero(); // 1/m
+};
+
+/// What is left of a shift near the surface of the body.
+Covered covered(const topology::Domain& domain, const Vector3& x, double inset) {
+  Covered result;
+  if (!(inset > 0))
+    return result;
+  const double t = -domain.signed_distance(x) / inset;
+  if (t >= 1)
+    return result;
+  result.value = t > 0 ? t * t * (3 - 2 * t) : 0;
+  if (t > 0)
+    result.gradient = -6 * t * (1 - t) / inset * domain.normal(x);
+  return result;
+}
+
+[[noreturn]] void throw_leaves(const Vector3& front, double outer) {
+  throw InputError(fmt::format("energy release: the tube of radius {:.3g} m around the front at ({:.6g}, {:.6g}, "
+                               "{:.6g}) m leaves the body",
+                               outer, front.x(), front.y(), front.z()));
+}
+
+} // namespace
+
+/// Of the shift at a point; zero where q is.
+struct EnergyMomentum::Shift {
+  double q = 0;
+  Vector3 gradient = Vector3::Zero(); // of q, 1/m
+  Vector3 ahead = Vector3::Zero(), normal = Vector3::Zero(), tangent = Vector3::Zero();
+  double turn = 0; // 1/m, of the way ahead per length along the tangent
+};
+
+/// A point of the sheet behind the front.
+struct EnergyMomentum::FacePlace {
+  Vector3 position, ahead, normal;
+  double weight = 0; // q dS, m2
+  double off = 0;    // m, from the sheet, that counts as on its face
+};
+
+EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficients,
+                               const std::function<FibreFrame(const Vector3& x)>& fibres)
+    : body_(body), coefficients_(coefficients) {
+  if (coefficients.size() != 3 * static_cast<Eigen::Index>(body.size()))
+    throw InputError(fmt::format("energy release: {} coefficients for {} nodes; there are 3 a node",
+                                 coefficients.size(), body.size()));
+  const PointTable& table = body.points();
+  const DilatationBlocks& blocks = body.blocks();
+  const Law& law = body.law();
+  const auto lanes = static_cast<std::size_t>(point_lanes);
+  gradients_.assign(lanes * table.groups(), Matrix3::Zero());
+  of_points_ = gradients_;
+  std::vector<double> mean(blocks.volume.size(), 0);
+  for (int group = 0; group < table.groups(); ++group) {
+    LaneValues f[9];
+    const std::span<const int> nodes = table.nodes_of(group);
+    deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table.gradients_of(group), coefficients.data(),
+                          f);
+    for (int lane = 0; lane < table.count[group]; ++lane) {
+      Matrix3 deformation;
+      for (int k = 0; k < 9; ++k)
+        deformation.data()[k] = f[k].value[lane];
+      const double j = deformation.determinant();
+      if (body.minds_volume() && !(j > 0)) {
+        const Vector3& x = table.positions[lanes * group + lane];
+        throw InputError(
+            fmt::format("energy release: J = {:.3g} at ({:.6g}, {:.6g}, {:.6g}) m; the law has no energy there", j,
+                        x.x(), x.y(), x.z()));
+      }
+      if (blocks.size() > 0)
+        mean[blocks.block[group]] += table.weights[group].value[lane] * j / blocks.volume[blocks.block[group]];
+      gradients_[lanes * group + lane] = deformation - Matrix3::Identity();
+    }
+  }
+  if (blocks.size() > 0)
+    of_blocks_ = of_points_;
+  const double own = body.pointwise_share(), shared = 1 - own;
+  for (int group = 0; group < table.groups(); ++group)
+    for (int lane = 0; lane < table.count[group]; ++lane) {
+      const std::size_t point = lanes * group + lane;
+      const Matrix3 deformation = gradients_[point] + Matrix3::Identity();
+      std::vector<FibreFrame> frame;
+      if (fibres)
+        frame.push_back(fibres(table.positions[point]));
+      double energy = 0;
+      Matrix3 stress;
+      law.evaluate_isochoric({&deformation, 1}, frame, {&energy, 1}, {&stress, 1});
+      const auto tensor = [&](double volumetric, double pressure, const Matrix3& cofactor) -> Matrix3 {
+        return (energy + volumetric) * Matrix3::Identity() -
+               gradients_[point].transpose() * (stress + pressure * cofactor);
+      };
+      if (!body.minds_volume()) {
+        of_points_[point] = tensor(0, 0, Matrix3::Zero());
+        continue;
+      }
+      const double j = deformation.determinant();
+      const Matrix3 cofactor = j * deformation.inverse().transpose();
+      const double volumetric = law.volumetric_energy(j), pressure = law.pressure(j);
+      of_points_[point] = tensor(volumetric, pressure, cofactor);
+      if (blocks.size() == 0)
+        continue;
+      const double jb = mean[blocks.block[group]], pb = law.pressure(jb);
+      of_blocks_[point] = tensor(own * volumetric + shared * (law.volumetric_energy(jb) + pb * (j - jb)),
+                                 own * pressure + shared * pb, cofactor);
+    }
+}
+
+template <class ShiftAt>
+EnergyRelease EnergyMomentum::integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor) const {
+  const PointTable& table = body_.points();
+  const std::vector<Matrix3>& tensor =
+      pressure == ReleasePressure::blocks && !of_blocks_.empty() ? of_blocks_ : of_points_;
+  const auto& body_force = body_.problem().loads.body_force;
+  EnergyRelease sum;
+  for (int group = 0; group < table.groups(); ++group)
+    for (int lane = 0; lane < table.count[group]; ++lane) {
+      const std::size_t point = static_cast<std::size_t>(point_lanes) * group + lane;
+      const Vector3& x = table.positions[point];
+      const Shift shift = shift_at(x);
+      if (shift.q == 0)
+        continue;
+      const Matrix3& s = tensor[point];
+      const double weight = table.weights[group].value[lane];
+      sum.rate -=
+          weight * (shift.ahead.dot(s * shift.gradient) + shift.q * shift.turn * shift.tangent.dot(s * shift.tangent));
+      if (body_force) {
+        const Vector3 pull = load_factor * weight * shift.q * gradients_[point].transpose() * body_force(x);
+        sum.rate -= shift.ahead.dot(pull);
+      }
+    }
+  return sum;
+}
+
+// On a face P n = t: e . S n = -t . H e along the sheet.
+void EnergyMomentum::add_faces(const std::vector<FacePlace>& places, double load_factor, EnergyRelease& sum) const {
+  const auto& lip_traction = body_.problem().loads.lip_traction;
+  if (!lip_traction)
+    return;
+  const topology::Incision& incision = *body_.problem().incision;
+  for (const FacePlace& place : places)
+    for (const double side : {1.0, -1.0}) {
+      Vector3 at = place.position + side * place.off * place.normal;
+      if (const auto face = incision.closest(place.position, 100 * place.off); face && !face->on_border)
+        at = face->point + side * place.off * face->normal;
+      const Vector3 traction = load_factor * lip_traction(at, -side * place.normal);
+      const Matrix3 h = body_.at(at, coefficients_).deformation - Matrix3::Identity();
+      sum.rate -= place.weight * traction.dot(h * place.ahead);
+    }
+}
+
+EnergyRelease EnergyMomentum::at(const topology::FrontFrame& front, const ReleaseOptions& options,
+                                 double load_factor) const {
+  check_release(options);
+  if (!options.half_length)
+    return mean(options, load_factor);
+  const topology::Incision& incision = incision_with_front(body_);
+  const topology::Domain& domain = *body_.problem().domain;
+  const double h = spacing_at_front(body_.problem().nodes, front.point);
+  const double inner = options.inner * h, outer = options.outer * h, half = *options.half_length * h,
+               inset = options.inset * h;
+  const double curvature = front_curvature(incision, front, h);
+  if (std::abs(curvature) * std::max(outer, half) > widest_release_turn)
+    throw InputError(fmt::format("energy release: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
+                                 front.point.x(), front.point.y(), front.point.z()));
+  // Along the front the place is an arc in the plane of the cut.
+  const auto along_front = [&](double s) -> Vector3 {
+    const double turn = curvature * s;
+    const double chord = std::abs(turn) < 1e-4 ? s : std::sin(turn) / curvature;
+    const double sag = std::abs(turn) < 1e-4 ? 0.5 * turn * s : (1 - std::cos(turn)) / curvature;
+    return chord * front.tangent - sag * front.ahead;
+  };
+  const auto bump = [&](double s) { // of the shift along the front
+    const double t = s / half, rest = 1 - t * t;
+    return std::abs(t) < 1 ? Faded{rest * rest, -4 * t * rest / half} : Faded{};
+  };
+  const auto axes_at = [&](double s, Shift& shift) {
+    const double c = std::cos(curvature * s), sine = std::sin(curvature * s);
+    shift.ahead = c * front.ahead + sine * front.tangent;
+    shift.tangent = c * front.tangent - sine * front.ahead;
+    shift.normal = front.normal;
+  };
+  const auto shift_at = [&](const Vector3& x) {
+    Shift shift;
+    const Vector3 away = x - front.point;
+    const double above = away.dot(front.normal);
+    double ahead = away.dot(front.ahead), along = away.dot(front.tangent);
+    if (std::abs(above) >= outer || std::abs(along) > half + outer || std::abs(ahead) > half + outer)
+      return shift;
+    double stretch = 1; // length along the front out here over that on the front
+    if (std::abs(curvature) * half > 1e-4) {
+      const double radius = 1 / curvature, out = radius + ahead, reach = std::hypot(out, along);
+      ahead = std::copysign(reach, radius) - radius;
+      along = std::atan2(std::copysign(1.0, radius) * along, std::abs(out)) * radius;
+      stretch = 1 + curvature * ahead;
+    }
+    const double r = std::hypot(ahead, above);
+    const Faded across = faded(r, inner, outer), lengthwise = bump(along);
+    const Covered cover = covered(domain, x, inset);
+    shift.q = across.value * lengthwise.value * cover.value;
+    if (shift.q == 0)
+      return shift;
+    axes_at(along, shift);
+    shift.turn = curvature / stretch;
+    shift.gradient = across.value * lengthwise.value * cover.gradient +
+                     across.value * cover.value * lengthwise.slope / stretch * shift.tangent;
+    if (across.slope != 0)
+      shift.gradient +=
+          across.slope * lengthwise.value * cover.value / r * (ahead * shift.ahead + above * shift.normal);
+    return shift;
+  };
+  if (inset == 0)
+    for (const double s : {-half, 0.0, half})
+      for (int c = 0; c < 8; ++c) {
+        Shift axes;
+        axes_at(s, axes);
+        const double angle = c * std::numbers::pi / 4;
+        if (domain.signed_distance(front.point + along_front(s) + outer * std::cos(angle) * axes.ahead +
+                                   outer * std::sin(angle) * axes.normal) > 0)
+          throw_leaves(front.point, outer);
+      }
+  EnergyRelease sum = integrate(shift_at, options.pressure, load_factor);
+  std::vector<FacePlace> faces;
+  for (int a = 0; a < front_points; ++a) {
+    const double s = half * ((2 * a + 1.0) / front_points - 1), ds = 2 * half / front_points;
+    sum.length += ds * bump(s).value * covered(domain, front.point + along_front(s), inset).value;
+  }
+  constexpr int along_faces = 8;
+  for (int a = 0; a < along_faces; ++a)
+    for (int b = 0; b < face_points; ++b) {
+      const double s = half * ((2 * a + 1.0) / along_faces - 1), ds = 2 * half / along_faces;
+      const double t = (b + 0.5) / face_points, r = outer * t * t;
+      Shift axes;
+      axes_at(s, axes);
+      FacePlace place{front.point + along_front(s) - r * axes.ahead, axes.ahead, axes.normal};
+      place.weight = ds * 2 * outer * t / face_points * (1 - curvature * r) * faded(r, inner, outer).value *
+                     bump(s).value * covered(domain, place.position, inset).value;
+      place.off = std::min(lip_offset * h, 1e-3 * r);
+      if (place.weight != 0)
+        faces.push_back(place);
+    }
+  if (!(sum.length > 0))
+    throw InputError(
+        fmt::format("energy release: the shift at ({:.6g}, {:.6g}, {:.6g}) m lies in the {:.3g} m below the "
+                    "surface where it fades",
+                    front.point.x(), front.point.y(), front.point.z(), inset));
+  add_faces(faces, load_factor, sum);
+  sum.rate /= sum.length;
+  return sum;
+}
+
+EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_factor) const {
+  check_release(options);
+  const topology::Incision& incision = incision_with_front(body_);
+  const topology::Domain& domain = *body_.problem().domain;
+  const NodeCloud& nodes = body_.problem().nodes;
+  const std::vector<topology::FrontSegment>& front = incision.front();
+  double longest = 0;
+  for (const topology::FrontSegment& segment : front)
+    longest = std::max({longest, spacing_at_front(nodes, segment.from), spacing_at_front(nodes, segment.to)});
+  const double inner = options.inner * longest, outer = options.outer * longest, inset = options.inset * longest;
+  const auto shift_at = [&](const Vector3& x) {
+    Shift shift;
+    const auto frame = incision.front_frame(x, outer);
+    if (!frame)
+      return shift;
+    const Vector3 away = x - frame->point;
+    const double ahead = away.dot(frame->ahead), above = away.dot(frame->normal), r = std::hypot(ahead, above);
+    const Faded across = faded(r, inner, outer);
+    const Covered cover = covered(domain, x, inset);
+    shift.q = across.value * cover.value;
+    if (shift.q == 0)
+      return shift;
+    shift.ahead = frame->ahead;
+    shift.normal = frame->normal;
+    shift.tangent = frame->tangent;
+    const double curvature = front_curvature(incision, *frame, longest);
+    shift.turn = curvature / std::max(0.1, 1 + curvature * ahead);
+    shift.gradient = across.value * cover.gradient;
+    if (across.slope != 0)
+      shift.gradient += across.slope * cover.value / r * (ahead * shift.ahead + above * shift.normal);
+    return shift;
+  };
+  EnergyRelease sum = integrate(shift_at, options.pressure, load_factor);
+  std::vector<FacePlace> faces;
+  const double step = 0.25 * longest;
+  for (int k = 0; k < std::ssize(front); ++k) {
+    const double length = (front[k].to - front[k].from).norm();
+    const int parts = std::max(1, static_cast<int>(std::ceil(length / step)));
+    for (int a = 0; a < parts; ++a) {
+      const topology::FrontFrame frame = incision.front_frame_at(k, (a + 0.5) / parts);
+      sum.length += length / parts * covered(domain, frame.point, inset).value;
+      const double curvature = front_curvature(incision, frame, longest);
+      if (std::abs(curvature) * outer > widest_release_turn)
+        throw InputError(fmt::format("energy release: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
+                                     frame.point.x(), frame.point.y(), frame.point.z()));
+      if (inset == 0)
+        for (int c = 0; c < 8; ++c) {
+          const double angle = c * std::numbers::pi / 4;
+          const Vector3 x = frame.point + outer * (std::cos(angle) * frame.ahead + std::sin(angle) * frame.normal);
+          if (domain.signed_distance(x) > 0 && std::abs(domain.normal(x).dot(frame.ahead)) > parallel_skin)
+            throw_leaves(frame.point, outer);
+        }
+      for (int b = 0; b < face_points; ++b) {
+        const double t = (b + 0.5) / face_points, r = outer * t * t;
+        FacePlace place{frame.point - r * frame.ahead, frame.ahead, frame.normal};
+        if (domain.signed_distance(place.position) > 0)
+          continue;
+        place.weight = length / parts * 2 * outer * t / face_points * (1 - curvature * r) *
+                       faded(r, inner, outer).value * covered(domain, place.position, inset).value;
+        place.off = std::min(lip_offset * longest, 1e-3 * r);
+        if (place.weight != 0)
+          faces.push_back(place);
+      }
+    }
+  }
+  if (!(sum.length > 0))
+    throw InputError(fmt::format("energy release: all of the front lies in the {:.3g} m below the surface where the "
+                                 "shift fades",
+                                 inset));
+  add_faces(faces, load_factor, sum);
+  sum.rate /= sum.length;
+  return sum;
+}
+
+} // namespace spherecut::solvers
