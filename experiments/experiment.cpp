@@ -73,6 +73,9 @@ const std::vector<Experiment>& all_experiments() {
        run_finite_locking},
       {"truth_cube", "a silicone cube under plate and ball: fitted at the smallest compression, the others predicted",
        run_truth_cube},
+      {"liver_blade", "a straight edge through a block of liver: force a millimetre, indentation before the cut",
+       run_liver_blade},
+      {"push_slice", "an edge that slices as it pushes: forces and onset against the slice-push ratio", run_push_slice},
   };
   return experiments;
 }

@@ -55,8 +55,11 @@ solvers::Problem finite_block(const FiniteBlock& block) {
   solvers::Problem problem;
   problem.domain = topology::make_box_domain(block.lower, block.upper, block.spacing);
   if (block.graded) {
+    if (!block.sheets.empty())
+      problem.incision = std::make_shared<topology::Incision>(block.sheets, problem.domain);
     solvers::SprinkleOptions options;
     options.spacing = *block.graded;
+    options.incision = problem.incision;
     options.random_seed = block.seed;
     problem.nodes = solvers::sprinkle(*problem.domain, options).nodes;
     hold_faces(problem, block);

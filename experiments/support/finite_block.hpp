@@ -17,6 +17,7 @@ struct FiniteBlock {
   std::uint64_t seed = 1;
   HeldFaces held{};
   std::optional<solvers::SpacingField> graded{}; // nodes are sprinkled so, in place of the grid
+  std::vector<topology::SurfaceMesh> sheets{};   // of a cut; only with sprinkled nodes
 };
 
 /// Nodes on a grid of about the spacing, or sprinkled. Entries are one per node and axis, or, where every face is held
