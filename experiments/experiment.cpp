@@ -76,6 +76,9 @@ const std::vector<Experiment>& all_experiments() {
       {"liver_blade", "a straight edge through a block of liver: force a millimetre, indentation before the cut",
        run_liver_blade},
       {"push_slice", "an edge that slices as it pushes: forces and onset against the slice-push ratio", run_push_slice},
+      {"wire_cutting", "force of a wire against its radius: plateau, transition, slope", run_wire_cutting},
+      {"skin_wound", "a piece cut out of stretched skin: its shrinking gives the stretch, the hole is predicted",
+       run_skin_wound},
   };
   return experiments;
 }
