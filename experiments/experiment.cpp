@@ -78,6 +78,12 @@ const std::vector<Experiment>& all_experiments() {
       {"gaping", "a cut through half of a block stretched by 20 and 40 % opens as in finite elements", run_gaping},
       {"truth_cube", "a silicone cube under plate and ball: fitted at the smallest compression, the others predicted",
        run_truth_cube},
+      {"liver_blade", "a straight edge through a block of liver: force a millimetre, indentation before the cut",
+       run_liver_blade},
+      {"push_slice", "an edge that slices as it pushes: forces and onset against the slice-push ratio", run_push_slice},
+      {"wire_cutting", "force of a wire against its radius: plateau, transition, slope", run_wire_cutting},
+      {"skin_wound", "a piece cut out of stretched skin: its shrinking gives the stretch, the hole is predicted",
+       run_skin_wound},
   };
   return experiments;
 }

@@ -4,11 +4,10 @@
 // Reference: the force of steady cutting, G_c times the width of the front; the force and depth of the first rupture on
 //            other spacings; work = G_c area + stored energy + friction.
 // Command:   spherecut experiment run cutting_force --out DIR
-#include "experiments/cutting_force/block.hpp"
 #include "experiments/registered.hpp"
+#include "experiments/support/cutting_run.hpp"
 
 #include "src/output/figure.hpp"
-#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <array>
@@ -20,32 +19,8 @@ namespace spherecut::experiments {
 
 namespace {
 
-using solvers::BladeState;
-
 constexpr double toughness = 0.33; // J/m2: 0.3 m of plane modulus
-constexpr double first_reach = 2;  // m, no first cut comes later
 constexpr double blunt_sharpness = 0.75;
-constexpr double stroke = 0.05; // m, of the blade between two looks
-
-struct Rupture {
-  double length = 0, blade = std::numeric_limits<double>::infinity(), force = 0; // m, m, N
-};
-
-/// The first cut: of all lengths, the one whose energy is there first.
-Rupture first_rupture(const CuttingBody& uncut, const std::vector<CuttingBody>& cuts, double needed_per_depth) {
-  Rupture first;
-  for (const CuttingBody& cut : cuts)
-    for (double blade = 0; blade < std::min(first_reach, first.blade); blade += stroke)
-      if (const auto share = solvers::cutting_share(uncut.patch, uncut.stroke(blade, blade + stroke), cut.patch,
-                                                    cut.stroke(blade, blade + stroke), needed_per_depth * cut.depth)) {
-        if (const double at = blade + *share * stroke; at < first.blade)
-          first = {cut.depth, at, push_blade(uncut.patch, uncut.advance(at)).edge_force.norm()};
-        break;
-      }
-  if (first.length == 0)
-    throw NumericalError(fmt::format("the blade does not cut within {} m", first_reach));
-  return first;
-}
 
 std::vector<CuttingBody> cut_to(const CuttingCase& block, const CuttingBody& uncut, const std::vector<double>& depths) {
   std::vector<CuttingBody> cuts;
@@ -55,90 +30,13 @@ std::vector<CuttingBody> cut_to(const CuttingCase& block, const CuttingBody& unc
   return cuts;
 }
 
-/// A whole cut: from the first touch to a depth, increment by increment.
-struct Run {
-  std::vector<double> blade, force; // m, N: of the blade
-  double steady = 0;                // N, mean over the way of the blade while the front is far from both ends
-  double rupture_force = 0, rupture_blade = 0, after_rupture = 0;
-  solvers::BladeLedger ledger;
-};
-
-class Cutting {
- public:
-  Cutting(const CuttingCase& block, double first, double increment, double sharpness)
-      : block_(block), increment_(increment), sharpness_(sharpness), now_(cutting_body(block_, 0, nullptr)),
-        next_(cutting_body(block_, first, &now_.nodes)), state_(push_blade(now_.patch, now_.advance(0))) {}
-
-  Run to(double depth, double steady_from) {
-    double steady_work = 0, steady_way = 0, pending_work = 0, pending_way = 0;
-    while (now_.depth < depth) {
-      if (blade_ > depth + first_reach)
-        throw NumericalError(fmt::format("the blade has gone {:.2f} m and cut {:.2f} m", blade_, now_.depth));
-      const double drag = block_.shear > 0 && now_.depth > 0 ? 1 : 0;
-      const double needed = toughness / sharpness_ * (next_.depth - now_.depth) * block_.front();
-      const auto way = now_.stroke(blade_, blade_ + stroke);
-      const auto share =
-          solvers::cutting_share(now_.patch, way, next_.patch, next_.stroke(blade_, blade_ + stroke), needed, drag);
-      const double reached = blade_ + stroke * share.value_or(1);
-      advance(reached, drag);
-      pending_work += 0.5 * (force_before_ + run_.force.back()) * (reached - blade_);
-      pending_way += reached - blade_;
-      blade_ = reached;
-      if (!share)
-        continue;
-      cut();
-      if (now_.depth - increment_ >= steady_from) { // whole increments, from one cut to the next
-        steady_work += pending_work;
-        steady_way += pending_way;
-      }
-      pending_work = pending_way = 0;
-    }
-    run_.steady = steady_work / steady_way;
-    return run_;
-  }
-
- private:
-  /// Moves the blade in short parts, so that the forces change evenly over each.
-  void advance(double reached, double drag) {
-    constexpr int parts = 20;
-    force_before_ = -state_.blade_force.x();
-    for (int k = 1; k <= parts; ++k) {
-      const double at = blade_ + (reached - blade_) * k / parts;
-      const BladeState next = push_blade(now_.patch, now_.advance(at), drag);
-      run_.ledger.move(now_.patch, state_, next, next.advance - state_.advance, (reached - blade_) / parts);
-      state_ = next;
-    }
-    note(reached);
-  }
-
-  void cut() {
-    if (now_.depth == 0) {
-      run_.rupture_force = -state_.blade_force.x();
-      run_.rupture_blade = blade_;
-    }
-    const double area = (next_.depth - now_.depth) * block_.front();
-    const BladeState after = push_blade(next_.patch, next_.advance(blade_), block_.shear > 0 ? 1 : 0);
-    run_.ledger.cut(state_, after, toughness, sharpness_, area);
-    state_ = after;
-    if (now_.depth == 0)
-      run_.after_rupture = -state_.blade_force.x();
-    now_ = std::move(next_);
-    next_ = cutting_body(block_, now_.depth + increment_, &now_.nodes);
-    note(blade_);
-  }
-
-  void note(double blade) {
-    run_.blade.push_back(blade);
-    run_.force.push_back(-state_.blade_force.x());
-  }
-
-  CuttingCase block_;
-  double increment_, sharpness_;
-  CuttingBody now_, next_;
-  BladeState state_;
-  double blade_ = 0, force_before_ = 0;
-  Run run_;
-};
+/// From nothing through the first cut to a depth.
+std::vector<double> depths_to(double depth, double first, double increment) {
+  std::vector<double> depths{0, first};
+  while (depths.back() < depth)
+    depths.push_back(depths.back() + increment);
+  return depths;
+}
 
 } // namespace
 
@@ -166,9 +64,9 @@ std::vector<Check> run_cutting_force(const ExperimentContext& context) {
       block.path = lengths.back();
       const CuttingBody uncut = cutting_body(block, 0, nullptr);
       const std::vector<CuttingBody> cuts = cut_to(block, uncut, lengths);
-      const Rupture rupture = first_rupture(uncut, cuts, toughness * block.front());
+      const Rupture rupture = first_rupture(block, uncut, cuts, {toughness});
       if (spacing == spacings.front())
-        first_length = {rupture.length, first_rupture(uncut, cuts, toughness / blunt_sharpness * block.front()).length};
+        first_length = {rupture.length, first_rupture(block, uncut, cuts, {toughness, blunt_sharpness}).length};
       least_force = std::min(least_force, rupture.force);
       most_force = std::max(most_force, rupture.force);
       least_blade = std::min(least_blade, rupture.blade);
@@ -190,7 +88,9 @@ std::vector<Check> run_cutting_force(const ExperimentContext& context) {
         block.flank = 0.3;
         block.shear = 0.05;
       }
-      const Run run = Cutting(block, first_length[ideal ? 0 : 1], increment, sharpness).to(depth, steady_from);
+      const std::vector<CuttingBody> bodies =
+          cutting_bodies(block, depths_to(depth, first_length[ideal ? 0 : 1], increment));
+      const CuttingRun run = run_blade(block, bodies, {toughness, sharpness}, steady_from);
       const double cutting = toughness / sharpness * block.front();
       const double wanted = cutting + 2 * block.shear * block.flank * block.front();
       const solvers::BladeLedger& ledger = run.ledger;

@@ -59,8 +59,8 @@ solvers::Problem finite_block(const FiniteBlock& block) {
   if (block.graded) {
     solvers::SprinkleOptions options;
     options.spacing = *block.graded;
-    options.random_seed = block.seed;
     options.incision = problem.incision;
+    options.random_seed = block.seed;
     problem.nodes = solvers::sprinkle(*problem.domain, options).nodes;
     hold_faces(problem, block);
     return problem;

@@ -59,9 +59,16 @@ double edge_half_width(const Material& material, double edge_radius, double toug
   return std::sqrt(4 * edge_radius * toughness / (std::numbers::pi * plane_modulus));
 }
 
+Vector3 EdgeContact::ahead() const {
+  if (edge.isZero(0))
+    return push;
+  const Vector3 across = normal.cross(edge).normalized();
+  return across.dot(push) < 0 ? Vector3(-across) : across;
+}
+
 ForcePattern edge_pattern(const EdgeContact& contact, double half_width, const topology::Domain& domain) {
   ForcePattern pattern;
-  const Vector3 along = contact.push.cross(contact.normal).normalized();
+  const Vector3 ahead = contact.ahead(), along = ahead.cross(contact.normal).normalized();
   double total = 0;
   std::vector<double> weights;
   for (std::size_t r = 0; r < radial.size(); ++r)
@@ -69,7 +76,7 @@ ForcePattern edge_pattern(const EdgeContact& contact, double half_width, const t
       for (const double share : lengthwise) {
         const double angle = std::numbers::pi * ((k + 0.5) / around - 0.5);
         const Vector3 x = contact.point + share * contact.length * along +
-                          radial[r] * half_width * (std::cos(angle) * contact.push + std::sin(angle) * contact.normal);
+                          radial[r] * half_width * (std::cos(angle) * ahead + std::sin(angle) * contact.normal);
         if (domain.signed_distance(x) > 0)
           continue;
         pattern.points.push_back(x);
@@ -249,7 +256,7 @@ double energy_release(const BladePatch& patch, const BladeState& state, const Ve
   const Eigen::Index m = count(patch);
   double swept = 0;
   for (Eigen::Index c = 0; c < m; ++c)
-    swept += motion[c] * patch.contacts[static_cast<std::size_t>(c)].length;
+    swept += motion[c] * patch.contacts[static_cast<std::size_t>(c)].swept_width();
   if (!(swept > 0))
     throw InputError(fmt::format("the edge sweeps an area of {} m2; it must be positive", swept));
   double power = state.forces.head(m).dot(motion);

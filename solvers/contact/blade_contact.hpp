@@ -40,13 +40,18 @@ double edge_half_width(const Material& material, double edge_radius, double toug
 /// A piece of the edge and the material it stands against, rest frame.
 struct EdgeContact {
   Vector3 point = Vector3::Zero();   // m, on the front or, where nothing is cut, on the surface
-  Vector3 push = -Vector3::UnitZ();  // unit, its way, across the edge
+  Vector3 push = -Vector3::UnitZ();  // unit, its way, across the edge unless that is given
   Vector3 normal = Vector3::UnitX(); // unit, of the sheet that it makes; across `push`
   double length = 0;                 // m, of edge
+  Vector3 edge = Vector3::Zero(); // unit, across `normal`, not along `push`: of an edge that slices; zero: it does not
+  /// Of the sheet's front, in the sheet and across the edge, on the side of `push`.
+  [[nodiscard]] Vector3 ahead() const;
+  /// Area that a metre of its way cuts, m.
+  [[nodiscard]] double swept_width() const { return length * push.dot(ahead()); }
   bool operator==(const EdgeContact&) const = default;
 };
 
-/// One newton along `push`, spread over the half disc of radius `half_width` ahead of the contact with the weight
+/// One newton along `push`, spread over the half disc of radius `half_width` ahead of the edge with the weight
 /// 1 - (r/b)^2, along its length. Points outside the body are left out. Throws InputError when none is inside.
 ForcePattern edge_pattern(const EdgeContact& contact, double half_width, const topology::Domain& domain);
 

