@@ -185,7 +185,7 @@ int percentile(std::vector<int> values, double part) {
 } // namespace
 
 std::vector<Check> run_tissue_fuzz(const ExperimentContext& context) {
-  const int runs = context.quick ? 8 : 800;
+  const int runs = context.quick ? 8 : 400;
   std::vector<Tally> of_law(laws);
   app::OutputFile notes(context.out / "notes.txt");
   for (int seed = 0; seed < runs; ++seed) {
