@@ -15,13 +15,13 @@ using experiments::FiniteBlock;
 
 namespace {
 
-constexpr double half_length = 1.2, strip_depth = 0.2, spacing = 0.1; // m
+constexpr double half_length = 1.2, strip_depth = 0.2, apart = 0.1; // m
 
 /// A strip 1 m high between clamps and sliding sides, cut along its middle up to x = tip. Its nodes lie in rows about
 /// the cut, the same whatever the tip.
 FiniteBlock cut_strip(double tip, double depth = strip_depth) {
   FiniteBlock block{
-      .lower = {-half_length, -0.55, 0}, .upper = {half_length, 0.55, depth}, .spacing = spacing, .jitter = 0};
+      .lower = {-half_length, -0.55, 0}, .upper = {half_length, 0.55, depth}, .spacing = apart, .jitter = 0};
   block.held[2].fill(true);
   block.held[3].fill(true);
   block.held[4][2] = block.held[5][2] = true;
@@ -115,7 +115,7 @@ TEST_CASE("The release is what the energy loses as the cut grows, whatever drive
         return -drive.pressure * normal;
       };
     // Nodes and cells of three quarters of a spacing repeat themselves after three: what they leave wrong does, too.
-    constexpr double step = 3 * spacing, tip = 0.01;
+    constexpr double step = 3 * apart, tip = 0.01;
     const auto strip = [&](double at) {
       return pulled_strip(cut_strip(at), drive.nu, drive.stretch, drive.slide, loads);
     };
