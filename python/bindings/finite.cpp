@@ -271,11 +271,12 @@ void bind_equilibrium(py::module_& module) {
           "(n, 3), m, of the state (a copy).")
       .def(
           "set_coefficients",
-          [](BodyEquilibrium& self, const Doubles& coefficients) {
+          [](BodyEquilibrium& self, const Doubles& coefficients, double load_factor) {
             const VectorX u = coefficients_from(coefficients, self.body->body->size());
-            with_equilibrium(self, [&](Equilibrium& e) { e.set_coefficients(u); });
+            with_equilibrium(self, [&](Equilibrium& e) { e.set_coefficients(u, load_factor); });
           },
-          "coefficients"_a, "Begins from these, (n, 3), m.")
+          "coefficients"_a, "load_factor"_a = 0.0,
+          "Begins from these, (n, 3), m, as from a state with that part of the loads.")
       .def_property_readonly(
           "constraint_forces",
           [](BodyEquilibrium& self) {

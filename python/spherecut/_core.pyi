@@ -706,8 +706,8 @@ class Equilibrium:
     @property
     def coefficients(self) -> npt.NDArray[Any]:
         """(n, 3), m, of the state (a copy)."""
-    def set_coefficients(self, coefficients: npt.ArrayLike) -> None:
-        """Begins from these, (n, 3), m."""
+    def set_coefficients(self, coefficients: npt.ArrayLike, load_factor: float = 0.0) -> None:
+        """Begins from these, (n, 3), m, as from a state with that part of the loads."""
     @property
     def constraint_forces(self) -> npt.NDArray[Any]:
         """(k, 3), N, on the body, of every entry that is held."""

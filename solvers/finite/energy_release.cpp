@@ -110,6 +110,8 @@ struct EnergyMomentum::FacePlace {
 EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficients,
                                const std::function<FibreFrame(const Vector3& x)>& fibres)
     : body_(body), coefficients_(coefficients) {
+  if (!body.options().prony.empty())
+    throw InputError("energy release: the body is viscoelastic; allowed: one without a Prony series");
   if (coefficients.size() != 3 * static_cast<Eigen::Index>(body.size()))
     throw InputError(fmt::format("energy release: {} coefficients for {} nodes; there are 3 a node",
                                  coefficients.size(), body.size()));

@@ -46,8 +46,9 @@ struct EnergyRelease {
 /// S at every point of a deformed body.
 class EnergyMomentum {
  public:
-  /// The body outlives it. `fibres`: as the body was given them. Throws InputError for coefficients of another number
-  /// and for a state with some J <= 0 that the law cannot be asked about.
+  /// The body outlives it. `fibres`: as the body was given them. Throws InputError for coefficients of another number,
+  /// for a state with some J <= 0 that the law cannot be asked about, and for a viscoelastic body: what has faded has
+  /// no energy that the integral could take.
   EnergyMomentum(const FiniteBody& body, const VectorX& coefficients,
                  const std::function<FibreFrame(const Vector3& x)>& fibres = nullptr);
 

@@ -55,9 +55,11 @@ Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& optio
     body.evaluate(state_.coefficients, forces_);
     VectorX free = forces_.forces;
     body.held().clear_held(free);
-    prestrain_forces_ = free.norm();
+    double lasting = 1; // of the sudden forces
+    for (const PronyTerm& term : body.options().prony)
+      lasting -= term.share;
+    prestrain_forces_ = lasting * free.norm();
   }
-  reactions_.assign(body.held().entries().size(), Vector3::Zero());
 }
 
 void Equilibrium::set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates) {
@@ -79,11 +81,21 @@ void Equilibrium::set_lips(std::vector<LipPair> pairs) {
   has_before_ = false;
 }
 
-void Equilibrium::set_coefficients(const VectorX& coefficients) {
+void Equilibrium::set_coefficients(const VectorX& coefficients, double load_factor,
+                                   const std::optional<topology::ToolPose>& tool) {
   if (coefficients.size() != 3 * static_cast<Eigen::Index>(body_.size()) || !coefficients.allFinite())
     throw InputError(fmt::format("{} coefficients for {} nodes; 3 finite numbers a node are wanted",
                                  coefficients.size(), body_.size()));
+  if (!std::isfinite(load_factor))
+    throw InputError(fmt::format("load factor {} is not finite", load_factor));
+  if (tool)
+    topology::check(*tool);
   state_.coefficients = coefficients;
+  state_.load_factor = load_factor;
+  state_.tool = tool;
+  std::fill(state_.contact_forces.begin(), state_.contact_forces.end(), 0.0);
+  std::fill(state_.lip_forces.begin(), state_.lip_forces.end(), 0.0);
+  reactions_.assign(body_.held().entries().size(), Vector3::Zero());
   state_.prescribed.clear();
   for (const DisplacementMean& mean : body_.held().means())
     state_.prescribed.push_back(mean.of(coefficients));

@@ -69,8 +69,10 @@ class Equilibrium {
   EquilibriumStatus solve(const FiniteLoading& loading);
 
   [[nodiscard]] const VectorX& coefficients() const { return state_.coefficients; } // m, 3 a node
-  /// Begins from these; nothing is remembered of the way.
-  void set_coefficients(const VectorX& coefficients);
+  /// Begins from these, as from a state with that part of the loads and the tool there (empty: nowhere), to which a
+  /// halved step goes back. Nothing is remembered of the way, nor of forces of contact.
+  void set_coefficients(const VectorX& coefficients, double load_factor = 0,
+                        const std::optional<topology::ToolPose>& tool = std::nullopt);
   /// Force of the constraint of every prescribed entry on the body, N.
   [[nodiscard]] const std::vector<Vector3>& constraint_forces() const { return reactions_; }
   [[nodiscard]] const FiniteContact* contact() const { return contact_ ? &*contact_ : nullptr; }

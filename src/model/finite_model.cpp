@@ -108,8 +108,8 @@ FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const t
     : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario),
             fibre_field(scenario.law)),
       equilibrium_(body_, equilibrium_options()), is_prestrained_(!scenario.pretension.isZero(0)),
-      lips_open_(scenario.cut.lips == solvers::LipCondition::open), pairs_(body_, nodes.pairs) {
-  if (!nodes.pairs.empty() && !lips_open_)
+      pairs_(body_, nodes.pairs) {
+  if (!nodes.pairs.empty() && scenario.cut.lips != solvers::LipCondition::open)
     equilibrium_.set_lips(nodes.pairs);
   if (!touched)
     return;
@@ -171,7 +171,7 @@ void FiniteModel::go_on_from(const BodyModel& before) {
   VectorX start(3 * static_cast<Eigen::Index>(nodes.size()));
   for (int i = 0; i < nodes.size(); ++i)
     start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(nodes.positions[i]).displacement;
-  equilibrium_.set_coefficients(start);
+  equilibrium_.set_coefficients(start, 1, before.finite != nullptr && tool_ ? before.finite->pose_ : std::nullopt);
 }
 
 void FiniteModel::begin_anew() {
@@ -179,8 +179,6 @@ void FiniteModel::begin_anew() {
 }
 
 std::vector<double> FiniteModel::openings() const {
-  if (const solvers::FiniteLips* lips = equilibrium_.lips())
-    return lips->openings(equilibrium_.coefficients());
   solvers::FiniteLips lips = pairs_;
   lips.turn(body_.piola_maps(equilibrium_.coefficients()));
   return lips.openings(equilibrium_.coefficients());
@@ -188,23 +186,33 @@ std::vector<double> FiniteModel::openings() const {
 
 // What acts before the tool comes, weight and pre-tension, has acted for ever.
 FiniteStep FiniteModel::solve(double time, const std::optional<topology::ToolPose>& pose) {
-  if (!body_.options().prony.empty()) {
-    double longest = 0;
-    for (const solvers::PronyTerm& term : body_.options().prony)
-      longest = std::max(longest, term.time);
-    if (!time_ && (!body_.loads().isZero(0) || is_prestrained_)) {
+  try {
+    if (!time_ && !has_settled_ && (!body_.loads().isZero(0) || is_prestrained_)) {
+      double longest = 0;
+      for (const solvers::PronyTerm& term : body_.options().prony)
+        longest = std::max(longest, term.time);
       body_.begin_step(solvers::FiniteBody::for_ever * longest);
-      static_cast<void>(equilibrium_.solve({}));
+      if (longest > 0)
+        static_cast<void>(equilibrium_.solve({}));
       body_.accept_step(equilibrium_.coefficients());
+      has_settled_ = true;
     }
     body_.begin_step(time_ ? std::max(0.0, time - *time_) : 0);
+    return solve_step(time, pose);
+  } catch (...) { // the step has not been: what is asked of the body is as of its last state
+    body_.begin_step(0);
+    throw;
   }
+}
+
+FiniteStep FiniteModel::solve_step(double time, const std::optional<topology::ToolPose>& pose) {
   solvers::FiniteLoading loading;
   if (tool_)
     loading.tool = pose;
   const solvers::EquilibriumStatus status = equilibrium_.solve(loading);
   body_.accept_step(equilibrium_.coefficients());
   time_ = time;
+  pose_ = loading.tool;
   FiniteStep step;
   step.force = status.tool_force;
   step.torque = status.tool_torque;

@@ -36,7 +36,8 @@ class FiniteModel {
   void begin_anew();
 
   /// Goes on to equilibrium at `time`, s, with the loads and the tool, which is nowhere when it has no pose. Throws
-  /// NumericalError: the state is then what it was before.
+  /// NumericalError: the state is then what it was before, but that a viscoelastic body may have come to rest under its
+  /// loads, as it does before its first step.
   FiniteStep solve(double time, const std::optional<topology::ToolPose>& pose);
 
   /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
@@ -59,18 +60,20 @@ class FiniteModel {
     std::vector<int> start{0}, nodes;
     std::vector<double> values;
   };
+  FiniteStep solve_step(double time, const std::optional<topology::ToolPose>& pose);
   void lay_skin();
   [[nodiscard]] double deepest(const topology::ToolPose& pose) const;
   void summarise_contact(FiniteStep& step) const;
 
   solvers::FiniteBody body_;
   solvers::Equilibrium equilibrium_;
-  std::vector<int> candidates_; // free nodes of the surface
-  std::vector<Vector3> rest_;   // m, of each the middle of its share
-  std::optional<double> time_;  // s, of the last solution
+  std::vector<int> candidates_;            // free nodes of the surface
+  std::vector<Vector3> rest_;              // m, of each the middle of its share
+  std::optional<double> time_;             // s, of the last solution
+  std::optional<topology::ToolPose> pose_; // of the tool then
+  bool has_settled_ = false;               // under the loads, before the first step
   bool is_prestrained_ = false;
-  bool lips_open_ = false;    // they may go through each other
-  solvers::FiniteLips pairs_; // then for their gaps alone
+  solvers::FiniteLips pairs_; // for their gaps
   std::optional<FiniteStep> last_;
   std::optional<topology::ToolShape> tool_;
   Skin skin_;

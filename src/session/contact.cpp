@@ -150,9 +150,9 @@ void Session::extend_fields(BodyModel& model) {
 // Displacements at the nodes, 3 a node, m; those asked for last are kept.
 const VectorX& Session::displacements_of(const BodyModel& model) const {
   const VectorX& coefficients = model.field.coefficients;
-  if (displaced_body_ != model.body.get() || displaced_coefficients_.size() != coefficients.size() ||
-      displaced_coefficients_ != coefficients) {
-    displaced_ = model.body->nodal_displacements(model.field);
+  if (model.finite != nullptr || displaced_body_ != model.body.get() ||
+      displaced_coefficients_.size() != coefficients.size() || displaced_coefficients_ != coefficients) {
+    displaced_ = model.nodal_displacements();
     displaced_coefficients_ = coefficients;
     displaced_body_ = model.body.get();
   }

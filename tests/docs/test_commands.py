@@ -69,7 +69,7 @@ HOW = [
      {"--system-site-packages": "--system-site-packages --without-pip"}),
     (rf"{S} experiment run NAME --out DIR \[--quick\]", "run_short", {"NAME": "patch_test", "[--quick]": "--quick"}),
     (rf"{S} experiment run \w+ --out DIR", "quick"),
-    (rf"{S} run scenarios/\w+\.toml --out (?:DIR|out/soft)", "run_coarse"),
+    (rf"{S} run scenarios/\w+\.toml --out (?:DIR|out/soft(?:_cut)?)", "run_coarse"),
     (rf"{S} run scenarios/liver(?:_live)?\.toml", "run_coarse", {".toml": ".toml --out out/named"}),
     (rf"{S} run /usr/share/spherecut/scenarios/liver_cut\.toml --out out/demo", "run_coarse", {"/usr/share/spherecut/": ""}),
     (rf"{S} serve --open", "serve"),

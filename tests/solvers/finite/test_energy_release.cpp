@@ -192,6 +192,8 @@ TEST_CASE("Releases that cannot be taken are refused in words") {
   whole.held[4].fill(true);
   const FiniteBody uncut(finite_block(whole), experiments::neo_hookean(1, 0.3));
   CHECK_THROWS_WITH(EnergyMomentum(uncut, VectorX::Zero(3 * uncut.size())).mean(), Catch::Contains("no cut"));
+  const FiniteBody fading(finite_block(whole), experiments::neo_hookean(1, 0.3), {.prony = {{0.5, 1}}});
+  CHECK_THROWS_WITH(EnergyMomentum(fading, VectorX::Zero(3 * fading.size())), Catch::Contains("viscoelastic"));
   VectorX inverted = VectorX::Zero(3 * uncut.size());
   for (int i = 0; i < uncut.size(); ++i)
     inverted[3 * i] = -2 * uncut.problem().nodes.positions[i].x();

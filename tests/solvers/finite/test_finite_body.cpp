@@ -348,6 +348,21 @@ TEST_CASE("A cut that is pressed together bears what the uncut block does, and o
   CHECK(error[0] > 0.05);
 }
 
+TEST_CASE("A state that is handed on is found at once, and one that begins at rest goes there again") {
+  Problem problem = finite_block(held_block(4, {4}));
+  problem.loads.body_force = [](const Vector3&) { return Vector3(0.1, 0, -0.2); };
+  const FiniteBody body(std::move(problem), experiments::neo_hookean(1, 0.45));
+  Equilibrium first(body), second(body);
+  static_cast<void>(first.solve({}));
+  second.set_coefficients(first.coefficients(), 1);
+  CHECK(second.solve({}).iterations <= 1);
+  CHECK((second.coefficients() - first.coefficients()).norm() < 2e-3 * first.coefficients().norm());
+  second.set_coefficients(VectorX::Zero(first.coefficients().size()));
+  CHECK(second.solve({}).iterations > 1);
+  CHECK((second.coefficients() - first.coefficients()).norm() < 1e-2 * first.coefficients().norm());
+  CHECK_THROWS_AS(second.set_coefficients(first.coefficients(), std::nan("")), InputError);
+}
+
 TEST_CASE("What has no equilibrium is refused in words and leaves the state as it was") {
   const FiniteBody body(finite_block(held_block(3, {4, 5})), experiments::neo_hookean(1, 0.45));
   EquilibriumOptions options;
