@@ -76,7 +76,7 @@ FiniteBody::~FiniteBody() = default;
 FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options,
                        const std::function<FibreFrame(const Vector3& x)>& fibres)
     : problem_(with_law(std::move(problem), law.get(), options)),
-      prestrain_(Matrix3::Identity() - problem_.loads.initial_strain), law_(with_prestrain(law, prestrain_)),
+      prestrain_(Matrix3::Identity() - problem_.loads.initial_strain), law_(with_prestrain(std::move(law), prestrain_)),
       options_(options), fibre_field_(fibres),
       spheres_(problem_.nodes.positions, problem_.nodes.spacings, options.support_radius, Basis::linear,
                worst_moment_condition, sight_about_cut(problem_, Method::galerkin, options.sight)),

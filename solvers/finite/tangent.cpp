@@ -126,7 +126,7 @@ void FiniteTangent::point_tangents(int group, const LaneValues* deformation, dou
       throw_with_place(error, body_.points().positions[static_cast<std::size_t>(point_lanes) * group + lane]);
     }
     if (body_.prony_ != nullptr)
-      body_.prony_->apply(static_cast<std::size_t>(body_.point_start_[group] + lane), d);
+      body_.prony_->apply(static_cast<std::size_t>(body_.point_start_[group]) + static_cast<std::size_t>(lane), d);
     if (minds) {
       Matrix3 c;
       c.col(0) = f.col(1).cross(f.col(2));

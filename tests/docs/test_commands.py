@@ -304,7 +304,7 @@ def quick(text: str, folder: Path) -> None:
         run(f"{text} --quick", folder)
     else:
         parse(text)
-        elsewhere(text, "tests/experiments/test_quick_experiments.cpp", f'require_quick_run_passes("{name}")')
+        elsewhere(text, "tests/experiments/test_quick_experiments.cpp", f'require_quick_run_passes("{name}"')
 
 
 def get(url: str) -> tuple[int, str]:
