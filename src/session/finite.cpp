@@ -53,6 +53,8 @@ void Session::solve_finite(double time, const std::optional<topology::ToolPose>&
   try {
     model.finite->solve(time, pose);
   } catch (const NumericalError&) {
+    if (model.finite->coefficients().isZero(0)) // it has begun there
+      throw;
     model.finite->begin_anew();
     model.finite->solve(time, pose);
   }

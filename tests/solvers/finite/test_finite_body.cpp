@@ -42,6 +42,22 @@ VectorX by_rank(const FiniteBody& body, const VectorX& v) {
   return ordered;
 }
 
+/// Energy, forces and tangent at u against central differences along a random direction.
+void check_derivatives(const FiniteBody& body, const VectorX& u) {
+  const VectorX d = VectorX::Random(u.size());
+  constexpr double small = 1e-6;
+  FiniteForces at, plus, minus;
+  body.evaluate(u, at);
+  body.evaluate(u + small * d, plus);
+  body.evaluate(u - small * d, minus);
+  CHECK((plus.energy - minus.energy) / (2 * small) == Approx(at.forces.dot(d)).epsilon(1e-6));
+  SparseMatrix lower;
+  body.tangent(u, 0, lower);
+  const VectorX product = lower.selfadjointView<Eigen::Lower>() * by_rank(body, d);
+  const VectorX difference = by_rank(body, (plus.forces - minus.forces) / (2 * small));
+  CHECK((product - difference).norm() < 1e-7 * difference.norm());
+}
+
 std::vector<Vector3> pressed_top(const FiniteBody& body, double depth) {
   return body.prescribed_values([&](const Vector3& x) { return Vector3(0, 0, x.z() > 1 - 1e-9 ? -depth : 0); });
 }
@@ -52,18 +68,7 @@ TEST_CASE("Forces are the slope of the energy, the tangent that of the forces") 
   for (const double nu : {0.3, 0.49}) {
     const FiniteBody body(finite_block(held_block(3, {4})), experiments::neo_hookean(2, nu));
     CHECK((nu > 0.4) == (body.blocks().size() > 0));
-    const VectorX u = disturbed(body), d = VectorX::Random(u.size());
-    constexpr double small = 1e-6;
-    FiniteForces at, plus, minus;
-    body.evaluate(u, at);
-    body.evaluate(u + small * d, plus);
-    body.evaluate(u - small * d, minus);
-    CHECK((plus.energy - minus.energy) / (2 * small) == Approx(at.forces.dot(d)).epsilon(1e-6));
-    SparseMatrix lower;
-    body.tangent(u, 0, lower);
-    const VectorX product = lower.selfadjointView<Eigen::Lower>() * by_rank(body, d);
-    const VectorX difference = by_rank(body, (plus.forces - minus.forces) / (2 * small));
-    CHECK((product - difference).norm() < 1e-7 * difference.norm());
+    check_derivatives(body, disturbed(body));
   }
 }
 
@@ -289,20 +294,10 @@ TEST_CASE("A confined viscoelastic block relaxes as its Prony series, and forget
 
 TEST_CASE("The tangent of a step of a viscoelastic body is that of its forces") {
   FiniteBody body(finite_block(held_block(3, {4})), experiments::neo_hookean(2, 0.49), {.prony = {{0.5, 1}}});
-  const VectorX u = disturbed(body), d = VectorX::Random(u.size());
+  const VectorX u = disturbed(body);
   body.accept_step(0.5 * u);
   body.begin_step(0.7);
-  constexpr double small = 1e-6;
-  FiniteForces at, plus, minus;
-  body.evaluate(u, at);
-  body.evaluate(u + small * d, plus);
-  body.evaluate(u - small * d, minus);
-  CHECK((plus.energy - minus.energy) / (2 * small) == Approx(at.forces.dot(d)).epsilon(1e-6));
-  SparseMatrix lower;
-  body.tangent(u, 0, lower);
-  const VectorX product = lower.selfadjointView<Eigen::Lower>() * by_rank(body, d);
-  const VectorX difference = by_rank(body, (plus.forces - minus.forces) / (2 * small));
-  CHECK((product - difference).norm() < 1e-7 * difference.norm());
+  check_derivatives(body, u);
 }
 
 TEST_CASE("A cut that is pressed together bears what the uncut block does, and opens when it is drawn") {
