@@ -21,6 +21,7 @@ constexpr double out_of_gap = 3;      // spacings: spheres that have grown reach
 constexpr double least_area = 0.5;    // of the squared spacing: what is smaller is roughness
 constexpr double longest_edge = 0.5;  // of a wall, in spacings
 constexpr double into_bottom = 1e-3;  // spacings
+constexpr double blunt = 0.6;         // spacings: the bottom of a wider gap is no front of a crack
 constexpr double inwards = 0.02;      // of the way to the middle of its triangles: a ray from a corner starts there
 constexpr double sharp_cosine = 0.77; // of 40 degrees
 constexpr double known_share = 0.5;   // of a patch: then its gap has a wall from the other side
@@ -40,6 +41,14 @@ Vector3 middle_of_triangle(const SurfaceMesh& mesh, int triangle) {
 double area_of_triangle(const SurfaceMesh& mesh, int triangle) {
   const Triangle& t = mesh.triangles[static_cast<std::size_t>(triangle)];
   return 0.5 * (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]).norm();
+}
+
+/// Whether it is more than a line, to rounding.
+bool has_area(const SurfaceMesh& mesh, int triangle) {
+  const Triangle& t = mesh.triangles[static_cast<std::size_t>(triangle)];
+  const Vector3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+  const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+  return (b - a).cross(c - a).norm() > 1e-9 * longest * longest;
 }
 
 /// The triangles for which `wanted` says so, with the vertices that they use.
@@ -134,11 +143,22 @@ std::vector<int> patches_of(const SurfaceMesh& mesh) {
   return patch;
 }
 
+double distance_to_segment(const Vector3& x, const Vector3& from, const Vector3& to) {
+  const Vector3 way = to - from;
+  const double share = std::clamp((x - from).dot(way) / std::max(way.squaredNorm(), 1e-300), 0.0, 1.0);
+  return (x - from - share * way).norm();
+}
+
 /// One side of a gap and its wall.
 class GapWall {
  public:
   GapWall(SurfaceMesh patch, const SurfaceRays& rays, const SpacingAt& spacing)
-      : patch_(std::move(patch)), rays_(rays), spacing_(spacing) {}
+      : patch_(std::move(patch)), rays_(rays), spacing_(spacing) {
+    leave_blunt_bottoms();
+  }
+
+  /// Nothing is left of it above a blunt bottom.
+  [[nodiscard]] bool empty() const { return patch_.triangles.empty(); }
 
   /// Half way from each triangle to the other side.
   [[nodiscard]] std::vector<Vector3> middles() const {
@@ -178,11 +198,66 @@ class GapWall {
     return met ? std::optional(met->point) : std::nullopt;
   }
 
+  [[nodiscard]] std::map<EdgeEnds, int> directed_edges() const {
+    std::map<EdgeEnds, int> directed;
+    for (int t = 0; t < std::ssize(patch_.triangles); ++t)
+      for (int e = 0; e < 3; ++e)
+        directed[{patch_.triangles[t][e], patch_.triangles[t][(e + 1) % 3]}] = t;
+    return directed;
+  }
+
+  /// In the surface, out of the patch.
+  [[nodiscard]] Vector3 way_out(const EdgeEnds& edge, int triangle) const {
+    return (patch_.vertices[edge.second] - patch_.vertices[edge.first])
+        .cross(triangle_normal(patch_, triangle))
+        .normalized();
+  }
+
+  /// Ends the patch at the centre of the largest circle that touches a blunt bottom and both sides: the stress at such
+  /// a bottom is not that at the front of a crack, which a border in the material would bring [Creager and Paris 1967:
+  /// its origin lies behind the bottom].
+  void leave_blunt_bottoms() {
+    struct Bottom {
+      Vector3 from, to, way; // way: out of the patch
+      double height;         // m, of the circle's centre above the edge
+    };
+    std::vector<Bottom> bottoms;
+    const std::map<EdgeEnds, int> directed = directed_edges();
+    for (const auto& [edge, triangle] : directed) {
+      if (directed.find({edge.second, edge.first}) != directed.end())
+        continue;
+      const Vector3 &from = patch_.vertices[edge.first], &to = patch_.vertices[edge.second];
+      const Vector3 normal = triangle_normal(patch_, triangle), middle = 0.5 * (from + to);
+      const Vector3 place = middle + inwards * (middle_of_triangle(patch_, triangle) - middle);
+      const auto half_way = across(place, normal);
+      const double h = spacing_(middle), half = half_way ? (*half_way - place).norm() : 0;
+      if (2 * half <= blunt * h)
+        continue;
+      const Vector3 way = way_out(edge, triangle);
+      const auto bottom = rays_.meet(*half_way, normal, way, out_of_gap * h);
+      if (bottom && bottom->width < half)
+        bottoms.push_back({from, to, way, half - bottom->width});
+    }
+    if (bottoms.empty())
+      return;
+    for (Vector3& x : patch_.vertices) {
+      const auto nearest = std::min_element(bottoms.begin(), bottoms.end(), [&](const Bottom& a, const Bottom& b) {
+        return distance_to_segment(x, a.from, a.to) < distance_to_segment(x, b.from, b.to);
+      });
+      if (distance_to_segment(x, nearest->from, nearest->to) < nearest->height)
+        x -= (nearest->height - (nearest->from - x).dot(nearest->way)) * nearest->way;
+    }
+    patch_ = triangles_of(patch_, [&](int t) { return has_area(patch_, t); });
+  }
+
   /// The vertex to which the wall goes on from v along `way`.
   int beyond(int v, const Vector3& way) {
-    const double h = spacing_(patch_.vertices[v]);
+    const double h = spacing_(patch_.vertices[v]), half = (wall_.vertices[v] - patch_.vertices[v]).norm();
     const auto bottom = rays_.meet(inner_[v], normals_[v], way, out_of_gap * h);
-    const double length = bottom ? bottom->width + into_bottom * h : out_of_gap * h;
+    const bool is_blunt = bottom && 2 * half > blunt * h;
+    const double length = !bottom    ? out_of_gap * h
+                          : is_blunt ? std::max(bottom->width - half, into_bottom * h)
+                                     : bottom->width + into_bottom * h;
     wall_.vertices.push_back(wall_.vertices[v] + length * way);
     return static_cast<int>(wall_.vertices.size()) - 1;
   }
@@ -192,18 +267,14 @@ class GapWall {
       int from, to;
       Vector3 way; // out of the patch
     };
-    std::map<EdgeEnds, int> directed;
-    for (int t = 0; t < std::ssize(patch_.triangles); ++t)
-      for (int e = 0; e < 3; ++e)
-        directed[{patch_.triangles[t][e], patch_.triangles[t][(e + 1) % 3]}] = t;
+    const std::map<EdgeEnds, int> directed = directed_edges();
     std::vector<BorderEdge> border;
     std::map<int, std::vector<int>> in, out; // border edges at a vertex
     for (const auto& [edge, triangle] : directed)
       if (const auto [a, b] = edge; directed.find({b, a}) == directed.end()) {
         in[b].push_back(static_cast<int>(border.size()));
         out[a].push_back(static_cast<int>(border.size()));
-        border.push_back(
-            {a, b, (patch_.vertices[b] - patch_.vertices[a]).cross(triangle_normal(patch_, triangle)).normalized()});
+        border.push_back({a, b, way_out(edge, triangle)});
       }
     std::vector<std::array<int, 2>> ends(border.size(), {-1, -1}); // beyond `from` and `to`
     for (const auto& [v, arriving] : in) {
@@ -233,10 +304,9 @@ class GapWall {
   }
 
   void add(const Triangle& corners) {
-    const Vector3 &a = wall_.vertices[corners[0]], &b = wall_.vertices[corners[1]], &c = wall_.vertices[corners[2]];
-    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    if ((b - a).cross(c - a).norm() > 1e-9 * longest * longest)
-      wall_.triangles.push_back(corners);
+    wall_.triangles.push_back(corners);
+    if (!has_area(wall_, static_cast<int>(wall_.triangles.size()) - 1))
+      wall_.triangles.pop_back();
   }
 
   SurfaceMesh patch_, wall_;
@@ -284,6 +354,8 @@ std::shared_ptr<const Incision> gap_walls(const std::shared_ptr<const Domain>& d
     if (relative[p] < least_area)
       continue;
     GapWall wall(triangles_of(sides, [&, patch = p](int t) { return patch_of[t] == patch; }), rays, spacing);
+    if (wall.empty())
+      continue;
     const std::vector<Vector3> middles = wall.middles();
     if (!taken.empty()) {
       const PointTree tree(taken);

@@ -11,8 +11,9 @@ namespace spherecut::topology {
 /// out of the surface meets the surface again within two spacings and the two sides face each other within 25 degrees;
 /// patches of less than half a squared spacing are roughness and count for nothing. A sheet stands half way between the
 /// sides of its gap. At the bottom of the gap it goes on into the material by a thousandth of the spacing, so that its
-/// border there is a front; elsewhere it reaches three spacings out of the gap, farther than spheres see. Null: the
-/// body has no such gap. `spacing` is that of the nodes at a place, m.
+/// border there is a front. Where the bottom is wider than 0.6 of the spacing it is none: there the sheet ends half the
+/// gap's width above the bottom. Elsewhere it reaches three spacings out of the gap, farther than spheres see. Null:
+/// the body has no such gap. `spacing` is that of the nodes at a place, m.
 std::shared_ptr<const Incision> gap_walls(const std::shared_ptr<const Domain>& domain,
                                           const std::function<double(const Vector3&)>& spacing);
 
