@@ -66,6 +66,9 @@ class AppendedBody final : public Discretisation, public Growable {
  private:
   void follow(const BoundingBox& region);
   void find_pieces();
+  void add_force(const Vector3& x, const Vector3& force);
+  [[nodiscard]] VectorX volume_loads_of_uncut() const;
+  void add_volume_loads_of_cut();
   void assemble_loads();
   [[nodiscard]] CutFunctional value_at(const Vector3& x) const;
   [[nodiscard]] bool is_dropped(PartId part) const { return !dropped_.empty() && dropped_[components_.of(part)] != 0; }

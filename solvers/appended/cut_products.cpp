@@ -63,13 +63,30 @@ struct CutSystem::CellProducts {
   std::vector<double> weights;                           // m3, of every one of them
   std::vector<int> twins, groups, new_twins, new_groups; // functions here, ascending
   std::vector<std::size_t> next;                         // entry of every twin, then of every group
-  MatrixX gradient;                                      // row: base function or twin; column 3 l + axis
-  MatrixX flat;                                          // the same of one axis
-  MatrixX pull;                                          // w g of new twins: row l, column 3 t + axis
+  bool is_plain = false;                                 // neither twins nor divided boxes: as in most cells
+  // Of the parts from `first` on, `count` of them:
+  std::size_t first = 0;
+  int count = 0;
+  std::array<double, lanes> weight{};
+  MatrixX gradient;          // row: base function or twin; column 3 l + axis
+  MatrixX flat;              // the same of one axis
+  MatrixX pull;              // w g of new twins: row l, column 3 t + axis
   MatrixX of_groups, stress; // row 3 t + m: gradients, column 9 l + 3 i + j; row 3 l + j: w sigma_ij of new ones
   MatrixX stress_columns;    // row 9 l + 3 i + j, column 3 t + m
+  // Over all parts:
   MatrixX with_groups, group_pairs, group_twin;
   std::array<MatrixX, 3> with_twins; // by axis of the gradient
+
+  /// Calls visit(lane, gradients) for the entries of a function at the parts that are at hand; `at`: its next entry.
+  template <class Visit>
+  void for_entries(const FunctionData& of, std::size_t& at, const Visit& visit) const {
+    for (int l = 0; l < count && at < of.parts.size(); ++l)
+      if (of.parts[at] == parts[first + l]) {
+        visit(l, of.gradients.data() + of.stride() * at);
+        if (of.is_sampled || first + l + 1 == parts.size() || parts[first + l + 1] != parts[first + l])
+          ++at;
+      }
+  }
 };
 
 void CutSystem::add_elastic(int first_new) {
@@ -99,6 +116,39 @@ void CutSystem::add_elastic(int first_new) {
     add_cell(cell, functions, work);
 }
 
+/// The parts of a cell with their volumes, and the functions that do not vanish there.
+void CutSystem::list_cell(int cell_index, std::span<const int> fresh, CellProducts& work) const {
+  const SmallBoxes& boxes = uncut_.boxes();
+  const BoxShapes& cell = boxes.cells()[cell_index];
+  for (auto* list : {&work.parts, &work.twins, &work.groups, &work.new_twins, &work.new_groups})
+    list->clear();
+  work.weights.clear();
+  for (int box = cell.first_box; box < cell.first_box + cell.boxes; ++box)
+    for (int k = 0; k < space_.cut().part_count(box); ++k) {
+      const PartId part = part_id(box, k);
+      const double volume = space_.cut().part(part).share * boxes.boxes()[box].volume;
+      if (space_.known_samples(part) == 1) {
+        work.parts.push_back(part);
+        work.weights.push_back(volume);
+        continue;
+      }
+      for (const PlacedSample& sample : space_.samples(part)) {
+        work.parts.push_back(part);
+        work.weights.push_back(sample.share * volume);
+      }
+    }
+  for (const int k : in_cell_[cell_index])
+    (data_[k].is_front ? work.groups : work.twins).push_back(k);
+  for (const int k : fresh)
+    (data_[k].is_front ? work.new_groups : work.new_twins).push_back(k);
+  work.next.clear();
+  for (const auto* list : {&work.twins, &work.groups})
+    for (const int k : *list)
+      work.next.push_back(static_cast<std::size_t>(
+          std::lower_bound(data_[k].parts.begin(), data_[k].parts.end(), work.parts.front()) - data_[k].parts.begin()));
+  work.is_plain = work.twins.empty() && std::ssize(work.parts) == cell.boxes;
+}
+
 // Products of the new functions with everything in a cell. With g the gradient of a base function or twin, and of a new
 // function the stress w sigma_m of its modes or w g of a twin,
 //
@@ -107,138 +157,124 @@ void CutSystem::add_elastic(int first_new) {
 //   group with group:         sum of grad_m : w sigma_n.
 void CutSystem::add_cell(int cell_index, std::span<const int> fresh, CellProducts& work) {
   constexpr int lanes = CellProducts::lanes;
-  const SmallBoxes& boxes = uncut_.boxes();
-  const BoxShapes& cell = boxes.cells()[cell_index];
-  const Material& material = uncut_.problem().material;
-  const double lambda = material.lame_lambda(), mu = material.shear_modulus();
-  auto& parts = work.parts;
-  auto &twins = work.twins, &groups = work.groups, &new_twins = work.new_twins, &new_groups = work.new_groups;
-  auto& next = work.next;
-  MatrixX &gradient = work.gradient, &flat = work.flat, &pull = work.pull, &of_groups = work.of_groups,
-          &stress = work.stress, &stress_columns = work.stress_columns, &with_groups = work.with_groups,
-          &group_pairs = work.group_pairs, &group_twin = work.group_twin;
-  auto& with_twins = work.with_twins;
-  for (auto* list : {&parts, &twins, &groups, &new_twins, &new_groups})
-    list->clear();
-  work.weights.clear();
-  for (int box = cell.first_box; box < cell.first_box + cell.boxes; ++box)
-    for (int k = 0; k < space_.cut().part_count(box); ++k) {
-      const PartId part = part_id(box, k);
-      const double volume = space_.cut().part(part).share * boxes.boxes()[box].volume;
-      if (space_.known_samples(part) == 1) {
-        parts.push_back(part);
-        work.weights.push_back(volume);
-        continue;
-      }
-      for (const PlacedSample& sample : space_.samples(part)) {
-        parts.push_back(part);
-        work.weights.push_back(sample.share * volume);
-      }
-    }
-  for (const int k : in_cell_[cell_index])
-    (data_[k].is_front ? groups : twins).push_back(k);
-  for (const int k : fresh)
-    (data_[k].is_front ? new_groups : new_twins).push_back(k);
-  const auto base = std::ssize(cell.nodes), twin_count = std::ssize(twins), group_count = std::ssize(groups),
-             fresh_twins = std::ssize(new_twins), fresh_groups = std::ssize(new_groups), rows = base + twin_count;
-  with_groups.setZero(rows, 9 * fresh_groups);
-  group_pairs.setZero(3 * group_count, 3 * fresh_groups);
-  group_twin.setZero(fresh_twins, 9 * group_count);
+  const BoxShapes& cell = uncut_.boxes().cells()[cell_index];
+  list_cell(cell_index, fresh, work);
+  const auto group_count = std::ssize(work.groups), fresh_twins = std::ssize(work.new_twins),
+             fresh_groups = std::ssize(work.new_groups), rows = std::ssize(cell.nodes) + std::ssize(work.twins);
+  work.with_groups.setZero(rows, 9 * fresh_groups);
+  work.group_pairs.setZero(3 * group_count, 3 * fresh_groups);
+  work.group_twin.setZero(fresh_twins, 9 * group_count);
   if (fresh_twins > 0)
-    for (MatrixX& products : with_twins)
+    for (MatrixX& products : work.with_twins)
       products.setZero(rows, 3 * fresh_twins);
-  next.clear();
-  for (const auto* list : {&twins, &groups})
-    for (const int k : *list)
-      next.push_back(static_cast<std::size_t>(
-          std::lower_bound(data_[k].parts.begin(), data_[k].parts.end(), parts.front()) - data_[k].parts.begin()));
-  // Most cells have neither twins nor divided boxes: the gradients are then those of the cell as they lie there.
-  const bool is_plain = twin_count == 0 && std::ssize(parts) == cell.boxes;
-  for (std::size_t first = 0; first < parts.size(); first += lanes) {
-    const int count = static_cast<int>(std::min<std::size_t>(lanes, parts.size() - first));
-    std::array<double, lanes> weight{};
-    std::copy_n(work.weights.begin() + static_cast<std::ptrdiff_t>(first), count, weight.begin());
-    const auto for_entries = [&](int k, std::size_t& at, auto&& visit) {
-      const FunctionData& of = data_[k];
-      for (int l = 0; l < count && at < of.parts.size(); ++l)
-        if (of.parts[at] == parts[first + l]) {
-          visit(l, of.gradients.data() + of.stride() * at);
-          if (of.is_sampled || first + l + 1 == parts.size() || parts[first + l + 1] != parts[first + l])
-            ++at;
-        }
-    };
-    if (!is_plain) {
-      gradient.setZero(rows, 3 * lanes);
-      for (int l = 0; l < count; ++l)
-        for (int a = 0; a < 3; ++a)
-          std::copy_n(cell.gradients.data() + (3 * boxes.lane_of(box_of(parts[first + l])) + a) * base, base,
-                      gradient.data() + (3 * l + a) * rows);
-      for (Eigen::Index t = 0; t < twin_count; ++t)
-        for_entries(twins[t], next[t], [&](int l, const double* g) {
-          for (int a = 0; a < 3; ++a)
-            gradient(base + t, 3 * l + a) = g[a];
-        });
-    }
-    if (fresh_twins > 0) {
-      pull.resize(lanes, 3 * fresh_twins);
-      for (Eigen::Index t = 0; t < fresh_twins; ++t) {
-        const auto row = base + (std::lower_bound(twins.begin(), twins.end(), new_twins[t]) - twins.begin());
-        for (int l = 0; l < lanes; ++l)
-          for (int a = 0; a < 3; ++a)
-            pull(l, 3 * t + a) = weight[l] * gradient(row, 3 * l + a);
-      }
-      flat.resize(rows, lanes);
-      for (int a = 0; a < 3; ++a) {
-        for (int l = 0; l < lanes; ++l)
-          flat.col(l) = gradient.col(3 * l + a);
-        add_product(1, flat, false, pull, with_twins[a]);
-      }
-    }
+  for (work.first = 0; work.first < work.parts.size(); work.first += lanes) {
+    work.count = static_cast<int>(std::min<std::size_t>(lanes, work.parts.size() - work.first));
+    work.weight.fill(0);
+    std::copy_n(work.weights.begin() + static_cast<std::ptrdiff_t>(work.first), work.count, work.weight.begin());
+    if (!work.is_plain)
+      gather_gradients(cell, work);
+    if (fresh_twins > 0)
+      multiply_twins(cell, work);
     if (group_count == 0)
       continue;
-    of_groups.setZero(3 * group_count, 9 * lanes);
-    stress.setZero(3 * lanes, 9 * fresh_groups);
-    stress_columns.setZero(9 * lanes, 3 * fresh_groups);
-    for (Eigen::Index t = 0; t < group_count; ++t) {
-      const auto at = std::lower_bound(new_groups.begin(), new_groups.end(), groups[t]);
-      const Eigen::Index own = at != new_groups.end() && *at == groups[t] ? at - new_groups.begin() : -1;
-      for_entries(groups[t], next[twin_count + t], [&](int l, const double* g) {
-        for (int m = 0; m < 3; ++m, g += 9) {
-          for (int e = 0; e < 9; ++e)
-            of_groups(3 * t + m, 9 * l + e) = g[e];
-          if (own < 0)
-            continue;
-          const double dilatation = lambda * (g[0] + g[4] + g[8]);
-          for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) {
-              const double sigma = weight[l] * (mu * (g[3 * i + j] + g[3 * j + i]) + (i == j ? dilatation : 0));
-              stress(3 * l + j, 9 * own + 3 * m + i) = sigma; // columns 3 m + c: component c of mode m
-              stress_columns(9 * l + 3 * i + j, 3 * own + m) = sigma;
-            }
-        }
-      });
-    }
-    if (is_plain)
+    gather_groups(work);
+    if (work.is_plain) // the gradients are those of the cell as they lie there
       add_product(static_cast<int>(rows), static_cast<int>(9 * fresh_groups), 3 * cell.boxes, cell.gradients.data(),
-                  static_cast<int>(base), stress.data(), 3 * lanes, with_groups.data(), static_cast<int>(rows));
+                  static_cast<int>(std::ssize(cell.nodes)), work.stress.data(), 3 * lanes, work.with_groups.data(),
+                  static_cast<int>(rows));
     else
-      add_product(1, gradient, false, stress, with_groups);
-    add_product(1, of_groups, false, stress_columns, group_pairs);
-    // Kept groups with new twins: the twins' w g against the stress of the groups.
-    for (Eigen::Index t = 0; t < group_count && fresh_twins > 0; ++t)
-      for (int l = 0; l < count; ++l)
-        for (int m = 0; m < 3; ++m) {
-          const auto at = [&](int i, int j) { return of_groups(3 * t + m, 9 * l + 3 * i + j); };
-          const double dilatation = lambda * (at(0, 0) + at(1, 1) + at(2, 2));
-          for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) {
-              const double sigma = mu * (at(i, j) + at(j, i)) + (i == j ? dilatation : 0);
-              for (Eigen::Index n = 0; n < fresh_twins; ++n)
-                group_twin(n, 9 * t + 3 * m + i) += sigma * pull(l, 3 * n + j);
-            }
-        }
+      add_product(1, work.gradient, false, work.stress, work.with_groups);
+    add_product(1, work.of_groups, false, work.stress_columns, work.group_pairs);
+    multiply_groups_with_twins(work);
   }
   distribute(cell_index, work);
+}
+
+/// Gradients of base functions and twins at the parts at hand.
+void CutSystem::gather_gradients(const BoxShapes& cell, CellProducts& work) const {
+  const SmallBoxes& boxes = uncut_.boxes();
+  const auto base = std::ssize(cell.nodes), twin_count = std::ssize(work.twins), rows = base + twin_count;
+  MatrixX& gradient = work.gradient;
+  gradient.setZero(rows, 3 * CellProducts::lanes);
+  for (int l = 0; l < work.count; ++l)
+    for (int a = 0; a < 3; ++a)
+      std::copy_n(cell.gradients.data() + (3 * boxes.lane_of(box_of(work.parts[work.first + l])) + a) * base, base,
+                  gradient.data() + (3 * l + a) * rows);
+  for (Eigen::Index t = 0; t < twin_count; ++t)
+    work.for_entries(data_[work.twins[t]], work.next[t], [&](int l, const double* g) {
+      for (int a = 0; a < 3; ++a)
+        gradient(base + t, 3 * l + a) = g[a];
+    });
+}
+
+/// Adds the products of base functions and twins with new twins.
+void CutSystem::multiply_twins(const BoxShapes& cell, CellProducts& work) {
+  constexpr int lanes = CellProducts::lanes;
+  const std::vector<int>& twins = work.twins;
+  const auto base = std::ssize(cell.nodes), fresh_twins = std::ssize(work.new_twins);
+  work.pull.resize(lanes, 3 * fresh_twins);
+  for (Eigen::Index t = 0; t < fresh_twins; ++t) {
+    const auto row = base + (std::lower_bound(twins.begin(), twins.end(), work.new_twins[t]) - twins.begin());
+    for (int l = 0; l < lanes; ++l)
+      for (int a = 0; a < 3; ++a)
+        work.pull(l, 3 * t + a) = work.weight[l] * work.gradient(row, 3 * l + a);
+  }
+  work.flat.resize(base + std::ssize(twins), lanes);
+  for (int a = 0; a < 3; ++a) {
+    for (int l = 0; l < lanes; ++l)
+      work.flat.col(l) = work.gradient.col(3 * l + a);
+    add_product(1, work.flat, false, work.pull, work.with_twins[a]);
+  }
+}
+
+/// Gradients of the groups at the parts at hand, and the stress of the new ones.
+void CutSystem::gather_groups(CellProducts& work) const {
+  constexpr int lanes = CellProducts::lanes;
+  const Material& material = uncut_.problem().material;
+  const double lambda = material.lame_lambda(), mu = material.shear_modulus();
+  const std::vector<int>&groups = work.groups, &new_groups = work.new_groups;
+  const auto group_count = std::ssize(groups), fresh_groups = std::ssize(new_groups);
+  work.of_groups.setZero(3 * group_count, 9 * lanes);
+  work.stress.setZero(3 * lanes, 9 * fresh_groups);
+  work.stress_columns.setZero(9 * lanes, 3 * fresh_groups);
+  for (Eigen::Index t = 0; t < group_count; ++t) {
+    const auto at = std::lower_bound(new_groups.begin(), new_groups.end(), groups[t]);
+    const Eigen::Index own = at != new_groups.end() && *at == groups[t] ? at - new_groups.begin() : -1;
+    work.for_entries(data_[groups[t]], work.next[work.twins.size() + t], [&](int l, const double* g) {
+      for (int m = 0; m < 3; ++m, g += 9) {
+        for (int e = 0; e < 9; ++e)
+          work.of_groups(3 * t + m, 9 * l + e) = g[e];
+        if (own < 0)
+          continue;
+        const double dilatation = lambda * (g[0] + g[4] + g[8]);
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j) {
+            const double sigma = work.weight[l] * (mu * (g[3 * i + j] + g[3 * j + i]) + (i == j ? dilatation : 0));
+            work.stress(3 * l + j, 9 * own + 3 * m + i) = sigma; // columns 3 m + c: component c of mode m
+            work.stress_columns(9 * l + 3 * i + j, 3 * own + m) = sigma;
+          }
+      }
+    });
+  }
+}
+
+/// Kept groups with new twins: the twins' w g against the stress of the groups.
+void CutSystem::multiply_groups_with_twins(CellProducts& work) const {
+  const Material& material = uncut_.problem().material;
+  const double lambda = material.lame_lambda(), mu = material.shear_modulus();
+  const auto fresh_twins = std::ssize(work.new_twins);
+  for (Eigen::Index t = 0; t < std::ssize(work.groups) && fresh_twins > 0; ++t)
+    for (int l = 0; l < work.count; ++l)
+      for (int m = 0; m < 3; ++m) {
+        const auto at = [&](int i, int j) { return work.of_groups(3 * t + m, 9 * l + 3 * i + j); };
+        const double dilatation = lambda * (at(0, 0) + at(1, 1) + at(2, 2));
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j) {
+            const double sigma = mu * (at(i, j) + at(j, i)) + (i == j ? dilatation : 0);
+            for (Eigen::Index n = 0; n < fresh_twins; ++n)
+              work.group_twin(n, 9 * t + 3 * m + i) += sigma * work.pull(l, 3 * n + j);
+          }
+      }
 }
 
 // The sums of a cell go to where they belong.

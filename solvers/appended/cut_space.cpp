@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <set>
 
 namespace spherecut::solvers {
 
@@ -136,20 +135,12 @@ PlacedPart& CutSpace::place_of(PartId part) const {
   return *known;
 }
 
-// Components of the parts in reach of a sphere: its node's own one, and a twin for each of the others. Where all hang
-// together although a sheet divides some, the sphere has a step.
-void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
-  faint_[node].clear();
-  const std::vector<int>& reach = boxes_in_reach(node);
-  if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
-    return;
-  std::vector<PartId> parts;
-  for (const int box : reach)
-    for (int k = 0; k < cut_.part_count(box); ++k) {
-      local_[part_id(box, k)] = static_cast<int>(parts.size());
-      parts.push_back(part_id(box, k));
-    }
-  std::vector<int> component(parts.size(), -1);
+/// The connected components of some parts, numbered from the first part on: that of each, and how many there are.
+/// local_ tells the place of each part when this returns.
+int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>& component) {
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    local_[parts[k]] = static_cast<int>(k);
+  component.assign(parts.size(), -1);
   int count = 0;
   std::vector<int> pending;
   for (std::size_t start = 0; start < parts.size(); ++start) {
@@ -170,25 +161,41 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
     }
     ++count;
   }
-  const Vector3& x = spheres_.centres()[node];
-  const int own_place = local_[cut_.part_at(x, *incision_)];
+  return count;
+}
+
+/// Energy of a sphere in a part, but for the material.
+double CutSpace::energy_in(int node, PartId part) const {
+  const int box = box_of(part);
+  const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
+  const auto at = std::lower_bound(cell.nodes.begin(), cell.nodes.end(), node);
+  if (at == cell.nodes.end() || *at != node)
+    return 0;
+  return cut_.part(part).share * boxes_.boxes()[box].volume *
+         cell.gradient_at(at - cell.nodes.begin(), boxes_.lane_of(box)).squaredNorm();
+}
+
+// Components of the parts in reach of a sphere: its node's own one, and a twin for each of the others. Where all hang
+// together although a sheet divides some, the sphere has a step.
+void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
+  faint_[node].clear();
+  const std::vector<int>& reach = boxes_in_reach(node);
+  if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
+    return;
+  std::vector<PartId> parts;
+  for (const int box : reach)
+    for (int k = 0; k < cut_.part_count(box); ++k)
+      parts.push_back(part_id(box, k));
+  std::vector<int> component;
+  const int count = find_components(parts, component);
+  const int own_place = local_[cut_.part_at(spheres_.centres()[node], *incision_)];
   const int own = own_place < 0 ? component.front() : component[own_place];
   for (const PartId part : parts)
     local_[part] = -1;
-  // Energy of the sphere in a part, but for the material. A component in which it has none asks for nothing.
-  const auto energy_in = [&](PartId part) {
-    const int box = box_of(part);
-    const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
-    const auto at = std::lower_bound(cell.nodes.begin(), cell.nodes.end(), node);
-    if (at == cell.nodes.end() || *at != node)
-      return 0.0;
-    return cut_.part(part).share * boxes_.boxes()[box].volume *
-           cell.gradient_at(at - cell.nodes.begin(), boxes_.lane_of(box)).squaredNorm();
-  };
   std::vector<double> energy(static_cast<std::size_t>(count), 0.0);
   double whole = 0;
   for (std::size_t k = 0; k < parts.size() && count > 1; ++k) {
-    const double own_share = energy_in(parts[k]);
+    const double own_share = energy_in(node, parts[k]);
     energy[component[k]] += own_share;
     whole += own_share;
   }
@@ -202,13 +209,17 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
         function.twin.hidden.push_back(parts[k]);
     if (energy[c] < faint * whole)
       faint_[node].insert(faint_[node].end(), function.twin.hidden.begin(), function.twin.hidden.end());
-    if (energy[c] > 0)
+    if (energy[c] > 0) // a component in which it has none asks for nothing
       found.push_back(std::move(function));
   }
   std::sort(faint_[node].begin(), faint_[node].end());
-  if (count > 1 || options_.step_reach <= 0)
-    return;
-  // The front ends in the sphere, or passes beside it.
+  if (count == 1 && options_.step_reach > 0)
+    add_step(node, std::move(parts), found);
+}
+
+/// The step of a sphere in which the front ends, or beside which it passes, where its run is curved.
+void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const {
+  const Vector3& x = spheres_.centres()[node];
   const double radius = spheres_.radii()[node];
   const auto nearest = incision_->front_frame(x, 2 * radius);
   if (!nearest || curved_[nearest->segment] == 0 || !incision_->closest(x, radius))
@@ -282,13 +293,9 @@ void CutSpace::find_curved_front() {
   }
 }
 
-CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> incision, const BoundingBox& region) {
-  incision_ = std::move(incision);
-  // Parts whose boxes, or whose places with respect to the front, are others now.
-  std::vector<int> divided = cut_.update(*incision_, region);
-  std::vector<char> changed(boxes_.size(), 0);
-  for (const int box : divided)
-    changed[box] = 1;
+/// Forgets the places of parts whose nearest place of the front is another one now: changed[box] becomes 2, unless the
+/// box itself is another (1).
+void CutSpace::follow_places(const BoundingBox& region, std::vector<char>& changed) {
   // The nearest place of the front changes where the front did. Far from what has changed it is where it was.
   const auto is_far = [&](const Vector3& x, double radius, const PlacedPart& before) {
     const double away = (x - region.lower.cwiseMax(x.cwiseMin(region.upper))).norm();
@@ -320,14 +327,10 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
       changed[box] = 2;
     }
   }
-  std::vector<char> cell_changed(boxes_.cells().size(), 0);
-  for (int box = 0; box < boxes_.size(); ++box)
-    if (changed[box] != 0)
-      cell_changed[boxes_.cell_of(box)] = 1;
+}
 
-  // Twins of spheres in reach of what has changed are found anew.
-  const std::vector<char> was_curved = std::move(curved_);
-  find_curved_front();
+/// Nodes whose twins or steps may be others now.
+std::set<int> CutSpace::concerned_nodes(const std::vector<char>& changed, bool has_curved) const {
   std::set<int> concerned;
   for (int box = 0; box < boxes_.size(); ++box)
     if (changed[box] == 1) {
@@ -339,58 +342,90 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
                  at.centre + at.half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1))))
           concerned.insert(node);
     }
-  const auto any = [](const std::vector<char>& flags) {
-    return std::any_of(flags.begin(), flags.end(), [](char is) { return is != 0; });
-  };
-  if (any(was_curved) || any(curved_)) // a step comes or goes with its run
+  if (has_curved) // a step comes or goes with its run
     for (int box = 0; box < boxes_.size(); ++box)
       if (cut_.is_divided(box))
         for (const int node : boxes_.cells()[boxes_.cell_of(box)].nodes)
           concerned.insert(node);
-  std::vector<CutFunction> wanted;
+  return concerned;
+}
+
+/// Functions that there are to be, and which of them the ones before are.
+struct CutSpace::Wanted {
+  std::vector<CutFunction> twins;
+  std::vector<FrontGroup> groups;
+  std::vector<char> twin_taken, group_taken;
+};
+
+bool CutSpace::front_stays(const CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const {
+  for (std::size_t g = 0; g < wanted.groups.size(); ++g)
+    if (wanted.group_taken[g] == 0 && wanted.groups[g] == old.group) {
+      const std::vector<int> cells = cells_of(old);
+      if (std::none_of(cells.begin(), cells.end(), [&](int cell) { return cell_changed[cell] != 0; })) {
+        wanted.group_taken[g] = 1;
+        return true;
+      }
+    }
+  return false;
+}
+
+bool CutSpace::twin_stays(const CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned,
+                          Wanted& wanted) {
+  const bool is_concerned = concerned.contains(old.twin.node);
+  if (!is_concerned && !old.twin.is_step)
+    return true;
+  const bool is_touched = std::any_of(old.twin.hidden.begin(), old.twin.hidden.end(), [&](PartId part) {
+    return changed[box_of(part)] == 1 || (old.twin.is_step && changed[box_of(part)] != 0);
+  });
+  if (!is_concerned) {
+    if (is_touched) { // a step whose front has moved on elsewhere
+      add_twins(old.twin.node, wanted.twins);
+      wanted.twin_taken.resize(wanted.twins.size(), 0);
+    }
+    return !is_touched;
+  }
+  for (std::size_t w = 0; w < wanted.twins.size(); ++w) {
+    const Twin& twin = wanted.twins[w].twin;
+    if (wanted.twin_taken[w] == 0 && twin.node == old.twin.node && twin.is_step == old.twin.is_step &&
+        twin.step_at_node == old.twin.step_at_node && twin.hidden == old.twin.hidden && !is_touched) {
+      wanted.twin_taken[w] = 1;
+      return true;
+    }
+  }
+  return false;
+}
+
+CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> incision, const BoundingBox& region) {
+  incision_ = std::move(incision);
+  // Parts whose boxes (1), or whose places with respect to the front (2), are others now.
+  std::vector<char> changed(boxes_.size(), 0);
+  for (const int box : cut_.update(*incision_, region))
+    changed[box] = 1;
+  follow_places(region, changed);
+  std::vector<char> cell_changed(boxes_.cells().size(), 0);
+  for (int box = 0; box < boxes_.size(); ++box)
+    if (changed[box] != 0)
+      cell_changed[boxes_.cell_of(box)] = 1;
+
+  // Twins of spheres in reach of what has changed are found anew.
+  const std::vector<char> was_curved = std::move(curved_);
+  find_curved_front();
+  const auto any = [](const std::vector<char>& flags) {
+    return std::any_of(flags.begin(), flags.end(), [](char is) { return is != 0; });
+  };
+  const std::set<int> concerned = concerned_nodes(changed, any(was_curved) || any(curved_));
+  Wanted wanted;
   for (const int node : concerned)
-    add_twins(node, wanted);
-  std::vector<FrontGroup> groups = front_groups(*incision_, nodes_, options_.front);
+    add_twins(node, wanted.twins);
+  wanted.groups = front_groups(*incision_, nodes_, options_.front);
+  wanted.twin_taken.assign(wanted.twins.size(), 0);
+  wanted.group_taken.assign(wanted.groups.size(), 0);
 
   Change change;
   std::vector<CutFunction> next;
-  std::vector<char> twin_taken(wanted.size(), 0), group_taken(groups.size(), 0);
   for (int k = 0; k < std::ssize(functions_); ++k) {
     CutFunction& old = functions_[k];
-    bool stays = false;
-    if (old.is_front) {
-      for (std::size_t g = 0; g < groups.size() && !stays; ++g)
-        if (group_taken[g] == 0 && groups[g] == old.group) {
-          const std::vector<int> cells = cells_of(old);
-          stays = std::none_of(cells.begin(), cells.end(), [&](int cell) { return cell_changed[cell] != 0; });
-          if (stays)
-            group_taken[g] = 1;
-        }
-    } else if (!concerned.contains(old.twin.node) && !old.twin.is_step) {
-      stays = true;
-    } else {
-      const bool is_touched = std::any_of(old.twin.hidden.begin(), old.twin.hidden.end(), [&](PartId part) {
-        return changed[box_of(part)] == 1 || (old.twin.is_step && changed[box_of(part)] != 0);
-      });
-      if (!concerned.contains(old.twin.node)) {
-        stays = !is_touched;
-        if (!stays) { // a step whose front has moved on elsewhere
-          std::vector<CutFunction> anew;
-          add_twins(old.twin.node, anew);
-          wanted.insert(wanted.end(), anew.begin(), anew.end());
-          twin_taken.resize(wanted.size(), 0);
-        }
-      } else {
-        for (std::size_t w = 0; w < wanted.size() && !stays; ++w)
-          if (twin_taken[w] == 0 && wanted[w].twin.node == old.twin.node &&
-              wanted[w].twin.is_step == old.twin.is_step && wanted[w].twin.step_at_node == old.twin.step_at_node &&
-              wanted[w].twin.hidden == old.twin.hidden && !is_touched) {
-            stays = true;
-            twin_taken[w] = 1;
-          }
-      }
-    }
-    if (stays) {
+    if (old.is_front ? front_stays(old, cell_changed, wanted) : twin_stays(old, changed, concerned, wanted)) {
       change.kept.push_back(k);
       next.push_back(std::move(old));
     }
@@ -400,17 +435,23 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
     next.push_back(std::move(function));
     ++change.added;
   };
-  for (std::size_t w = 0; w < wanted.size(); ++w)
-    if (twin_taken[w] == 0)
-      append(std::move(wanted[w]));
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    if (group_taken[g] == 0) {
+  for (std::size_t w = 0; w < wanted.twins.size(); ++w)
+    if (wanted.twin_taken[w] == 0)
+      append(std::move(wanted.twins[w]));
+  for (std::size_t g = 0; g < wanted.groups.size(); ++g)
+    if (wanted.group_taken[g] == 0) {
       CutFunction function;
       function.is_front = true;
-      function.group = std::move(groups[g]);
+      function.group = std::move(wanted.groups[g]);
       append(std::move(function));
     }
   functions_ = std::move(next);
+  list_by_node();
+  return change;
+}
+
+/// Twins and groups of every node.
+void CutSpace::list_by_node() {
   for (std::size_t j = 0; j < twins_of_.size(); ++j) {
     twins_of_[j].clear();
     groups_of_[j].clear();
@@ -427,7 +468,6 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
       group_weights_[function.group.nodes[n]].push_back(function.group.weights[n]);
     }
   }
-  return change;
 }
 
 std::vector<int> CutSpace::cells_of(const CutFunction& function) const {

@@ -6,6 +6,7 @@
 #include "solvers/appended/front_functions.hpp"
 
 #include <memory>
+#include <set>
 
 namespace spherecut::solvers {
 
@@ -124,7 +125,17 @@ class CutSpace {
   /// Boxes that the sphere of a node may reach, ascending; kept.
   [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
   void add_twins(int node, std::vector<CutFunction>& found);
+  int find_components(const std::vector<PartId>& parts, std::vector<int>& component);
+  [[nodiscard]] double energy_in(int node, PartId part) const;
+  void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
   void find_curved_front();
+  void follow_places(const BoundingBox& region, std::vector<char>& changed);
+  [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool has_curved) const;
+  struct Wanted;
+  bool front_stays(const CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const;
+  bool twin_stays(const CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned,
+                  Wanted& wanted);
+  void list_by_node();
   [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedSample& placed) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
   /// Place of a part with respect to the front, kept until the front about it changes.

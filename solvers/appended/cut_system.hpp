@@ -106,6 +106,11 @@ class CutSystem {
   void solve_multipliers();
   struct CellProducts;
   void add_cell(int cell, std::span<const int> fresh, CellProducts& work);
+  void list_cell(int cell, std::span<const int> fresh, CellProducts& work) const;
+  void gather_gradients(const BoxShapes& cell, CellProducts& work) const;
+  static void multiply_twins(const BoxShapes& cell, CellProducts& work);
+  void gather_groups(CellProducts& work) const;
+  void multiply_groups_with_twins(CellProducts& work) const;
   void distribute(int cell, const CellProducts& work);
 
   const UncutBody& uncut_;

@@ -96,56 +96,77 @@ std::optional<FrontPlace> front_place(const topology::Incision& incision, const 
   return place;
 }
 
-std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
-                                     const FrontOptions& options) {
-  std::vector<FrontGroup> groups;
-  const std::vector<topology::FrontSegment>& front = incision.front();
-  if (front.empty() || options.radius <= 0 || options.rings < 1)
+namespace {
+
+/// Stations along the runs of a front, and the nodes about it in their hats.
+class FrontStations {
+ public:
+  FrontStations(const topology::Incision& incision, const NodeCloud& nodes, const FrontOptions& options)
+      : incision_(incision), front_(incision.front()), nodes_(nodes), options_(options), tree_(nodes.positions),
+        run_of_(front_.size(), -1), place_in_run_(front_.size(), 0) {
+    for (FrontRun& run : front_runs(incision))
+      runs_.push_back({std::move(run), {}, false});
+    for (int r = 0; r < std::ssize(runs_); ++r)
+      measure(r);
+    of_run_.resize(runs_.size());
+    for (int r = 0; r < std::ssize(runs_); ++r)
+      put_stations(r);
+  }
+
+  [[nodiscard]] std::vector<FrontGroup> groups() const {
+    std::vector<FrontGroup> groups;
+    double widest = 0;
+    for (const FrontStation& station : all_) {
+      widest = std::max(widest, station.spacing);
+      for (int ring = 0; ring < options_.rings; ++ring)
+        groups.push_back({station, ring, {}, {}});
+    }
+    for (int j = 0; j < nodes_.size(); ++j)
+      add_node(j, widest, groups);
+    std::erase_if(groups, [](const FrontGroup& group) { return group.nodes.empty(); });
     return groups;
-  const topology::PointTree tree(nodes.positions);
-  const auto spacing_at = [&](const Vector3& x) { return nodes.spacings[tree.nearest(x).index]; };
-  std::vector<MeasuredRun> runs;
-  for (FrontRun& run : front_runs(incision))
-    runs.push_back({std::move(run), {}, false});
-  std::vector<int> run_of(front.size(), -1), place_in_run(front.size(), 0);
-  for (int r = 0; r < std::ssize(runs); ++r) {
-    MeasuredRun& run = runs[r];
+  }
+
+ private:
+  struct Stations {
+    std::vector<double> at; // spacings, along the run
+    int first = 0;          // among all stations
+  };
+
+  [[nodiscard]] double spacing_at(const Vector3& x) const { return nodes_.spacings[tree_.nearest(x).index]; }
+
+  void measure(int r) {
+    MeasuredRun& run = runs_[r];
     run.measure.assign(1, 0);
     for (int k = 0; k < std::ssize(run.segments); ++k) {
-      const topology::FrontSegment& segment = front[run.segments[k]];
-      run_of[run.segments[k]] = r;
-      place_in_run[run.segments[k]] = k;
+      const topology::FrontSegment& segment = front_[run.segments[k]];
+      run_of_[run.segments[k]] = r;
+      place_in_run_[run.segments[k]] = k;
       run.measure.push_back(run.measure.back() +
                             (segment.to - segment.from).norm() / spacing_at(0.5 * (segment.from + segment.to)));
     }
     if (!run.closed) {
       // The older end, whose place in the sheet came first: it stays where it is as the other end grows.
-      const topology::FrontSegment &first = front[run.segments.front()], &last = front[run.segments.back()];
+      const topology::FrontSegment &first = front_[run.segments.front()], &last = front_[run.segments.back()];
       run.reversed =
-          age_of(incision.sheets()[last.sheet], last.to) < age_of(incision.sheets()[first.sheet], first.from);
+          age_of(incision_.sheets()[last.sheet], last.to) < age_of(incision_.sheets()[first.sheet], first.from);
     }
   }
 
-  // Stations: an open run has one at either end.
-  struct Stations {
-    std::vector<double> at; // spacings
-    int first = 0;          // among all stations
-  };
-  std::vector<Stations> stations(runs.size());
-  std::vector<FrontStation> all;
-  for (int r = 0; r < std::ssize(runs); ++r) {
-    const MeasuredRun& run = runs[r];
-    stations[r].first = static_cast<int>(all.size());
+  /// An open run has a station at either end.
+  void put_stations(int r) {
+    const MeasuredRun& run = runs_[r];
+    of_run_[r].first = static_cast<int>(all_.size());
     const double length = run.length();
     if (length < least_run)
-      continue;
-    std::vector<double>& at = stations[r].at;
+      return;
+    std::vector<double>& at = of_run_[r].at;
     if (run.closed) {
-      const int count = std::max(3, static_cast<int>(std::lround(length / options.gather)));
+      const int count = std::max(3, static_cast<int>(std::lround(length / options_.gather)));
       for (int k = 0; k < count; ++k)
         at.push_back(length * k / count);
     } else {
-      for (double s = 0; s < length - 0.5 * options.gather; s += options.gather)
+      for (double s = 0; s < length - 0.5 * options_.gather; s += options_.gather)
         at.push_back(s);
       at.push_back(length);
     }
@@ -154,57 +175,69 @@ std::vector<FrontGroup> front_groups(const topology::Incision& incision, const N
       const auto next = std::upper_bound(run.measure.begin() + 1, run.measure.end() - 1, s);
       const auto k = static_cast<int>(next - run.measure.begin()) - 1;
       const double share = std::clamp((s - run.measure[k]) / (run.measure[k + 1] - run.measure[k]), 0.0, 1.0);
-      const topology::FrontFrame frame = incision.front_frame_at(run.segments[k], share);
+      const topology::FrontFrame frame = incision_.front_frame_at(run.segments[k], share);
       FrontStation station;
       station.point = frame.point;
       station.axes << frame.ahead, frame.normal, frame.tangent;
       station.spacing = spacing_at(frame.point);
-      all.push_back(station);
+      all_.push_back(station);
     }
   }
-  for (const FrontStation& station : all)
-    for (int ring = 0; ring < options.rings; ++ring)
-      groups.push_back({station, ring, {}, {}});
 
-  double widest = 0;
-  for (const FrontStation& station : all)
-    widest = std::max(widest, station.spacing);
-  for (int j = 0; j < nodes.size(); ++j) {
-    const auto place = front_place(incision, nodes.positions[j], options.radius * widest);
+  /// Node j joins the groups in whose hats it lies.
+  void add_node(int j, double widest, std::vector<FrontGroup>& groups) const {
+    const auto place = front_place(incision_, nodes_.positions[j], options_.radius * widest);
     if (!place)
-      continue;
-    const int r = run_of[place->segment];
-    if (stations[r].at.empty())
-      continue;
-    const double radius = options.radius * spacing_at(place->nearest);
+      return;
+    const int r = run_of_[place->segment];
+    const std::vector<double>& at = of_run_[r].at;
+    if (at.empty())
+      return;
+    const double radius = options_.radius * spacing_at(place->nearest);
     if (place->distance > radius)
-      continue;
-    const MeasuredRun& run = runs[r];
-    const topology::FrontSegment& segment = front[place->segment];
-    const int k = place_in_run[place->segment];
+      return;
+    const MeasuredRun& run = runs_[r];
+    const topology::FrontSegment& segment = front_[place->segment];
+    const int k = place_in_run_[place->segment];
     const double length = (segment.to - segment.from).norm();
     const double share = length > 0 ? std::clamp((place->nearest - segment.from).norm() / length, 0.0, 1.0) : 0;
     double s = run.measure[k] + share * (run.measure[k + 1] - run.measure[k]);
     if (run.reversed)
       s = run.length() - s;
-    const std::vector<double>& at = stations[r].at;
     const int count = static_cast<int>(at.size());
     const int low = std::clamp(static_cast<int>(std::upper_bound(at.begin(), at.end(), s) - at.begin()) - 1, 0,
                                run.closed ? count - 1 : std::max(0, count - 2));
     const int high = low + 1 < count ? low + 1 : run.closed ? 0 : low;
     const double to = high == 0 && run.closed ? run.length() : at[high];
     const double along = high == low ? 0 : std::clamp((s - at[low]) / (to - at[low]), 0.0, 1.0);
-    const double ring = options.rings > 1 ? place->distance / radius * (options.rings - 1) : 0;
+    const double ring = options_.rings > 1 ? place->distance / radius * (options_.rings - 1) : 0;
     for (const auto& [which, weight] : {std::pair(low, 1 - along), std::pair(high, along)})
-      for (int i = 0; i < options.rings; ++i)
+      for (int i = 0; i < options_.rings; ++i)
         if (const double hat = 1 - std::abs(ring - i); hat > 0 && weight > 0) {
-          FrontGroup& group = groups[(stations[r].first + which) * options.rings + i];
+          FrontGroup& group = groups[(of_run_[r].first + which) * options_.rings + i];
           group.nodes.push_back(j);
           group.weights.push_back(weight * hat);
         }
   }
-  std::erase_if(groups, [](const FrontGroup& group) { return group.nodes.empty(); });
-  return groups;
+
+  const topology::Incision& incision_;
+  const std::vector<topology::FrontSegment>& front_;
+  const NodeCloud& nodes_;
+  const FrontOptions& options_;
+  topology::PointTree tree_;
+  std::vector<MeasuredRun> runs_;
+  std::vector<int> run_of_, place_in_run_; // of every segment
+  std::vector<Stations> of_run_;
+  std::vector<FrontStation> all_;
+};
+
+} // namespace
+
+std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
+                                     const FrontOptions& options) {
+  if (incision.front().empty() || options.radius <= 0 || options.rings < 1)
+    return {};
+  return FrontStations(incision, nodes, options).groups();
 }
 
 TipFields tip_fields(const Material& material, const FrontPlace& place) {

@@ -24,67 +24,59 @@ constexpr double lifted = 0.15; // eyes are lifted off a sheet, in spacings
 
 } // namespace
 
-GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& change, std::vector<int> place,
-                                                     const Problem& grown, GrowthReport& report) const {
-  const Stopwatch sphere_watch;
-  Next next;
-  const NodeCloud &nodes = grown.nodes, &old = problem_.nodes;
-  const int count = nodes.size();
-  next.place = std::move(place);
-  next.was.assign(count, -1);
-  for (int i = 0; i < old.size(); ++i)
-    if (next.place[i] >= 0)
-      next.was[next.place[i]] = i;
-  next.spheres.emplace(nodes.positions, nodes.spacings, rho(), Basis::linear, worst_moment_condition,
-                       sight_about_cut(grown, Method::collocation, options_.method.sight));
-  const std::vector<double>&radii = next.spheres->radii(), &old_radii = spheres_.radii();
-  report.spheres_seconds = sphere_watch.seconds();
+/// What an increment changes of spheres, faces and front, and who may see it.
+class GrowingCollocation::SphereChange {
+ public:
+  SphereChange(const GrowingCollocation& body, const SprinkleIncrement& change, const Problem& grown,
+               const Next& next) {
+    const NodeCloud &nodes = grown.nodes, &old = body.problem_.nodes;
+    const std::vector<double>&radii = next.spheres->radii(), &old_radii = body.spheres_.radii();
+    // Spheres of both, those that have gone at the end; where one came, went or changed its size.
+    std::vector<Vector3> centres = nodes.positions;
+    std::vector<double> largest = radii;
+    for (int i = 0; i < nodes.size(); ++i) {
+      const double before = next.was[i] >= 0 ? old_radii[next.was[i]] : 0;
+      largest[i] = std::max(largest[i], before);
+      if (before != radii[i])
+        balls_.emplace_back(nodes.positions[i], largest[i]);
+    }
+    for (const int node : change.removed) {
+      centres.push_back(old.positions[node]);
+      largest.push_back(old_radii[node]);
+      balls_.emplace_back(old.positions[node], old_radii[node]);
+    }
+    slack_ = 0.25 * *std::min_element(nodes.spacings.begin(), nodes.spacings.end());
+    const topology::Incision* const before = body.problem_.incision.get();
+    changes_ = changes_between(before, SpacingAt(old, std::vector<char>(old.positions.size(), 0)), *grown.incision,
+                               SpacingAt(nodes, std::vector<char>(nodes.positions.size(), 0)), 2 * slack_);
+    std::vector<Vector3> all_front = changes_.front;
+    add_front(before, 2 * slack_, all_front);
+    add_front(grown.incision.get(), 2 * slack_, all_front);
+    enriched_ = body.options_.method.sight == SightRule::enriched ? next.spheres->cut()->sight().reach / body.rho() : 0;
+    reach_.emplace(changes_.faces, changes_.front, all_front, enriched_, centres, largest, slack_);
+  }
 
-  // Spheres of both, those that have gone at the end; where one came, went or changed its size.
-  std::vector<Vector3> centres = nodes.positions;
-  std::vector<double> largest = radii;
-  std::vector<std::pair<Vector3, double>> balls;
-  for (int i = 0; i < count; ++i) {
-    const double before = next.was[i] >= 0 ? old_radii[next.was[i]] : 0;
-    largest[i] = std::max(largest[i], before);
-    if (before != radii[i])
-      balls.emplace_back(nodes.positions[i], largest[i]);
-  }
-  for (const int node : change.removed) {
-    centres.push_back(old.positions[node]);
-    largest.push_back(old_radii[node]);
-    balls.emplace_back(old.positions[node], old_radii[node]);
-  }
-  const double slack = 0.25 * *std::min_element(nodes.spacings.begin(), nodes.spacings.end());
-  const topology::Incision* const before = problem_.incision.get();
-  const Changes changes =
-      changes_between(before, SpacingAt(old, std::vector<char>(old.positions.size(), 0)), *grown.incision,
-                      SpacingAt(nodes, std::vector<char>(nodes.positions.size(), 0)), 2 * slack);
-  std::vector<Vector3> all_front = changes.front;
-  add_front(before, 2 * slack, all_front);
-  add_front(grown.incision.get(), 2 * slack, all_front);
-  const double enriched = options_.method.sight == SightRule::enriched ? next.spheres->cut()->sight().reach / rho() : 0;
-  const Reach reach(changes.faces, changes.front, all_front, enriched, centres, largest, slack);
-  const auto sees_change = [&](const Vector3& x, double half) {
-    return reach.sees(x, half) || reach.near_front(x, half, std::max(1.0, enriched)) ||
-           std::any_of(balls.begin(), balls.end(), [&](const auto& ball) {
+  [[nodiscard]] const Changes& changes() const { return changes_; }
+  [[nodiscard]] double slack() const { return slack_; }
+  /// Whether something within `half` m of x changes.
+  [[nodiscard]] bool is_seen(const Vector3& x, double half) const {
+    return reach_->sees(x, half) || reach_->near_front(x, half, std::max(1.0, enriched_)) ||
+           std::any_of(balls_.begin(), balls_.end(), [&](const auto& ball) {
              const double far = ball.second + half;
              return (ball.first - x).squaredNorm() < far * far;
            });
-  };
+  }
 
-  const Stopwatch cell_watch;
-  next.places = changes.faces;
-  next.places.insert(next.places.end(), changes.front.begin(), changes.front.end());
-  const Nearness to_places(next.places);
-  std::vector<char> touched(static_cast<std::size_t>(count), 1);
-  for (int i = 0; i < count; ++i)
-    if (next.was[i] >= 0)
-      touched[i] =
-          to_places(nodes.positions[i]) < cells_see * cells_.reaches[next.was[i]] + lifted * nodes.spacings[i] + slack;
-  next.cells = topology::update_cells(cells_, next.was, nodes.positions, nodes.spacings, *grown.domain,
-                                      grown.incision.get(), touched);
+ private:
+  Changes changes_;
+  std::vector<std::pair<Vector3, double>> balls_;
+  double slack_ = 0, enriched_ = 0; // m; reach of the enrichment in sphere radii
+  std::optional<Reach> reach_;
+};
 
+/// Rows that are made again, and the nodes whose supports are.
+void GrowingCollocation::find_wanted_rows(const SphereChange& sphere_change, std::vector<char>& seen_anew,
+                                          Next& next) const {
   // A support that was not sound reached beyond the spheres, and knows nodes that none of them tells of.
   const auto names_removed = [&](std::span<const int> named) {
     return std::any_of(named.begin(), named.end(), [&](int node) { return next.place[node] < 0; });
@@ -94,24 +86,60 @@ GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& ch
         std::span(supports_.nodes).subspan(supports_.start[was], supports_.start[was + 1] - supports_.start[was]));
   };
   const topology::CellComplex& cells = next.cells.cells;
-  std::vector<char> seen_anew(static_cast<std::size_t>(count), 0);
+  const std::vector<Vector3>& x = next.spheres->centres();
+  const int count = static_cast<int>(x.size());
+  seen_anew.assign(x.size(), 0);
   next.wanted = next.cells.made;
   for (int i = 0; i < count; ++i) {
     const double half = std::max(cells.reaches[i], next.was[i] >= 0 ? cells_.reaches[next.was[i]] : 0);
-    if (next.was[i] < 0 || sees_change(nodes.positions[i], 0) || names_removed_in_support(next.was[i]))
+    if (next.was[i] < 0 || sphere_change.is_seen(x[i], 0) || names_removed_in_support(next.was[i]))
       seen_anew[i] = 1;
-    if (seen_anew[i] != 0 || sees_change(nodes.positions[i], half) || names_removed(rows_[next.was[i]].nodes))
+    if (seen_anew[i] != 0 || sphere_change.is_seen(x[i], half) || names_removed(rows_[next.was[i]].nodes))
       next.wanted[i] = 1;
   }
   for (const topology::CellFace& face : cells.faces) // whose rows ask for each other's supports
     if (seen_anew[face.first] != 0 || seen_anew[face.second] != 0)
       next.wanted[face.first] = next.wanted[face.second] = 1;
+}
+
+GrowingCollocation::Next GrowingCollocation::next_of(const SprinkleIncrement& change, std::vector<int> place,
+                                                     const Problem& grown, GrowthReport& report) const {
+  const Stopwatch sphere_watch;
+  Next next;
+  const NodeCloud& nodes = grown.nodes;
+  const int count = nodes.size();
+  next.place = std::move(place);
+  next.was.assign(count, -1);
+  for (int i = 0; i < problem_.nodes.size(); ++i)
+    if (next.place[i] >= 0)
+      next.was[next.place[i]] = i;
+  next.spheres.emplace(nodes.positions, nodes.spacings, rho(), Basis::linear, worst_moment_condition,
+                       sight_about_cut(grown, Method::collocation, options_.method.sight));
+  report.spheres_seconds = sphere_watch.seconds();
+  const SphereChange sphere_change(*this, change, grown, next);
+  const Changes& changes = sphere_change.changes();
+
+  const Stopwatch cell_watch;
+  next.places = changes.faces;
+  next.places.insert(next.places.end(), changes.front.begin(), changes.front.end());
+  const Nearness to_places(next.places);
+  std::vector<char> touched(static_cast<std::size_t>(count), 1);
+  for (int i = 0; i < count; ++i)
+    if (next.was[i] >= 0)
+      touched[i] = to_places(nodes.positions[i]) <
+                   cells_see * cells_.reaches[next.was[i]] + lifted * nodes.spacings[i] + sphere_change.slack();
+  next.cells = topology::update_cells(cells_, next.was, nodes.positions, nodes.spacings, *grown.domain,
+                                      grown.incision.get(), touched);
+
+  std::vector<char> seen_anew;
+  find_wanted_rows(sphere_change, seen_anew, next);
   std::vector<int> found, known = next.was;
   for (int i = 0; i < count; ++i)
     if (seen_anew[i] != 0) {
       found.push_back(i);
       known[i] = -1;
     }
+  const topology::CellComplex& cells = next.cells.cells;
   next.supports = renewed_supports(supports_, nodal_supports(*next.spheres, found), known, next.place);
   assemble_rows(grown, cells, *next.spheres, next.supports, mixed_, next.wanted, next.rows);
   for (const Anchor& anchor : anchors_)
@@ -260,80 +288,56 @@ void GrowingCollocation::take_over(GrowingCollocation& other) {
   std::swap(last_places_, other.last_places_);
 }
 
-BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem grown,
-                                    const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) {
-  const Stopwatch total;
-  if (grown.incision == nullptr)
-    throw InputError("a growing cut needs an incision");
-  check_problem(grown);
-  BodyGrowth growth;
-  GrowthReport& report = growth.update;
-  const std::vector<int> place = places_after(change, problem_.nodes.size(), grown.nodes.size());
-  std::vector<Piece> pieces = pieces_by_sight(grown);
-  if (unheld_count(pieces) > unheld_count(report_.pieces)) {
-    growth.uncovered = "a piece came free";
-    return growth;
+struct GrowingCollocation::Growing {
+  const std::function<topology::SurfaceMesh()>& way_ahead;
+  bool only_update;
+  std::vector<int> place; // of nodes before in those after; -1: gone
+  BodyGrowth growth{};
+};
+
+/// The body of `problem` from nothing; `is_overwritten`: this one is not what it was before.
+void GrowingCollocation::condense_anew(const char* reason, Problem problem, bool is_overwritten, Growing& growing) {
+  GrowthReport& report = growing.growth.update;
+  report.reason = reason;
+  if (growing.only_update && !is_overwritten) {
+    report.declined = true;
+    growing.growth.uncovered = reason;
+    return;
   }
-  for (const Anchor& anchor : anchors_)
-    if (place[anchor.node] < 0) {
-      growth.uncovered = "a spring that holds a severed piece lost its node";
-      return growth;
-    }
-  const auto anew = [&](const char* reason, Problem problem, bool is_overwritten) {
-    report.reason = reason;
-    if (only_update && !is_overwritten) {
-      report.declined = true;
-      growth.uncovered = reason;
-      return;
-    }
-    GrowthOptions options = options_;
-    if (!is_overwritten) {
-      std::erase_if(options.contact, [&](int& node) { return (node = place[node]) < 0; });
-      if (way_ahead)
-        if (topology::SurfaceMesh way = way_ahead(); !way.triangles.empty())
-          options.way = std::move(way);
-    }
-    GrowingCollocation fresh(std::move(problem), std::move(options));
-    take_over(fresh);
-    report.condensed_anew = true;
-    report.window_nodes = window_->slots() / stride_ - options_.room;
-  };
-  const auto finish = [&] {
-    if (!report.condensed_anew && !report.declined) {
-      report_.supports_seconds = report.spheres_seconds;
-      report_.assembly_seconds = report.cells_seconds;
-      report_.factor_seconds = report.factor_seconds;
-      report_.pieces = std::move(pieces);
-    }
-    report.total_seconds = total.seconds();
-    return growth;
-  };
-  if (!continues(problem_.incision.get(), *grown.incision)) {
-    anew("the sheets do not continue those before", std::move(grown), false);
-    return finish();
+  GrowthOptions options = options_;
+  if (!is_overwritten) {
+    std::erase_if(options.contact, [&](int& node) { return (node = growing.place[node]) < 0; });
+    if (growing.way_ahead)
+      if (topology::SurfaceMesh way = growing.way_ahead(); !way.triangles.empty())
+        options.way = std::move(way);
   }
-  if (stride_ * (next_room_ + change.added.size()) > window_->slots()) {
-    anew("no room for the added nodes", std::move(grown), false);
-    return finish();
-  }
-  Next next = next_of(change, place, grown, report);
+  GrowingCollocation fresh(std::move(problem), std::move(options));
+  take_over(fresh);
+  report.condensed_anew = true;
+  report.window_nodes = window_->slots() / stride_ - options_.room;
+}
+
+/// Puts the increment into the window, or condenses anew where the window does not hold it.
+void GrowingCollocation::update(const SprinkleIncrement& change, Problem grown, Growing& growing) {
+  GrowthReport& report = growing.growth.update;
+  if (!continues(problem_.incision.get(), *grown.incision))
+    return condense_anew("the sheets do not continue those before", std::move(grown), false, growing);
+  if (stride_ * (next_room_ + change.added.size()) > window_->slots())
+    return condense_anew("no room for the added nodes", std::move(grown), false, growing);
+  Next next = next_of(change, growing.place, grown, report);
   std::vector<int> slot(next.was.size());
   for (std::size_t i = 0, added = 0; i < slot.size(); ++i)
     slot[i] = next.was[i] >= 0 ? slot_[next.was[i]] : next_room_ + static_cast<int>(added++);
-  const char* const outside = [&] {
-    for (const int node : change.removed)
-      if (slot_[node] < 0)
-        return "a removed node lies outside the window";
-    return hindrance(next, slot);
-  }();
-  if (outside[0] != '\0') {
-    anew(outside, std::move(grown), false);
-    return finish();
-  }
+  for (const int node : change.removed)
+    if (slot_[node] < 0)
+      return condense_anew("a removed node lies outside the window", std::move(grown), false, growing);
+  if (const char* const outside = hindrance(next, slot); outside[0] != '\0')
+    return condense_anew(outside, std::move(grown), false, growing);
+
   const Stopwatch commit_watch;
   Problem before = problem_;
   std::vector<int> contact_before = options_.contact;
-  std::erase_if(options_.contact, [&](int& node) { return (node = place[node]) < 0; });
+  std::erase_if(options_.contact, [&](int& node) { return (node = growing.place[node]) < 0; });
   next_room_ += change.added.size();
   const std::vector<Vector3> places = std::move(next.places);
   put_in(std::move(next), std::move(grown), slot);
@@ -344,17 +348,46 @@ BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem gro
   } catch (const NumericalError&) {
     // The ordinary way says what is wrong; then the body before is made again, for this one has been overwritten.
     try {
-      anew("the window became singular", problem_, true);
+      condense_anew("the window became singular", problem_, true, growing);
     } catch (...) {
       options_.contact = std::move(contact_before);
-      anew("as it was", std::move(before), true);
+      condense_anew("as it was", std::move(before), true, growing);
       throw;
     }
   }
   report.factor_seconds = factor_watch.seconds();
   report.factored = window_->factored();
   report.window_nodes = (window_->factored() + window_->done_ahead()) / stride_;
-  return finish();
+}
+
+BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem grown,
+                                    const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) {
+  const Stopwatch total;
+  if (grown.incision == nullptr)
+    throw InputError("a growing cut needs an incision");
+  check_problem(grown);
+  Growing growing{way_ahead, only_update, places_after(change, problem_.nodes.size(), grown.nodes.size())};
+  BodyGrowth& growth = growing.growth;
+  std::vector<Piece> pieces = pieces_by_sight(grown);
+  if (unheld_count(pieces) > unheld_count(report_.pieces)) {
+    growth.uncovered = "a piece came free";
+    return growth;
+  }
+  for (const Anchor& anchor : anchors_)
+    if (growing.place[anchor.node] < 0) {
+      growth.uncovered = "a spring that holds a severed piece lost its node";
+      return growth;
+    }
+  update(change, std::move(grown), growing);
+  GrowthReport& report = growth.update;
+  if (!report.condensed_anew && !report.declined) {
+    report_.supports_seconds = report.spheres_seconds;
+    report_.assembly_seconds = report.cells_seconds;
+    report_.factor_seconds = report.factor_seconds;
+    report_.pieces = std::move(pieces);
+  }
+  report.total_seconds = total.seconds();
+  return growth;
 }
 
 std::unique_ptr<Discretisation> make_growable(Problem problem, GrowthOptions options) {

@@ -40,9 +40,16 @@ class GrowingCollocation final : public Collocation, public Growable {
   [[nodiscard]] MatrixX unit_forces(const std::vector<int>& nodes) const; // by slots
   [[nodiscard]] MatrixX window_solution(const MatrixX& right) const;
   [[nodiscard]] double rho() const { return collocation_support_radius(options_.method); }
+  [[nodiscard]] std::vector<char> predicted_window() const;
   void make_window();
   [[nodiscard]] Next next_of(const SprinkleIncrement& change, std::vector<int> place, const Problem& grown,
                              GrowthReport& report) const;
+  class SphereChange;
+  void find_wanted_rows(const SphereChange& sphere_change, std::vector<char>& seen_anew, Next& next) const;
+  /// An increment while it is worked on.
+  struct Growing;
+  void condense_anew(const char* reason, Problem problem, bool is_overwritten, Growing& growing);
+  void update(const SprinkleIncrement& change, Problem grown, Growing& growing);
   void find_changed_rows(Next& next) const;
   /// Why the window does not cover it; empty: it does.
   [[nodiscard]] const char* hindrance(const Next& next, const std::vector<int>& slot) const;

@@ -29,8 +29,8 @@ GrowingCollocation::GrowingCollocation(Problem problem, GrowthOptions options)
   make_window();
 }
 
-void GrowingCollocation::make_window() {
-  const Stopwatch watch;
+/// Nodes whose rows the cut may change on its way, or that such rows may come to see; and those of the contact.
+std::vector<char> GrowingCollocation::predicted_window() const {
   const int count = problem_.nodes.size();
   const std::vector<Vector3>& x = problem_.nodes.positions;
   const bool enriched = options_.method.sight == SightRule::enriched;
@@ -59,17 +59,6 @@ void GrowingCollocation::make_window() {
              return (x[j] - x[i]).squaredNorm() < (radii[j] + half) * (radii[j] + half);
            });
   };
-  std::vector<char> in_window(static_cast<std::size_t>(count), 0);
-  const auto add_row = [&](int i) { // with the nodes that its faces and its support may come to see
-    in_window[i] = 1;
-    for (const int j : rows_[i].nodes)
-      in_window[j] = 1;
-    for (int k = supports_.start[i]; k < supports_.start[i + 1]; ++k)
-      in_window[supports_.nodes[k]] = 1;
-    for (int j = 0; j < count; ++j)
-      if ((x[j] - x[i]).squaredNorm() < std::pow(cells_.reaches[i] + radii[j], 2))
-        in_window[j] = 1;
-  };
   std::vector<char> may_change(static_cast<std::size_t>(count), 0);
   for (int i = 0; i < count; ++i)
     if (sees_change(i, cells_.reaches[i]))
@@ -77,12 +66,32 @@ void GrowingCollocation::make_window() {
   for (const topology::CellFace& face : cells_.faces) // whose rows ask for each other's supports
     if (sees_change(face.first, 0) || sees_change(face.second, 0))
       may_change[face.first] = may_change[face.second] = 1;
-  for (int i = 0; i < count; ++i)
-    if (may_change[i] != 0)
-      add_row(i);
-  for (const int node : options_.contact)
-    for (int k = supports_.start[node]; k < supports_.start[node + 1]; ++k)
+  std::vector<char> in_window(static_cast<std::size_t>(count), 0);
+  const auto add_support = [&](int i) {
+    for (int k = supports_.start[i]; k < supports_.start[i + 1]; ++k)
       in_window[supports_.nodes[k]] = 1;
+  };
+  for (int i = 0; i < count; ++i) {
+    if (may_change[i] == 0)
+      continue;
+    // With the nodes that its faces and its support may come to see.
+    in_window[i] = 1;
+    for (const int j : rows_[i].nodes)
+      in_window[j] = 1;
+    add_support(i);
+    for (int j = 0; j < count; ++j)
+      if ((x[j] - x[i]).squaredNorm() < std::pow(cells_.reaches[i] + radii[j], 2))
+        in_window[j] = 1;
+  }
+  for (const int node : options_.contact)
+    add_support(node);
+  return in_window;
+}
+
+void GrowingCollocation::make_window() {
+  const Stopwatch watch;
+  const int count = problem_.nodes.size();
+  const std::vector<char> in_window = predicted_window();
   slot_.assign(count, -1);
   origin_.resize(static_cast<std::size_t>(count));
   next_room_ = 0;

@@ -110,6 +110,7 @@ class GrowingCut {
 
  private:
   struct State;
+  class Growth;
   std::unique_ptr<State> state_;
 };
 

@@ -92,6 +92,11 @@ struct GrowingCut::State {
     std::vector<int> boxes{};                                                 // touched
     std::vector<char> moved{};                                                // of these: their points are placed anew
 
+    /// All within `far` m of x may change.
+    void include(const Vector3& x, double far) {
+      touched.lower = touched.lower.cwiseMin((x.array() - far).matrix());
+      touched.upper = touched.upper.cwiseMax((x.array() + far).matrix());
+    }
     /// Whether something within `half` m of x changes; `enriched`: reach of the enrichment in sphere radii.
     [[nodiscard]] bool concerns(const Vector3& x, double half, double enriched) const {
       return reach->sees(x, half) || reach->near_front(x, half, std::max(1.0, enriched)) ||
@@ -110,6 +115,9 @@ struct GrowingCut::State {
 
   State(Problem p, GrowthOptions o);
 
+  void change_problem(const NodeChange& change, const std::shared_ptr<const topology::Incision>& incision,
+                      Increment& increment) const;
+  void find_changes(const NodeChange& change, Increment& increment) const;
   [[nodiscard]] Increment increment(const NodeChange& change,
                                     const std::shared_ptr<const topology::Incision>& incision) const;
 
@@ -276,6 +284,10 @@ struct GrowingCut::State {
   /// system at least, m. Whether all of it stood.
   bool factor_window(const std::vector<Vector3>& places, double reach = 0);
   void condense_all();
+  [[nodiscard]] std::vector<char> keep_cells(const OrderedStiffness& stiffness, const std::vector<int>& id,
+                                             bool is_whole);
+  [[nodiscard]] std::vector<int> open_window(const OrderedStiffness& stiffness, const std::vector<int>& id,
+                                             const std::vector<char>& in_window);
   void condense_contact();
   [[nodiscard]] SparseMatrix contact_functionals() const; // slots x 3 per candidate
   [[nodiscard]] VectorX window_right(const VectorX& right) const;

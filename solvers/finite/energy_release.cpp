@@ -219,102 +219,135 @@ void EnergyMomentum::add_faces(const std::vector<FacePlace>& places, double load
     }
 }
 
+/// The shift of a short length of the front, in a tube about it that follows its curvature.
+class EnergyMomentum::LocalShift {
+ public:
+  LocalShift(const FiniteBody& body, const topology::FrontFrame& front, const ReleaseOptions& options)
+      : domain_(*body.problem().domain), front_(front), h_(spacing_at_front(body.problem().nodes, front.point)),
+        inner_(options.inner * h_), outer_(options.outer * h_), half_(*options.half_length * h_),
+        inset_(options.inset * h_), curvature_(front_curvature(incision_with_front(body), front, h_)) {
+    const Vector3& at = front.point;
+    if (std::abs(curvature_) * std::max(outer_, half_) > widest_release_turn)
+      throw InputError(fmt::format("energy release: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
+                                   at.x(), at.y(), at.z()));
+    if (inset_ == 0)
+      require_inside();
+  }
+
+  [[nodiscard]] Shift operator()(const Vector3& x) const;
+  /// m, of the shift along the front.
+  [[nodiscard]] double length() const;
+  [[nodiscard]] std::vector<FacePlace> faces() const;
+
+ private:
+  void require_inside() const {
+    for (const double s : {-half_, 0.0, half_})
+      for (int c = 0; c < 8; ++c) {
+        Shift axes;
+        axes_at(s, axes);
+        const double angle = c * std::numbers::pi / 4;
+        if (domain_.signed_distance(along_front(s) + outer_ * std::cos(angle) * axes.ahead +
+                                    outer_ * std::sin(angle) * axes.normal) > 0)
+          throw_leaves(front_.point, outer_);
+      }
+  }
+  /// The place at `s` m along the front: on an arc in the plane of the cut.
+  [[nodiscard]] Vector3 along_front(double s) const {
+    const double turn = curvature_ * s;
+    const double chord = std::abs(turn) < 1e-4 ? s : std::sin(turn) / curvature_;
+    const double sag = std::abs(turn) < 1e-4 ? 0.5 * turn * s : (1 - std::cos(turn)) / curvature_;
+    return front_.point + (chord * front_.tangent - sag * front_.ahead);
+  }
+  /// Of the shift along the front.
+  [[nodiscard]] Faded bump(double s) const {
+    const double t = s / half_, rest = 1 - t * t;
+    return std::abs(t) < 1 ? Faded{rest * rest, -4 * t * rest / half_} : Faded{};
+  }
+  void axes_at(double s, Shift& shift) const {
+    const double c = std::cos(curvature_ * s), sine = std::sin(curvature_ * s);
+    shift.ahead = c * front_.ahead + sine * front_.tangent;
+    shift.tangent = c * front_.tangent - sine * front_.ahead;
+    shift.normal = front_.normal;
+  }
+
+  const topology::Domain& domain_;
+  const topology::FrontFrame& front_;
+  double h_;                            // m, spacing of the nodes there
+  double inner_, outer_, half_, inset_; // m
+  double curvature_;                    // 1/m
+};
+
+EnergyMomentum::Shift EnergyMomentum::LocalShift::operator()(const Vector3& x) const {
+  Shift shift;
+  const Vector3 away = x - front_.point;
+  const double above = away.dot(front_.normal);
+  double ahead = away.dot(front_.ahead), along = away.dot(front_.tangent);
+  if (std::abs(above) >= outer_ || std::abs(along) > half_ + outer_ || std::abs(ahead) > half_ + outer_)
+    return shift;
+  double stretch = 1; // length along the front out here over that on the front
+  if (std::abs(curvature_) * half_ > 1e-4) {
+    const double radius = 1 / curvature_, out = radius + ahead, reach = std::hypot(out, along);
+    ahead = std::copysign(reach, radius) - radius;
+    along = std::atan2(std::copysign(1.0, radius) * along, std::abs(out)) * radius;
+    stretch = 1 + curvature_ * ahead;
+  }
+  const double r = std::hypot(ahead, above);
+  const Faded across = faded(r, inner_, outer_), lengthwise = bump(along);
+  const Covered cover = covered(domain_, x, inset_);
+  shift.q = across.value * lengthwise.value * cover.value;
+  if (shift.q == 0)
+    return shift;
+  axes_at(along, shift);
+  shift.turn = curvature_ / stretch;
+  shift.gradient = across.value * lengthwise.value * cover.gradient +
+                   across.value * cover.value * lengthwise.slope / stretch * shift.tangent;
+  if (across.slope != 0)
+    shift.gradient += across.slope * lengthwise.value * cover.value / r * (ahead * shift.ahead + above * shift.normal);
+  return shift;
+}
+
+double EnergyMomentum::LocalShift::length() const {
+  double length = 0;
+  for (int a = 0; a < front_points; ++a) {
+    const double s = half_ * ((2 * a + 1.0) / front_points - 1), ds = 2 * half_ / front_points;
+    length += ds * bump(s).value * covered(domain_, along_front(s), inset_).value;
+  }
+  if (!(length > 0))
+    throw InputError(
+        fmt::format("energy release: the shift at ({:.6g}, {:.6g}, {:.6g}) m lies in the {:.3g} m below the "
+                    "surface where it fades",
+                    front_.point.x(), front_.point.y(), front_.point.z(), inset_));
+  return length;
+}
+
+std::vector<EnergyMomentum::FacePlace> EnergyMomentum::LocalShift::faces() const {
+  constexpr int along_faces = 8;
+  std::vector<FacePlace> faces;
+  for (int a = 0; a < along_faces; ++a)
+    for (int b = 0; b < face_points; ++b) {
+      const double s = half_ * ((2 * a + 1.0) / along_faces - 1), ds = 2 * half_ / along_faces;
+      const double t = (b + 0.5) / face_points, r = outer_ * t * t;
+      Shift axes;
+      axes_at(s, axes);
+      FacePlace place{along_front(s) - r * axes.ahead, axes.ahead, axes.normal};
+      place.weight = ds * 2 * outer_ * t / face_points * (1 - curvature_ * r) * faded(r, inner_, outer_).value *
+                     bump(s).value * covered(domain_, place.position, inset_).value;
+      place.off = std::min(lip_offset * h_, 1e-3 * r);
+      if (place.weight != 0)
+        faces.push_back(place);
+    }
+  return faces;
+}
+
 EnergyRelease EnergyMomentum::at(const topology::FrontFrame& front, const ReleaseOptions& options,
                                  double load_factor) const {
   check_release(options);
   if (!options.half_length)
     return mean(options, load_factor);
-  const topology::Incision& incision = incision_with_front(body_);
-  const topology::Domain& domain = *body_.problem().domain;
-  const double h = spacing_at_front(body_.problem().nodes, front.point);
-  const double inner = options.inner * h, outer = options.outer * h, half = *options.half_length * h,
-               inset = options.inset * h;
-  const double curvature = front_curvature(incision, front, h);
-  if (std::abs(curvature) * std::max(outer, half) > widest_release_turn)
-    throw InputError(fmt::format("energy release: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
-                                 front.point.x(), front.point.y(), front.point.z()));
-  // Along the front the place is an arc in the plane of the cut.
-  const auto along_front = [&](double s) -> Vector3 {
-    const double turn = curvature * s;
-    const double chord = std::abs(turn) < 1e-4 ? s : std::sin(turn) / curvature;
-    const double sag = std::abs(turn) < 1e-4 ? 0.5 * turn * s : (1 - std::cos(turn)) / curvature;
-    return chord * front.tangent - sag * front.ahead;
-  };
-  const auto bump = [&](double s) { // of the shift along the front
-    const double t = s / half, rest = 1 - t * t;
-    return std::abs(t) < 1 ? Faded{rest * rest, -4 * t * rest / half} : Faded{};
-  };
-  const auto axes_at = [&](double s, Shift& shift) {
-    const double c = std::cos(curvature * s), sine = std::sin(curvature * s);
-    shift.ahead = c * front.ahead + sine * front.tangent;
-    shift.tangent = c * front.tangent - sine * front.ahead;
-    shift.normal = front.normal;
-  };
-  const auto shift_at = [&](const Vector3& x) {
-    Shift shift;
-    const Vector3 away = x - front.point;
-    const double above = away.dot(front.normal);
-    double ahead = away.dot(front.ahead), along = away.dot(front.tangent);
-    if (std::abs(above) >= outer || std::abs(along) > half + outer || std::abs(ahead) > half + outer)
-      return shift;
-    double stretch = 1; // length along the front out here over that on the front
-    if (std::abs(curvature) * half > 1e-4) {
-      const double radius = 1 / curvature, out = radius + ahead, reach = std::hypot(out, along);
-      ahead = std::copysign(reach, radius) - radius;
-      along = std::atan2(std::copysign(1.0, radius) * along, std::abs(out)) * radius;
-      stretch = 1 + curvature * ahead;
-    }
-    const double r = std::hypot(ahead, above);
-    const Faded across = faded(r, inner, outer), lengthwise = bump(along);
-    const Covered cover = covered(domain, x, inset);
-    shift.q = across.value * lengthwise.value * cover.value;
-    if (shift.q == 0)
-      return shift;
-    axes_at(along, shift);
-    shift.turn = curvature / stretch;
-    shift.gradient = across.value * lengthwise.value * cover.gradient +
-                     across.value * cover.value * lengthwise.slope / stretch * shift.tangent;
-    if (across.slope != 0)
-      shift.gradient +=
-          across.slope * lengthwise.value * cover.value / r * (ahead * shift.ahead + above * shift.normal);
-    return shift;
-  };
-  if (inset == 0)
-    for (const double s : {-half, 0.0, half})
-      for (int c = 0; c < 8; ++c) {
-        Shift axes;
-        axes_at(s, axes);
-        const double angle = c * std::numbers::pi / 4;
-        if (domain.signed_distance(front.point + along_front(s) + outer * std::cos(angle) * axes.ahead +
-                                   outer * std::sin(angle) * axes.normal) > 0)
-          throw_leaves(front.point, outer);
-      }
-  EnergyRelease sum = integrate(shift_at, options.pressure, load_factor);
-  std::vector<FacePlace> faces;
-  for (int a = 0; a < front_points; ++a) {
-    const double s = half * ((2 * a + 1.0) / front_points - 1), ds = 2 * half / front_points;
-    sum.length += ds * bump(s).value * covered(domain, front.point + along_front(s), inset).value;
-  }
-  constexpr int along_faces = 8;
-  for (int a = 0; a < along_faces; ++a)
-    for (int b = 0; b < face_points; ++b) {
-      const double s = half * ((2 * a + 1.0) / along_faces - 1), ds = 2 * half / along_faces;
-      const double t = (b + 0.5) / face_points, r = outer * t * t;
-      Shift axes;
-      axes_at(s, axes);
-      FacePlace place{front.point + along_front(s) - r * axes.ahead, axes.ahead, axes.normal};
-      place.weight = ds * 2 * outer * t / face_points * (1 - curvature * r) * faded(r, inner, outer).value *
-                     bump(s).value * covered(domain, place.position, inset).value;
-      place.off = std::min(lip_offset * h, 1e-3 * r);
-      if (place.weight != 0)
-        faces.push_back(place);
-    }
-  if (!(sum.length > 0))
-    throw InputError(
-        fmt::format("energy release: the shift at ({:.6g}, {:.6g}, {:.6g}) m lies in the {:.3g} m below the "
-                    "surface where it fades",
-                    front.point.x(), front.point.y(), front.point.z(), inset));
-  add_faces(faces, load_factor, sum);
+  const LocalShift shift(body_, front, options);
+  EnergyRelease sum = integrate(shift, options.pressure, load_factor);
+  sum.length = shift.length();
+  add_faces(shift.faces(), load_factor, sum);
   sum.rate /= sum.length;
   return sum;
 }

@@ -61,9 +61,10 @@ class EnergyMomentum {
 
  private:
   struct Shift; // q, the way ahead, and their gradients
+  struct FacePlace;
+  class LocalShift;
   template <class ShiftAt>
   [[nodiscard]] EnergyRelease integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor) const;
-  struct FacePlace;
   void add_faces(const std::vector<FacePlace>& places, double load_factor, EnergyRelease& sum) const;
 
   const FiniteBody& body_;

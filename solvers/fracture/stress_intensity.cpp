@@ -196,176 +196,236 @@ struct Sample {
 // u, sigma the field, v, tau = C grad v the auxiliary one, b the body force, t the traction on the faces, n out of the
 // material. v keeps its components in axes that turn with the front: tau is not quite in equilibrium then.
 // Within `inset_spacings` of the surface of the body xi fades to nothing (0: it does not, and the tube must not leave).
-//
-// Calls visit(sample) for every point and gives the factors that make intensities of the sums.
-template <class Visitor>
-Intensities each_sample(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
-                        double inset_spacings, Visitor&& visit_sample) {
-  const topology::Incision& incision = incision_of(body);
-  const Problem& problem = body.problem();
-  const Material& material = problem.material;
-  const double h = spacing_at(body, front.point);
-  const Tube tube(front, curvature_of(incision, front, h));
-  // Sections meet at the centre of curvature. Behind a front that turns round it the tube is narrowed, for they would
-  // count twice there, the second time negative.
-  const double narrowed = std::min(1.0, widest_turn / (std::max(0.0, tube.curvature()) * options.outer * h));
-  const double inner = narrowed * options.inner * h, outer = narrowed * options.outer * h;
-  const double shortest = std::min(options.half_length, shortest_half) * h;
-  double half_length = options.half_length * h;
-  if (half_length * std::abs(tube.curvature()) > longest_arc)
-    half_length = std::max(shortest, longest_arc / std::abs(tube.curvature()));
-  if (tube.curvature() * outer <= -widest_turn)
-    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
-                                 front.point.x(), front.point.y(), front.point.z()));
-  const auto fade = [&](double r) { // of the shift across the tube, with its derivative
-    const double t = std::clamp((outer - r) / (outer - inner), 0.0, 1.0);
-    return std::pair(t * t * (3 - 2 * t), r > inner && r < outer ? -6 * t * (1 - t) / (outer - inner) : 0.0);
+class InteractionRule {
+ public:
+  InteractionRule(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
+                  double inset_spacings)
+      : incision_(incision_of(body)), problem_(body.problem()), front_(front), options_(options),
+        h_(spacing_at(body, front.point)), tube_(front, curvature_of(incision_, front, h_)),
+        inset_(inset_spacings * h_) {
+    size_tube();
+    for (const auto& [s, ds] : along_front())
+      total_ += ds * bump(s).first * cover(tube_.at(0, 0, s).position).share;
+    if (!(total_ > 0))
+      throw InputError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
+                                   2 * half_length_));
+  }
+
+  /// Calls visit(sample) for every point.
+  template <class Visitor>
+  void each_sample(const Visitor& visit) const {
+    for (const auto& [s, ds] : along_front())
+      for (int b = 0; b < cells_radial(); ++b)
+        for (const double gb : gauss_.place) {
+          // r = outer t^2: the singular products of the two fields are smooth in t.
+          const double t = (b + 0.5 + 0.5 * gb) / cells_radial();
+          const Section section{s, ds, outer_ * t * t, outer_ * t / cells_radial()};
+          for (int c = 0; c < 2 * cells_around(); ++c)
+            if (const auto sample = around(section, c))
+              visit(*sample);
+          for (const double side : {1.0, -1.0})
+            if (const auto sample = on_face(section, side))
+              visit(*sample);
+        }
+  }
+
+  /// What makes intensities of the sums over the samples.
+  [[nodiscard]] Intensities factors() const {
+    const double plane = plane_strain_modulus(problem_.material);
+    return Vector3(0.5 * plane, 0.5 * plane, problem_.material.shear_modulus()) / total_;
+  }
+
+ private:
+  /// A ring of the tube: place along the front and distance from it, with their weights, m.
+  struct Section {
+    double s, ds, r, dr;
   };
-  const auto bump = [&](double s) { // and along it
-    const double t = s / half_length;
-    return std::pair((1 - t * t) * (1 - t * t), -4 * t * (1 - t * t) / half_length);
-  };
-  const double inset = inset_spacings * h;
   struct Cover {
     double share = 1;
     Vector3 gradient = Vector3::Zero(); // 1/m
   };
-  const auto cover = [&](const Vector3& x) { // of the shift near the surface of the body, where it has to vanish
+
+  [[nodiscard]] int cells_radial() const { return std::max(1, options_.radial / 2); }
+  [[nodiscard]] int cells_around() const { return std::max(1, options_.around / 2); }
+
+  void size_tube();
+  [[nodiscard]] bool leaves_body() const {
+    for (const double s : {-half_length_, half_length_})
+      for (int c = 0; c < 8; ++c)
+        if (tube_.at(outer_ * std::cos(c * std::numbers::pi / 4), outer_ * std::sin(c * std::numbers::pi / 4), s)
+                .leaves(*problem_.domain))
+          return true;
+    return false;
+  }
+
+  /// Places along the front with their weights, m.
+  [[nodiscard]] std::vector<std::pair<double, double>> along_front() const {
+    const int cells = std::max(1, options_.along / 2);
+    std::vector<std::pair<double, double>> places;
+    for (int a = 0; a < cells; ++a)
+      for (const double ga : gauss_.place)
+        places.emplace_back(half_length_ * ((2 * a + 1 + ga) / cells - 1), half_length_ / cells);
+    return places;
+  }
+
+  /// Of the shift across the tube, with its derivative.
+  [[nodiscard]] std::pair<double, double> fade(double r) const {
+    const double t = std::clamp((outer_ - r) / (outer_ - inner_), 0.0, 1.0);
+    return {t * t * (3 - 2 * t), r > inner_ && r < outer_ ? -6 * t * (1 - t) / (outer_ - inner_) : 0.0};
+  }
+  /// And along it.
+  [[nodiscard]] std::pair<double, double> bump(double s) const {
+    const double t = s / half_length_;
+    return {(1 - t * t) * (1 - t * t), -4 * t * (1 - t * t) / half_length_};
+  }
+  /// And near the surface of the body, where it has to vanish.
+  [[nodiscard]] Cover cover(const Vector3& x) const {
     Cover result;
-    if (!(inset > 0))
+    if (!(inset_ > 0))
       return result;
-    const double t = -problem.domain->signed_distance(x) / inset;
+    const double t = -problem_.domain->signed_distance(x) / inset_;
     if (t >= 1)
       return result;
     result.share = t > 0 ? t * t * (3 - 2 * t) : 0;
     if (t > 0)
-      result.gradient = -6 * t * (1 - t) / inset * problem.domain->normal(x);
+      result.gradient = -6 * t * (1 - t) / inset_ * problem_.domain->normal(x);
     return result;
-  };
-  if (inset > 0 && -problem.domain->signed_distance(front.point) < 0.2 * inset)
-    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m is {:.3g} m from the "
-                                 "surface; allowed: {:.3g} m",
-                                 front.point.x(), front.point.y(), front.point.z(),
-                                 -problem.domain->signed_distance(front.point), 0.2 * inset));
-  const auto leaves_body = [&] {
-    for (const double s : {-half_length, half_length})
-      for (int c = 0; c < 8; ++c)
-        if (tube.at(outer * std::cos(c * std::numbers::pi / 4), outer * std::sin(c * std::numbers::pi / 4), s)
-                .leaves(*problem.domain))
-          return true;
-    return false;
-  };
-  while (inset == 0 && half_length > shortest && leaves_body())
-    half_length = std::max(shortest, half_length - shortened_by * h);
-  if (inset == 0 && leaves_body())
-    throw InputError(fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
-                                 "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
-                                 outer, 2 * half_length, front.point.x(), front.point.y(), front.point.z()));
-  const std::array<Intensities, 3> modes{Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()};
-  const GaussRule gauss;
-  const int cells_along = std::max(1, options.along / 2), cells_radial = std::max(1, options.radial / 2);
-  const int cells_around = std::max(1, options.around / 2);
-  double total = 0; // of the bump, by the same rule
-  for (int a = 0; a < cells_along; ++a)
-    for (const double ga : gauss.place) {
-      const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1);
-      total += half_length / cells_along * bump(s).first * cover(tube.at(0, 0, s).position).share;
-    }
-  if (!(total > 0))
-    throw InputError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
-                                 2 * half_length));
-  // r = outer t^2: the singular products of the two fields are smooth in t.
-  const auto each_section = [&](const auto& visit) { // (s, weight ds, r, weight dr)
-    for (int a = 0; a < cells_along; ++a)
-      for (const double ga : gauss.place)
-        for (int b = 0; b < cells_radial; ++b)
-          for (const double gb : gauss.place) {
-            const double s = half_length * ((2 * a + 1 + ga) / cells_along - 1),
-                         t = (b + 0.5 + 0.5 * gb) / cells_radial;
-            visit(s, half_length / cells_along, outer * t * t, outer * t / cells_radial);
-          }
-  };
-  // Where the sheet bends off the plane of the front (a tear kinks), a point belongs to the side of the sheet it is on.
-  const auto side_of = [&](const Vector3& x, double r, double above) {
-    const auto face = incision.closest(x, 0.5 * r);
+  }
+
+  /// Where the sheet bends off the plane of the front (a tear kinks), a point belongs to the side of the sheet it is
+  /// on.
+  [[nodiscard]] double side_of(const Vector3& x, double r, double above) const {
+    const auto face = incision_.closest(x, 0.5 * r);
     if (!face || face->on_border)
       return above >= 0 ? 1.0 : -1.0;
     return (x - face->point).dot(face->normal) >= 0 ? 1.0 : -1.0;
-  };
-  each_section([&](double s, double ds, double r, double dr) {
-    const auto [fade_r, dq_r] = fade(r);
-    const auto [q_s, dq_s] = bump(s);
-    for (int c = 0; c < 2 * cells_around; ++c) {
-      const int cell = c / 2;
-      const double theta = std::numbers::pi * ((2 * cell + 1 + gauss.place[c % 2]) / cells_around - 1);
-      const double ahead = r * std::cos(theta);
-      double above = r * std::sin(theta);
-      const Tube::Place place = tube.at(ahead, above, s);
-      if (ahead < 0 && std::abs(above) < -ahead)
-        if (const double side = side_of(place.position, r, above); side * above < 0)
-          above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
-      const Cover covered = cover(place.position);
-      if (covered.share == 0)
-        continue;
-      const double q_r = fade_r * covered.share;
-      const double weight = r * (std::numbers::pi / cells_around) * ds * dr * place.stretch;
-      Sample sample;
-      sample.position = place.position;
-      // Gradient of xi = q e in the axes of the place; e turns along the front.
-      Matrix3 shift = Matrix3::Zero();
-      shift.row(0) = covered.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta),
-                                             fade_r * dq_s / place.stretch) +
-                     fade_r * q_s * place.axes.transpose() * covered.gradient;
-      shift(2, 2) = q_r * q_s * tube.curvature() / place.stretch;
-      for (int m = 0; m < 3; ++m) {
-        const TipField local = tip_field(material, modes[m], ahead, above);
-        const Matrix3 v = tube.curved_gradient(local, ahead);
-        const auto tau_at = [&](double x, double z) {
-          return stress_from_gradient(material, tube.curved_gradient(tip_field(material, modes[m], x, z), x));
-        };
-        const Matrix3 tau = stress_from_gradient(material, v);
-        sample.stress[m] = weight * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
-        Matrix3 by_gradient = tau * shift.transpose();
-        if (tube.curvature() != 0)
-          by_gradient.col(0) += q_r * q_s * tube.divergence(tau_at, ahead, above, 1e-4 * r);
-        sample.gradient[m] = weight * place.axes * by_gradient * place.axes.transpose();
-        sample.load[m] = 0;
-        if (problem.loads.body_force)
-          sample.load[m] =
-              -weight * q_r * q_s * (place.axes.transpose() * problem.loads.body_force(place.position)).dot(v.col(0));
-      }
-      visit_sample(sample);
-    }
-    // Both faces.
-    for (const double side : {1.0, -1.0}) {
-      const double off = std::min(lip_offset * h, 1e-3 * r);
-      Tube::Place place = tube.at(-r, side * off, s);
-      if (const auto face = incision.closest(tube.at(-r, 0, s).position, 0.5 * r); face && !face->on_border)
-        place.position = face->point + side * off * face->normal;
-      const double q_r = fade_r * cover(place.position).share;
-      if (q_r == 0)
-        continue;
-      const Vector3 outward = -side * front.normal;
-      Vector3 traction = Vector3::Zero();
-      if (problem.loads.lip_traction)
-        traction = place.axes.transpose() * problem.loads.lip_traction(place.position, outward);
-      if (traction.isZero(0) && tube.curvature() == 0)
-        continue;
-      Sample sample;
-      sample.position = place.position;
-      const double weight = q_r * q_s * ds * dr * place.stretch;
-      for (int m = 0; m < 3; ++m) {
-        const Matrix3 v = tube.curved_gradient(tip_field(material, modes[m], -r, side * 1e-12 * r), -r);
-        const Vector3 pull = -side * stress_from_gradient(material, v).col(1);
-        sample.stress[m].setZero();
-        sample.gradient[m] = -weight * place.axes * pull * place.axes.col(0).transpose();
-        sample.load[m] = -weight * traction.dot(v.col(0));
-      }
-      visit_sample(sample);
-    }
-  });
-  const double plane = plane_strain_modulus(material);
-  return Vector3(0.5 * plane, 0.5 * plane, material.shear_modulus()) / total;
+  }
+
+  [[nodiscard]] std::optional<Sample> around(const Section& section, int c) const;
+  [[nodiscard]] std::optional<Sample> on_face(const Section& section, double side) const;
+
+  const topology::Incision& incision_;
+  const Problem& problem_;
+  const FrontFrame& front_;
+  const InteractionOptions& options_;
+  double h_; // m, spacing of the nodes there
+  Tube tube_;
+  double inset_; // m
+  GaussRule gauss_;
+  std::array<Intensities, 3> modes_{Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()};
+  double inner_ = 0, outer_ = 0, half_length_ = 0; // m, of the tube
+  double total_ = 0;                               // m, of the bump, by the same rule
+};
+
+/// Sections meet at the centre of curvature. Behind a front that turns round it the tube is narrowed, for they would
+/// count twice there, the second time negative. It is shortened where it would leave the body.
+void InteractionRule::size_tube() {
+  const Vector3& at = front_.point;
+  const double narrowed = std::min(1.0, widest_turn / (std::max(0.0, tube_.curvature()) * options_.outer * h_));
+  inner_ = narrowed * options_.inner * h_;
+  outer_ = narrowed * options_.outer * h_;
+  const double shortest = std::min(options_.half_length, shortest_half) * h_;
+  half_length_ = options_.half_length * h_;
+  if (half_length_ * std::abs(tube_.curvature()) > longest_arc)
+    half_length_ = std::max(shortest, longest_arc / std::abs(tube_.curvature()));
+  if (tube_.curvature() * outer_ <= -widest_turn)
+    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
+                                 at.x(), at.y(), at.z()));
+  if (inset_ > 0 && -problem_.domain->signed_distance(at) < 0.2 * inset_)
+    throw InputError(fmt::format("stress intensity: the front at ({:.6g}, {:.6g}, {:.6g}) m is {:.3g} m from the "
+                                 "surface; allowed: {:.3g} m",
+                                 at.x(), at.y(), at.z(), -problem_.domain->signed_distance(at), 0.2 * inset_));
+  while (inset_ == 0 && half_length_ > shortest && leaves_body())
+    half_length_ = std::max(shortest, half_length_ - shortened_by * h_);
+  if (inset_ == 0 && leaves_body())
+    throw InputError(fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
+                                 "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
+                                 outer_, 2 * half_length_, at.x(), at.y(), at.z()));
+}
+
+/// The c-th point of a ring.
+std::optional<Sample> InteractionRule::around(const Section& section, int c) const {
+  const Material& material = problem_.material;
+  const double r = section.r;
+  const auto [fade_r, dq_r] = fade(r);
+  const auto [q_s, dq_s] = bump(section.s);
+  const double theta = std::numbers::pi * ((2 * (c / 2) + 1 + gauss_.place[c % 2]) / cells_around() - 1);
+  const double ahead = r * std::cos(theta);
+  double above = r * std::sin(theta);
+  const Tube::Place place = tube_.at(ahead, above, section.s);
+  if (ahead < 0 && std::abs(above) < -ahead)
+    if (const double side = side_of(place.position, r, above); side * above < 0)
+      above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
+  const Cover covered = cover(place.position);
+  if (covered.share == 0)
+    return std::nullopt;
+  const double q_r = fade_r * covered.share;
+  const double weight = r * (std::numbers::pi / cells_around()) * section.ds * section.dr * place.stretch;
+  Sample sample;
+  sample.position = place.position;
+  // Gradient of xi = q e in the axes of the place; e turns along the front.
+  Matrix3 shift = Matrix3::Zero();
+  shift.row(0) = covered.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta),
+                                         fade_r * dq_s / place.stretch) +
+                 fade_r * q_s * place.axes.transpose() * covered.gradient;
+  shift(2, 2) = q_r * q_s * tube_.curvature() / place.stretch;
+  for (int m = 0; m < 3; ++m) {
+    const TipField local = tip_field(material, modes_[m], ahead, above);
+    const Matrix3 v = tube_.curved_gradient(local, ahead);
+    const auto tau_at = [&](double x, double z) {
+      return stress_from_gradient(material, tube_.curved_gradient(tip_field(material, modes_[m], x, z), x));
+    };
+    const Matrix3 tau = stress_from_gradient(material, v);
+    sample.stress[m] = weight * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
+    Matrix3 by_gradient = tau * shift.transpose();
+    if (tube_.curvature() != 0)
+      by_gradient.col(0) += q_r * q_s * tube_.divergence(tau_at, ahead, above, 1e-4 * r);
+    sample.gradient[m] = weight * place.axes * by_gradient * place.axes.transpose();
+    sample.load[m] = 0;
+    if (problem_.loads.body_force)
+      sample.load[m] =
+          -weight * q_r * q_s * (place.axes.transpose() * problem_.loads.body_force(place.position)).dot(v.col(0));
+  }
+  return sample;
+}
+
+/// The point of a ring on one face.
+std::optional<Sample> InteractionRule::on_face(const Section& section, double side) const {
+  const Material& material = problem_.material;
+  const double r = section.r, q_s = bump(section.s).first;
+  const double off = std::min(lip_offset * h_, 1e-3 * r);
+  Tube::Place place = tube_.at(-r, side * off, section.s);
+  if (const auto face = incision_.closest(tube_.at(-r, 0, section.s).position, 0.5 * r); face && !face->on_border)
+    place.position = face->point + side * off * face->normal;
+  const double q_r = fade(r).first * cover(place.position).share;
+  if (q_r == 0)
+    return std::nullopt;
+  const Vector3 outward = -side * front_.normal;
+  Vector3 traction = Vector3::Zero();
+  if (problem_.loads.lip_traction)
+    traction = place.axes.transpose() * problem_.loads.lip_traction(place.position, outward);
+  if (traction.isZero(0) && tube_.curvature() == 0)
+    return std::nullopt;
+  Sample sample;
+  sample.position = place.position;
+  const double weight = q_r * q_s * section.ds * section.dr * place.stretch;
+  for (int m = 0; m < 3; ++m) {
+    const Matrix3 v = tube_.curved_gradient(tip_field(material, modes_[m], -r, side * 1e-12 * r), -r);
+    const Vector3 pull = -side * stress_from_gradient(material, v).col(1);
+    sample.stress[m].setZero();
+    sample.gradient[m] = -weight * place.axes * pull * place.axes.col(0).transpose();
+    sample.load[m] = -weight * traction.dot(v.col(0));
+  }
+  return sample;
+}
+
+/// Calls visit(sample) for every point and gives the factors that make intensities of the sums.
+template <class Visitor>
+Intensities each_sample(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
+                        double inset_spacings, const Visitor& visit) {
+  const InteractionRule rule(body, front, options, inset_spacings);
+  rule.each_sample(visit);
+  return rule.factors();
 }
 
 Intensities integral_over(const Discretisation& body, const Field& field, const FrontFrame& front,

@@ -9,40 +9,56 @@
 
 namespace spherecut::solvers {
 
-void build_stiffness(std::vector<StiffnessTiles::Pair> pairs, const std::vector<int>& rank,
-                     const std::vector<char>& dropped, const std::vector<Anchor>& anchors, const Problem& problem,
-                     SparseMatrix& stiffness, EntriesInLargePages& elastic) {
-  const int count = problem.nodes.size();
-  const auto is_dropped = [&](int node) { return !dropped.empty() && dropped[node] != 0; };
-  std::erase_if(pairs, [&](const auto& pair) { return is_dropped(pair.column); });
+namespace {
+
+using TilePair = StiffnessTiles::Pair;
+
+/// Without those of nodes that are left out, and with a diagonal block for every node.
+void complete_pairs(int count, const std::vector<char>& dropped, std::vector<TilePair>& pairs) {
+  if (!dropped.empty())
+    std::erase_if(pairs, [&](const TilePair& pair) { return dropped[pair.column] != 0; });
   std::vector<char> has_diagonal(count, 0);
-  for (const StiffnessTiles::Pair& pair : pairs)
+  for (const TilePair& pair : pairs)
     if (pair.row == pair.column)
       has_diagonal[pair.row] = 1;
   for (int i = 0; i < count; ++i)
     if (has_diagonal[i] == 0)
       pairs.push_back({i, i, nullptr, nullptr});
+}
+
+/// The pairs in the order `before` sorted by key(pair), those alike as they were; start[k]: the first with key k.
+template <class Key>
+std::vector<int> sorted_by(const std::vector<TilePair>& pairs, const std::vector<int>& before, const Key& key,
+                           int count, std::vector<int>& start) {
+  start.assign(count + 1, 0);
+  for (const int p : before)
+    ++start[key(pairs[p]) + 1];
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<int> next(start.begin(), start.end() - 1), after(before.size());
+  for (const int p : before)
+    after[next[key(pairs[p])]++] = p;
+  return after;
+}
+
+} // namespace
+
+void build_stiffness(std::vector<StiffnessTiles::Pair> pairs, const std::vector<int>& rank,
+                     const std::vector<char>& dropped, const std::vector<Anchor>& anchors, const Problem& problem,
+                     SparseMatrix& stiffness, EntriesInLargePages& elastic) {
+  const int count = problem.nodes.size();
+  complete_pairs(count, dropped, pairs);
   const long blocks = std::ssize(pairs);
   if (9 * blocks > std::numeric_limits<int>::max())
     throw InputError(
         fmt::format("{} nodes give {} matrix entries, more than the factorisation can index", count, 9 * blocks));
 
-  // Into ascending columns and, within each, ascending rows: by the row first, then by the column.
-  const auto sorted_by = [&](const std::vector<int>& before, const auto& key, std::vector<int>& start) {
-    start.assign(count + 1, 0);
-    for (const int p : before)
-      ++start[key(pairs[p]) + 1];
-    std::partial_sum(start.begin(), start.end(), start.begin());
-    std::vector<int> next(start.begin(), start.end() - 1), after(before.size());
-    for (const int p : before)
-      after[next[key(pairs[p])]++] = p;
-    return after;
-  };
   std::vector<int> all(pairs.size()), start;
   std::iota(all.begin(), all.end(), 0);
-  const auto lower_of = [&](const StiffnessTiles::Pair& pair) { return std::max(rank[pair.row], rank[pair.column]); };
-  const auto upper_of = [&](const StiffnessTiles::Pair& pair) { return std::min(rank[pair.row], rank[pair.column]); };
-  const std::vector<int> sorted = sorted_by(sorted_by(all, lower_of, start), upper_of, start);
+  const auto lower_of = [&](const TilePair& pair) { return std::max(rank[pair.row], rank[pair.column]); };
+  const auto upper_of = [&](const TilePair& pair) { return std::min(rank[pair.row], rank[pair.column]); };
+  // Into ascending columns and, within each, ascending rows: by the row first, then by the column.
+  const std::vector<int> by_row = sorted_by(pairs, all, lower_of, count, start),
+                         sorted = sorted_by(pairs, by_row, upper_of, count, start);
 
   stiffness.resize(3 * count, 3 * count);
   stiffness.resizeNonZeros(9 * blocks);
@@ -64,16 +80,14 @@ void build_stiffness(std::vector<StiffnessTiles::Pair> pairs, const std::vector<
           inner[first + b * stride + a] = row + a;
     }
   }
-  const auto stride_of = [&](const StiffnessTiles::Pair& pair) {
-    return 3 * (start[upper_of(pair) + 1] - start[upper_of(pair)]);
-  };
+  const auto stride_of = [&](const TilePair& pair) { return 3 * (start[upper_of(pair) + 1] - start[upper_of(pair)]); };
   // In the order of the tiles, which lie in memory as the pairs do.
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const StiffnessTiles::Pair& pair = pairs[p];
+    const TilePair& pair = pairs[p];
     Matrix3 block = Matrix3::Zero();
     if (pair.products != nullptr)
       block = pair.stiffness(lambda, mu);
-    else if (is_dropped(pair.row)) // the unknowns stay, alone and without load
+    else if (!dropped.empty() && dropped[pair.row] != 0) // the unknowns stay, alone and without load
       block.diagonal().setConstant(problem.material.young_modulus * problem.nodes.spacings[pair.row]);
     if (rank[pair.row] < rank[pair.column])
       block.transposeInPlace();

@@ -24,10 +24,8 @@ void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes
   out = cell;
 }
 
-bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, CellShapes& cell) {
-  if (spheres_.basis() != Basis::linear || points.empty())
-    return false;
-  // The candidates of all points, in ascending order.
+/// The candidates of all points, in ascending order.
+void CellEvaluator::find_candidates(std::span<const QuadraturePoint> points, CellShapes& cell) {
   std::array<const int*, most_cell_points> seen{};
   int seen_count = 0, first_word = static_cast<int>(marked_.size()), last_word = -1;
   for (const QuadraturePoint& point : points) {
@@ -49,23 +47,24 @@ bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, C
       cell.nodes.push_back(id);
       candidates_.push_back({x.x(), x.y(), x.z(), 1 / (radius * radius)});
     }
+}
 
+/// Keeps the candidates whose spheres hold some point; whether the cut may matter to any of them.
+bool CellEvaluator::keep_reached(std::span<const QuadraturePoint> points, CellShapes& cell) {
   const shape_kernel::Kernel& kernel = shape_kernel::dispatched();
-  const int batches = cell.stride / shape_kernel::points_together;
-  std::array<shape_kernel::Points, (most_cell_points - 1) / shape_kernel::points_together + 1> batch;
   inside_.resize(candidates_.size());
   cell.reached.assign(candidates_.size(), 0);
-  for (int b = 0; b < batches; ++b) {
+  for (int b = 0; b < cell.stride / shape_kernel::points_together; ++b) {
     for (int p = 0; p < shape_kernel::points_together; ++p) {
       const int q = shape_kernel::points_together * b + p;
       const QuadraturePoint& point = points[q < cell.points ? q : 0];
-      batch[b].x[p] = point.position.x();
-      batch[b].y[p] = point.position.y();
-      batch[b].z[p] = point.position.z();
-      batch[b].factor[p] = q < cell.points ? std::sqrt(point.weight) : 0;
+      batch_[b].x[p] = point.position.x();
+      batch_[b].y[p] = point.position.y();
+      batch_[b].z[p] = point.position.z();
+      batch_[b].factor[p] = q < cell.points ? std::sqrt(point.weight) : 0;
     }
     const int here = std::min(shape_kernel::points_together, cell.points - shape_kernel::points_together * b);
-    kernel.find_inside(candidates_.data(), static_cast<int>(candidates_.size()), batch[b], inside_.data());
+    kernel.find_inside(candidates_.data(), static_cast<int>(candidates_.size()), batch_[b], inside_.data());
     for (std::size_t k = 0; k < inside_.size(); ++k)
       cell.reached[k] |= (std::uint32_t{inside_[k]} & ((1U << here) - 1)) << shape_kernel::points_together * b;
   }
@@ -80,24 +79,34 @@ bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, C
     }
   cell.nodes.resize(count);
   cell.reached.resize(count);
+  return concerned;
+}
+
+bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, CellShapes& cell) {
+  if (spheres_.basis() != Basis::linear || points.empty())
+    return false;
+  find_candidates(points, cell);
+  const bool concerned = keep_reached(points, cell);
+  const auto count = static_cast<int>(cell.nodes.size());
   cell.gradients.resize(static_cast<std::size_t>(3 * count) * cell.stride);
   std::uint32_t altered = 0;
   if (concerned) {
     spheres_.cut()->look(points, cell.nodes, cell.reached, view_);
     altered = view_.altered;
   }
+  const shape_kernel::Kernel& kernel = shape_kernel::dispatched();
   const std::uint32_t all = (std::uint32_t{1} << cell.points) - 1;
   const int first_plain = std::countr_one(altered);
-  for (int b = 0; b < batches; ++b) {
+  for (int b = 0; b < cell.stride / shape_kernel::points_together; ++b) {
     const int first = shape_kernel::points_together * b;
     // A point that the cut alters gives its place to one that weighs nothing, as those in the room that is left do.
     for (int p = 0; p < shape_kernel::points_together; ++p)
       if (const int q = first + p; altered != 0 && (q >= cell.points || (altered >> q & 1) != 0)) {
         const Vector3& x = points[first_plain < cell.points ? first_plain : 0].position;
-        batch[b].x[p] = x.x();
-        batch[b].y[p] = x.y();
-        batch[b].z[p] = x.z();
-        batch[b].factor[p] = 0;
+        batch_[b].x[p] = x.x();
+        batch_[b].y[p] = x.y();
+        batch_[b].z[p] = x.z();
+        batch_[b].factor[p] = 0;
       }
     if (((all & ~altered) >> first & 0xff) == 0) {
       for (int row = 0; row < 3 * count; ++row)
@@ -106,7 +115,7 @@ bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, C
       continue;
     }
     alignas(64) std::array<double, shape_kernel::points_together> condition;
-    kernel.gradients_at_points(candidates_.data(), count, batch[b], cell.stride, cell.gradients.data() + first,
+    kernel.gradients_at_points(candidates_.data(), count, batch_[b], cell.stride, cell.gradients.data() + first,
                                condition.data());
     for (const double c : condition)
       if (!(c <= spheres_.worst_condition()))
@@ -115,43 +124,44 @@ bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, C
   return altered == 0 || add_altered(points, cell);
 }
 
+/// Shape functions at a point that the cut alters; false where no support is sound.
+bool CellEvaluator::evaluate_altered(const Vector3& x, int q, CellShapes& cell) {
+  ShapeFunctions& shape = at_point_[q];
+  if ((view_.on_sheet >> q & 1) == 0) {
+    const std::size_t count = cell.nodes.size(), stride = count + SphereGrid::lanes;
+    double* at = coordinates_.data();
+    shape_kernel::Support support{0, ids_.data(), at, at + stride, at + 2 * stride, at + 3 * stride};
+    // Every node is written at the end of the list, which moves on only past those that hold the point: no branch.
+    int n = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const shape_kernel::Sphere& sphere = candidates_[k];
+      support.ids[n] = cell.nodes[k];
+      support.dx[n] = sphere.x - x.x();
+      support.dy[n] = sphere.y - x.y();
+      support.dz[n] = sphere.z - x.z();
+      support.q[n] = sphere.q;
+      hidden_[n] = static_cast<char>(view_.hidden[k] >> q & 1);
+      n += static_cast<int>(cell.reached[k] >> q & 1);
+    }
+    support.count = n;
+    if (spheres_.cut()->evaluate_seen(shape_kernel::dispatched(), x, view_.points[q], hidden_, support,
+                                      spheres_.worst_condition(), shape))
+      return true;
+  }
+  if (!solvers::evaluate(spheres_, x, shape))
+    return false;
+  cell.growth = std::max(cell.growth, shape.growth);
+  return true;
+}
+
 bool CellEvaluator::add_altered(std::span<const QuadraturePoint> points, CellShapes& cell) {
-  const CutSight& cut = *spheres_.cut();
-  const shape_kernel::Kernel& kernel = shape_kernel::dispatched();
   const std::size_t count = cell.nodes.size(), stride = count + SphereGrid::lanes;
   ids_.resize(stride);
   coordinates_.resize(4 * stride);
   hidden_.resize(stride);
-  double* at = coordinates_.data();
-  for (std::uint32_t bits = view_.altered; bits != 0; bits &= bits - 1) {
-    const int q = std::countr_zero(bits);
-    const Vector3& x = points[q].position;
-    const std::uint32_t bit = std::uint32_t{1} << q;
-    ShapeFunctions& shape = at_point_[q];
-    bool sound = false;
-    if ((view_.on_sheet & bit) == 0) {
-      shape_kernel::Support support{0, ids_.data(), at, at + stride, at + 2 * stride, at + 3 * stride};
-      // Every node is written at the end of the list, which moves on only past those that hold the point: no branch.
-      int n = 0;
-      for (std::size_t k = 0; k < count; ++k) {
-        const shape_kernel::Sphere& sphere = candidates_[k];
-        support.ids[n] = cell.nodes[k];
-        support.dx[n] = sphere.x - x.x();
-        support.dy[n] = sphere.y - x.y();
-        support.dz[n] = sphere.z - x.z();
-        support.q[n] = sphere.q;
-        hidden_[n] = static_cast<char>(view_.hidden[k] >> q & 1);
-        n += static_cast<int>(cell.reached[k] >> q & 1);
-      }
-      support.count = n;
-      sound = cut.evaluate_seen(kernel, x, view_.points[q], hidden_, support, spheres_.worst_condition(), shape);
-    }
-    if (!sound) {
-      if (!solvers::evaluate(spheres_, x, shape))
-        return false;
-      cell.growth = std::max(cell.growth, shape.growth);
-    }
-  }
+  for (std::uint32_t bits = view_.altered; bits != 0; bits &= bits - 1)
+    if (const int q = std::countr_zero(bits); !evaluate_altered(points[q].position, q, cell))
+      return false;
 
   for (std::size_t k = 0; k < count; ++k) {
     cell.reached[k] &= ~view_.altered;
@@ -177,12 +187,16 @@ bool CellEvaluator::add_altered(std::span<const QuadraturePoint> points, CellSha
   }
   for (const int node : cell.nodes)
     place_[node] = -1;
-  if (!within)
-    return false;
-  // Nodes that no point sees have no part in the cell.
+  if (within)
+    drop_unreached(cell);
+  return within;
+}
+
+/// Nodes that no point sees have no part in the cell.
+void CellEvaluator::drop_unreached(CellShapes& cell) {
   const std::ptrdiff_t rows = 3 * static_cast<std::ptrdiff_t>(cell.stride);
   std::size_t kept = 0;
-  for (std::size_t k = 0; k < count; ++k) {
+  for (std::size_t k = 0; k < cell.nodes.size(); ++k) {
     if (cell.reached[k] == 0)
       continue;
     if (kept != k) {
@@ -196,7 +210,6 @@ bool CellEvaluator::add_altered(std::span<const QuadraturePoint> points, CellSha
   cell.nodes.resize(kept);
   cell.reached.resize(kept);
   cell.gradients.resize(kept * static_cast<std::size_t>(rows));
-  return true;
 }
 
 void CellEvaluator::evaluate_each(std::span<const QuadraturePoint> points, CellShapes& cell) {

@@ -38,11 +38,16 @@ class CellEvaluator {
   /// Adds the points that a cut alters; false where a support is not sound or has grown beyond the nodes of the cell.
   bool add_altered(std::span<const QuadraturePoint> points, CellShapes& cell);
   void evaluate_each(std::span<const QuadraturePoint> points, CellShapes& cell);
+  void find_candidates(std::span<const QuadraturePoint> points, CellShapes& cell);
+  bool keep_reached(std::span<const QuadraturePoint> points, CellShapes& cell);
+  bool evaluate_altered(const Vector3& x, int q, CellShapes& cell);
+  static void drop_unreached(CellShapes& cell);
 
   const Spheres& spheres_;
   std::vector<int> place_;            // of a node in the cell, -1 outside
   std::vector<std::uint64_t> marked_; // a bit of every node, all 0 between calls
   std::vector<shape_kernel::Sphere> candidates_;
+  std::array<shape_kernel::Points, (most_cell_points - 1) / shape_kernel::points_together + 1> batch_;
   std::vector<std::uint8_t> inside_;
   CellView view_;
   // The support of one point, and which of its nodes are hidden; room for a register beyond the last.

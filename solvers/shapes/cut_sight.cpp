@@ -319,20 +319,13 @@ bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& 
                        support, out);
 }
 
-bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
-                             std::span<const char> hidden, const Wanted& wanted, Support& support,
-                             ShapeFunctions& out) const {
+/// Nodes in sight and around the front move to the head of the support; the way and its direction give their weights.
+/// Whether some way bends.
+bool CutSight::weigh(const Vector3& x, const PointView& view, std::span<const char> hidden, Support& support) const {
   const topology::Incision& incision = *sight_.incision;
-  const std::optional<FrontFrame>& front = view.front;
-  const auto [second, may_enrich, spare, worst_condition] = wanted;
-  const Clock::time_point looked = Clock::now();
-
-  // Nodes in sight and around the front move to the head of the support; the way and its direction give their weights.
   Scratch& scratch = scratch_of_this_thread();
   scratch.resize(support.count);
   double* weight = scratch.weight();
-  const std::array<double*, 3> weight_gradient{scratch.weight_gradient(0), scratch.weight_gradient(1),
-                                               scratch.weight_gradient(2)};
   int n = 0;
   bool bent = false;
   for (int k = 0; k < support.count; ++k) {
@@ -343,9 +336,9 @@ bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& 
     double way = 0;         // 0: straight
     if (hidden[k] != 0) {
       const double radius = 1 / std::sqrt(q);
-      if (!front || front->distance + front_distance_[id] >= radius)
+      if (!view.front || view.front->distance + front_distance_[id] >= radius)
         continue;
-      const auto detour = incision.detour(view.eye, eyes_[id], radius, front->segment);
+      const auto detour = incision.detour(view.eye, eyes_[id], radius, view.front->segment);
       if (!detour || detour->length >= radius)
         continue;
       way = detour->length;
@@ -357,7 +350,7 @@ bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& 
     const double s = (way > 0 ? way : d.norm()) * std::sqrt(q), t = 1 - s;
     weight[n] = t * t * t * (1 + 3 * s);
     for (int axis = 0; axis < 3; ++axis)
-      weight_gradient[axis][n] = -12 * t * t * q * direction[axis];
+      scratch.weight_gradient(axis)[n] = -12 * t * t * q * direction[axis];
     support.ids[n] = id;
     support.dx[n] = d.x();
     support.dy[n] = d.y();
@@ -366,11 +359,79 @@ bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& 
     ++n;
   }
   support.count = n;
+  return bent;
+}
+
+/// The linear part of the moments at a point whose support has been weighed, padded to whole registers.
+shape_kernel::Moments CutSight::linear_moments(Support& support) {
+  Scratch& scratch = scratch_of_this_thread();
+  const int n = support.count, padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
+  const double scale = std::sqrt(support.q[0]);
+  for (int k = n; k < padded; ++k) {
+    scratch.weight()[k] = support.dx[k] = support.dy[k] = support.dz[k] = 0;
+    for (int axis = 0; axis < 3; ++axis)
+      scratch.weight_gradient(axis)[k] = 0;
+  }
+  shape_kernel::Moments moments{};
+  moments.count = n;
+  moments.weight = scratch.weight();
+  moments.slope = scale;
+  moments.share = 1;
+  moments.flattest = flattest;
+  for (int axis = 0; axis < 3; ++axis) {
+    moments.weight_gradient[axis] = scratch.weight_gradient(axis);
+    const double* d = axis == 0 ? support.dx : axis == 1 ? support.dy : support.dz;
+    double* to = scratch.basis(1 + axis);
+    for (int k = 0; k < padded; ++k)
+      to[k] = scale * d[k];
+    moments.basis[axis] = to;
+  }
+  return moments;
+}
+
+/// Adds the branch functions, which fade towards the end of their reach.
+void CutSight::enrich(const Vector3& x, const FrontFrame& front, const EnrichedReach& around, const Support& support,
+                      shape_kernel::Moments& moments) const {
+  Scratch& scratch = scratch_of_this_thread();
+  const int n = support.count, padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
+  const double scale = moments.slope, reach = around.length;
+  moments.enriched = true;
+  const Branch here = branch_at(*sight_.incision, front, x);
+  const double r = std::hypot((x - front.point).dot(front.ahead), (x - front.point).dot(front.normal));
+  const bool smooth = r * scale > 0.5;
+  for (int e = 0; e < 4; ++e) {
+    double* to = scratch.basis(plain_size + e);
+    const Vector3 linear = smooth ? here.gradient[e] : Vector3::Zero();
+    for (int k = 0; k < n; ++k)
+      to[k] = branch_[support.ids[k]].value[e] - here.value[e] -
+              (linear.x() * support.dx[k] + linear.y() * support.dy[k] + linear.z() * support.dz[k]);
+    std::fill(to + n, to + padded, 0.0);
+    moments.basis[plain_size - 1 + e] = to;
+    for (int axis = 0; axis < 3 && !smooth; ++axis)
+      moments.branch_slope[e][axis] = here.gradient[e][axis];
+  }
+  if (front.distance > sight_.blend * reach) {
+    const double width = (1 - sight_.blend) * reach, t = (reach - front.distance) / width;
+    const Vector3 nearness = (front.distance / reach) * around.gradient - (x - front.point) / front.distance;
+    moments.share = t * t * (3 - 2 * t);
+    for (int axis = 0; axis < 3; ++axis)
+      moments.share_gradient[axis] = 6 * t * (1 - t) / width * nearness[axis];
+  }
+}
+
+bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
+                             std::span<const char> hidden, const Wanted& wanted, Support& support,
+                             ShapeFunctions& out) const {
+  const std::optional<FrontFrame>& front = view.front;
+  const auto [second, may_enrich, spare, worst_condition] = wanted;
+  const Clock::time_point looked = Clock::now();
+  const bool bent = weigh(x, view, hidden, support);
   sight_time += Clock::now() - looked;
 
+  const int n = support.count;
   const EnrichedReach around = front ? reach_at(x, *front) : EnrichedReach{};
-  const double reach = around.length;
-  const bool enriched = may_enrich && front && front->distance < reach && front->distance > 1e-9 * reach;
+  const bool enriched =
+      may_enrich && front && front->distance < around.length && front->distance > 1e-9 * around.length;
   if (!bent && !enriched) {
     for (int k = n; k < n + SphereGrid::lanes; ++k) {
       support.dx[k] = support.q[k] = 1;
@@ -382,52 +443,10 @@ bool CutSight::evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& 
   if (n < (enriched ? enriched_size + enriched_spare : plain_size + spare))
     return false;
 
-  const double scale = std::sqrt(support.q[0]);
-  const int padded = (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes;
-  for (int k = n; k < padded; ++k) {
-    weight[k] = support.dx[k] = support.dy[k] = support.dz[k] = 0;
-    for (double* gradient : weight_gradient)
-      gradient[k] = 0;
-  }
-  shape_kernel::Moments moments{};
-  moments.count = n;
-  moments.weight = weight;
-  moments.slope = scale;
-  moments.share = 1;
-  moments.flattest = flattest;
-  for (int axis = 0; axis < 3; ++axis) {
-    moments.weight_gradient[axis] = weight_gradient[axis];
-    const double* d = axis == 0 ? support.dx : axis == 1 ? support.dy : support.dz;
-    double* to = scratch.basis(1 + axis);
-    for (int k = 0; k < padded; ++k)
-      to[k] = scale * d[k];
-    moments.basis[axis] = to;
-  }
-  if (enriched) {
-    moments.enriched = true;
-    const Branch here = branch_at(incision, *front, x);
-    const double r = std::hypot((x - front->point).dot(front->ahead), (x - front->point).dot(front->normal));
-    const bool smooth = r * scale > 0.5;
-    for (int e = 0; e < 4; ++e) {
-      double* to = scratch.basis(plain_size + e);
-      const Vector3 linear = smooth ? here.gradient[e] : Vector3::Zero();
-      for (int k = 0; k < n; ++k)
-        to[k] = branch_[support.ids[k]].value[e] - here.value[e] -
-                (linear.x() * support.dx[k] + linear.y() * support.dy[k] + linear.z() * support.dz[k]);
-      std::fill(to + n, to + padded, 0.0);
-      moments.basis[plain_size - 1 + e] = to;
-      for (int axis = 0; axis < 3 && !smooth; ++axis)
-        moments.branch_slope[e][axis] = here.gradient[e][axis];
-    }
-    if (front->distance > sight_.blend * reach) {
-      const double width = (1 - sight_.blend) * reach, t = (reach - front->distance) / width;
-      const Vector3 nearness = (front->distance / reach) * around.gradient - (x - front->point) / front->distance;
-      moments.share = t * t * (3 - 2 * t);
-      for (int axis = 0; axis < 3; ++axis)
-        moments.share_gradient[axis] = 6 * t * (1 - t) / width * nearness[axis];
-    }
-  }
-  resize(out, padded);
+  shape_kernel::Moments moments = linear_moments(support);
+  if (enriched)
+    enrich(x, *front, around, support, moments);
+  resize(out, (n + SphereGrid::lanes - 1) / SphereGrid::lanes * SphereGrid::lanes);
   out.moment_condition =
       kernel.solve_moments(moments, {out.value.data(), out.dx.data(), out.dy.data(), out.dz.data(), {}});
   resize(out, n);

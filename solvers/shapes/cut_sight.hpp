@@ -101,6 +101,11 @@ class CutSight {
   bool evaluate_seen(const shape_kernel::Kernel& kernel, const Vector3& x, const PointView& view,
                      std::span<const char> hidden, const Wanted& wanted, shape_kernel::Support& support,
                      ShapeFunctions& out) const;
+  bool weigh(const Vector3& x, const PointView& view, std::span<const char> hidden,
+             shape_kernel::Support& support) const;
+  [[nodiscard]] static shape_kernel::Moments linear_moments(shape_kernel::Support& support);
+  void enrich(const Vector3& x, const topology::FrontFrame& front, const EnrichedReach& around,
+              const shape_kernel::Support& support, shape_kernel::Moments& moments) const;
   [[nodiscard]] EnrichedReach reach_at(const Vector3& x, const topology::FrontFrame& frame) const;
 
   Sight sight_;

@@ -211,11 +211,94 @@ double quartic_spline(double s) {
   return t * t * t * (1 + 3 * s);
 }
 
+/// A node whose support is not sound asks for one more step of growth of every sphere that would then hold it; the
+/// steps are counted per sphere so that the outcome does not depend on the order of the nodes.
+struct Spheres::Growing {
+  Spheres& spheres;
+  const std::vector<double>& base; // m, radii that have not grown
+  const std::vector<char>& absent;
+  // Near a front the nodes may be too few for the enriched basis: a support that stays so is left to the linear one.
+  int enriched_growth;
+  std::vector<int> wanted = std::vector<int>(base.size(), 0), level = wanted; // steps
+  int round = 0;
+  ShapeFunctions shape{};
+
+  [[nodiscard]] bool is_absent(int i) const { return !absent.empty() && absent[i] != 0; }
+
+  [[nodiscard]] bool is_sound(int i, Support& support, bool grown) {
+    const Kernel& kernel = shape_kernel::dispatched();
+    if (spheres.cut_ != nullptr && (grown || spheres.cut_->concerns(support)))
+      return spheres.cut_->evaluate(
+          kernel, spheres.centres_[i], support, grown, false, 2, spheres.worst_condition_,
+          wanted[i] < enriched_growth ? CutSight::Enrich::where_near : CutSight::Enrich::never, shape);
+    return support.count >= basis_size(spheres.basis_) + 2 &&
+           evaluate_support(kernel, support, spheres.basis_, false, spheres.worst_condition_, shape);
+  }
+
+  std::vector<int> unsound_nodes() {
+    std::vector<int> unsound;
+    for (int i = 0; i < spheres.size(); ++i) {
+      if (is_absent(i))
+        continue;
+      const Vector3& x = spheres.centres_[i];
+      const SphereGrid::Cell cell = spheres.grid_->find(x);
+      SupportMemory memory(cell.padded);
+      shape_kernel::dispatched().collect(cell, x.data(), memory.support);
+      if (!is_sound(i, memory.support, false))
+        unsound.push_back(i);
+    }
+    return unsound;
+  }
+
+  /// One more step for the nodes in question alone. Those that are not sound still.
+  std::vector<int> grow(const std::vector<int>& unsound) {
+    const std::vector<Vector3>& centres = spheres.centres_;
+    const std::size_t n = centres.size();
+    const double furthest = std::pow(radius_growth, ++round);
+    std::vector<double> widest(n);
+    for (std::size_t j = 0; j < n; ++j)
+      widest[j] = furthest * base[j];
+    // For a few of them every sphere is looked at.
+    const bool are_many = unsound.size() > 100;
+    const SphereGrid reach = are_many ? SphereGrid(centres, widest) : SphereGrid();
+    std::vector<int> everyone(are_many ? 0 : n);
+    std::iota(everyone.begin(), everyone.end(), 0);
+    const auto near = [&](int i) -> std::span<const int> {
+      return are_many ? reach.find(centres[i]).ids : std::span<const int>(everyone);
+    };
+    for (int i : unsound) {
+      if (++wanted[i] > growth_steps_at_node)
+        throw NumericalError(fmt::format(
+            "shape functions: the support of node {} at ({:.6g}, {:.6g}, {:.6g}) m is not sound after {} steps of "
+            "growth by {} from a radius of {:.6g} m ({} such nodes); the nodes around it are too few or in a plane",
+            i, centres[i].x(), centres[i].y(), centres[i].z(), growth_steps_at_node, radius_growth, base[i],
+            unsound.size()));
+      const double factor = std::pow(radius_growth, wanted[i]);
+      for (int j : near(i))
+        if ((centres[j] - centres[i]).norm() < factor * base[j])
+          level[j] = std::max(level[j], wanted[i]);
+    }
+    for (std::size_t j = 0; j < n; ++j)
+      spheres.radii_[j] = base[j] * std::pow(radius_growth, level[j]);
+    std::vector<int> still;
+    for (int i : unsound) {
+      const std::span<const int> candidates = near(i);
+      SupportMemory memory(static_cast<int>(candidates.size()));
+      for (int j : candidates)
+        append(memory.support, j, centres[j] - centres[i], spheres.radii_[j]);
+      pad(memory.support);
+      if (!is_sound(i, memory.support, true))
+        still.push_back(i);
+    }
+    return still;
+  }
+};
+
 Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis,
                  double worst_condition, const Sight& sight, const std::vector<char>& absent, const Spheres* before)
     : centres_(std::move(centres)), basis_(basis), worst_condition_(worst_condition) {
   check(centres_, spacings, rho, basis, worst_condition);
-  const int n = size(), needed = basis_size(basis) + 2;
+  const int n = size();
   std::vector<double> base(n);
   const auto is_absent = [&](int i) { return !absent.empty() && absent[i] != 0; };
   for (int i = 0; i < n; ++i)
@@ -236,78 +319,15 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
     cut_ = std::make_shared<CutSight>(sight, centres_, spacings, radii_);
   }
 
-  // A node whose support is not sound asks for one more step of growth of every sphere that would then hold it; the
-  // steps are counted per sphere so that the outcome does not depend on the order of the nodes.
-  const Kernel& kernel = shape_kernel::dispatched();
-  ShapeFunctions shape;
-  // Near a front the nodes may be too few for the enriched basis: a support that stays so is left to the linear one.
-  std::vector<int> wanted(n, 0), level(n, 0), everyone(n);
-  std::iota(everyone.begin(), everyone.end(), 0);
-  const auto is_sound = [&](int i, Support& support, bool grown) {
-    if (cut_ != nullptr && (grown || cut_->concerns(support)))
-      return cut_->evaluate(kernel, centres_[i], support, grown, false, 2, worst_condition,
-                            wanted[i] < sight.enriched_growth ? CutSight::Enrich::where_near : CutSight::Enrich::never,
-                            shape);
-    return support.count >= needed && evaluate_support(kernel, support, basis, false, worst_condition, shape);
-  };
-  const auto unsound_nodes = [&] {
-    std::vector<int> unsound;
-    for (int i = 0; i < n; ++i) {
-      if (is_absent(i))
-        continue;
-      const SphereGrid::Cell cell = grid_->find(centres_[i]);
-      SupportMemory memory(cell.padded);
-      kernel.collect(cell, centres_[i].data(), memory.support);
-      if (!is_sound(i, memory.support, false))
-        unsound.push_back(i);
-    }
-    return unsound;
-  };
-  std::vector<int> unsound = unsound_nodes();
-  int round = 0;
-  while (!unsound.empty()) {
-    // The nodes in question alone, until they are sound. For a few of them every sphere is looked at.
-    while (!unsound.empty()) {
-      const double furthest = std::pow(radius_growth, ++round);
-      std::vector<double> widest(n);
-      for (int j = 0; j < n; ++j)
-        widest[j] = furthest * base[j];
-      const SphereGrid reach = unsound.size() > 100 ? SphereGrid(centres_, widest) : SphereGrid();
-      const auto near = [&](int i) -> std::span<const int> {
-        return unsound.size() > 100 ? reach.find(centres_[i]).ids : std::span<const int>(everyone);
-      };
-      for (int i : unsound) {
-        if (++wanted[i] > growth_steps_at_node)
-          throw NumericalError(fmt::format(
-              "shape functions: the support of node {} at ({:.6g}, {:.6g}, {:.6g}) m is not sound after {} steps of "
-              "growth by {} from a radius of {:.6g} m ({} such nodes); the nodes around it are too few or in a plane",
-              i, centres_[i].x(), centres_[i].y(), centres_[i].z(), growth_steps_at_node, radius_growth, base[i],
-              unsound.size()));
-        const double factor = std::pow(radius_growth, wanted[i]);
-        for (int j : near(i))
-          if ((centres_[j] - centres_[i]).norm() < factor * base[j])
-            level[j] = std::max(level[j], wanted[i]);
-      }
-      for (int j = 0; j < n; ++j)
-        radii_[j] = base[j] * std::pow(radius_growth, level[j]);
-      std::vector<int> still;
-      for (int i : unsound) {
-        const std::span<const int> candidates = near(i);
-        SupportMemory memory(static_cast<int>(candidates.size()));
-        for (int j : candidates)
-          append(memory.support, j, centres_[j] - centres_[i], radii_[j]);
-        pad(memory.support);
-        if (!is_sound(i, memory.support, true))
-          still.push_back(i);
-      }
-      unsound = std::move(still);
-    }
+  Growing growing{*this, base, absent, sight.enriched_growth};
+  for (std::vector<int> unsound = growing.unsound_nodes(); !unsound.empty(); unsound = growing.unsound_nodes()) {
+    while (!unsound.empty())
+      unsound = growing.grow(unsound);
     grid_ = std::make_shared<const SphereGrid>(centres_, radii_);
     if (cut_ != nullptr)
       cut_->update_radii(centres_, radii_);
-    unsound = unsound_nodes();
   }
-  grown_ = static_cast<int>(std::count_if(level.begin(), level.end(), [](int l) { return l > 0; }));
+  grown_ = static_cast<int>(std::count_if(growing.level.begin(), growing.level.end(), [](int l) { return l > 0; }));
 }
 
 bool evaluate(const Spheres& spheres, const Vector3& x, ShapeFunctions& out) {

@@ -46,6 +46,8 @@ class Spheres {
   [[nodiscard]] const CutSight* cut() const { return cut_.get(); }
 
  private:
+  struct Growing;
+
   std::vector<Vector3> centres_;
   std::vector<double> radii_;
   Basis basis_;

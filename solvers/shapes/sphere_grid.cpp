@@ -111,35 +111,12 @@ struct SphereGrid::Builder {
   }
 };
 
-SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<double>& radii) {
-  const int n = static_cast<int>(centres.size());
-  Vector3 lower = Vector3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-  // The box of the centres will do: a sphere that reaches a point outside it also touches the cell of the box nearest
-  // to that point, since its centre lies on the inner side of whatever face of the box is between.
-  for (int j = 0; j < n; ++j) {
-    lower = lower.cwiseMin(centres[j]);
-    upper = upper.cwiseMax(centres[j]);
-  }
-  const Vector3 extent = upper - lower;
-  // Root cells fit the spheres of median size, but are no more than one per sphere or so, however large the box;
-  // octants make up for it where spheres are small.
-  std::vector<double> sorted = radii;
-  std::nth_element(sorted.begin(), sorted.begin() + n / 2, sorted.end());
-  const double median = sorted[n / 2];
-  const double side =
-      std::max(side_over_radius * median, std::cbrt(extent.cwiseMax(Vector3::Constant(median)).prod() / (n + 64.0)));
-  origin_ = lower;
-  inverse_side_ = 1 / side;
-  for (int a = 0; a < 3; ++a)
-    roots_[a] = std::max(1, static_cast<int>(std::ceil(extent[a] / side)));
-
-  // Members of the root cells as compressed rows. A sphere covers a run of cells in each row of cells that it meets;
-  // the runs are found first, then counted, then written.
-  struct Run {
-    int sphere, first, last;
-  };
+/// A sphere covers a run of root cells in each row of cells that it meets. `side`: of a root cell, m.
+std::vector<SphereGrid::Run> SphereGrid::runs_of(const std::vector<Vector3>& centres, const std::vector<double>& radii,
+                                                 double side) const {
+  const auto n = static_cast<int>(centres.size());
   std::vector<Run> runs;
-  runs.reserve(static_cast<std::size_t>(n) * 40);
+  runs.reserve(centres.size() * 40);
   const auto cells_between = [&](int axis, double low, double high) {
     const double from = (low - origin_[axis]) * inverse_side_ - face_slack;
     const double to = (high - origin_[axis]) * inverse_side_ + face_slack;
@@ -168,6 +145,33 @@ SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<do
         runs.push_back({j, row + h0, row + h1});
       }
   }
+  return runs;
+}
+
+SphereGrid::SphereGrid(const std::vector<Vector3>& centres, const std::vector<double>& radii) {
+  const int n = static_cast<int>(centres.size());
+  Vector3 lower = Vector3::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
+  // The box of the centres will do: a sphere that reaches a point outside it also touches the cell of the box nearest
+  // to that point, since its centre lies on the inner side of whatever face of the box is between.
+  for (int j = 0; j < n; ++j) {
+    lower = lower.cwiseMin(centres[j]);
+    upper = upper.cwiseMax(centres[j]);
+  }
+  const Vector3 extent = upper - lower;
+  // Root cells fit the spheres of median size, but are no more than one per sphere or so, however large the box;
+  // octants make up for it where spheres are small.
+  std::vector<double> sorted = radii;
+  std::nth_element(sorted.begin(), sorted.begin() + n / 2, sorted.end());
+  const double median = sorted[n / 2];
+  const double side =
+      std::max(side_over_radius * median, std::cbrt(extent.cwiseMax(Vector3::Constant(median)).prod() / (n + 64.0)));
+  origin_ = lower;
+  inverse_side_ = 1 / side;
+  for (int a = 0; a < 3; ++a)
+    roots_[a] = std::max(1, static_cast<int>(std::ceil(extent[a] / side)));
+
+  // Members of the root cells as compressed rows: the runs are found first, then counted, then written.
+  const std::vector<Run> runs = runs_of(centres, radii, side);
   const int root_count = roots_[0] * roots_[1] * roots_[2];
   // Every run adds one to the count from its first cell on and takes it back behind its last.
   std::vector<int> start(static_cast<std::size_t>(root_count) + 2, 0);

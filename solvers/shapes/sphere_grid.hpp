@@ -42,6 +42,11 @@ class SphereGrid {
     [[nodiscard]] int first_block() const { return first_id / lanes * 4; }
   };
   struct Builder;
+  struct Run {
+    int sphere, first, last; // root cells
+  };
+  [[nodiscard]] std::vector<Run> runs_of(const std::vector<Vector3>& centres, const std::vector<double>& radii,
+                                         double side) const;
 
   Vector3 origin_ = Vector3::Zero();
   double inverse_side_ = 1; // of a root cell, 1/m

@@ -344,100 +344,72 @@ void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
   }
 }
 
-ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
-  const int count = snapshot_->count;
-  const solvers::PressingTool tool = solvers::pressing(tool_, pose, rest(), normals());
-  const bool frictional = snapshot_->condition == solvers::ContactCondition::frictional;
-  if (frictional)
-    for (int c = 0; c < count; ++c)
-      if (active_[c] != 0)
-        bond_[c] += solvers::tool_motion(pose_, pose, condensed_->rest[c] + bond_[c]);
-  expect(pose.point - pose_.point);
-  look_around(tool);
-  if (frictional)
-    drag_along();
-  ModelForce result;
-  result.converged = false;
-  int pivots = 0;
-  double went = 0; // m, of any candidate in this tick, at most
-  double relaxation = 1;
-  double last_square = 0; // of the last step, and its product with this one, for Aitken's factor
-  while (result.rounds < most_rounds) {
-    ++result.rounds;
+// Gaps and normals of the candidates nearby where they stand.
+void TangentModel::measure_gaps(const solvers::PressingTool& tool) noexcept {
+  for (int k = 0; k < near_count_; ++k) {
+    const int c = near_[k];
+    const solvers::Gap gap = gap_of(tool, c, displacement_[c]);
+    normal_[c] = gap.normal;
+    gap_[c] = gap.distance + gap.normal.dot(condensed_->base[c] - displacement_[c]);
+    fresh_[c] = 0;
+  }
+}
+
+// Pressures and gaps that are complementary, those gaps and normals given. False: not within most_pivots, counted on.
+bool TangentModel::pivot(int& pivots) noexcept {
+  int fewest = std::numeric_limits<int>::max();
+  int patience = patience_of_block;
+  while (true) {
+    while (!solve_active()) {
+    } // ends: every failure lets one candidate go
+    displace();
+    int wrong = 0;
+    int last = -1;
+    const auto is_wrong = [&](int c) {
+      return active_[c] != 0 ? pressure_[c] < 0
+                             : gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c]) < -gap_slack;
+    };
     for (int k = 0; k < near_count_; ++k) {
       const int c = near_[k];
-      const solvers::Gap gap = gap_of(tool, c, displacement_[c]);
-      normal_[c] = gap.normal;
-      gap_[c] = gap.distance + gap.normal.dot(condensed_->base[c] - displacement_[c]);
-      fresh_[c] = 0;
-    }
-    int fewest = std::numeric_limits<int>::max();
-    int patience = patience_of_block;
-    bool complementary = false;
-    while (true) {
-      while (!solve_active()) {
-      } // ends: every failure lets one candidate go
-      displace();
-      int wrong = 0;
-      int last = -1;
-      const auto is_wrong = [&](int c) {
-        return active_[c] != 0 ? pressure_[c] < 0
-                               : gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c]) < -gap_slack;
-      };
-      for (int k = 0; k < near_count_; ++k) {
-        const int c = near_[k];
-        wrong_[c] = is_wrong(c) ? 1 : 0;
-        if (wrong_[c] != 0) {
-          ++wrong;
-          last = c;
-        }
+      wrong_[c] = is_wrong(c) ? 1 : 0;
+      if (wrong_[c] != 0) {
+        ++wrong;
+        last = c;
       }
-      complementary = wrong == 0;
-      if (complementary || pivots >= most_pivots)
-        break;
-      ++pivots;
-      if (wrong < fewest) {
-        fewest = wrong;
-        patience = patience_of_block;
-      } else {
-        --patience;
-      }
-      // All at once while that helps, else one by one [Judice and Pires 1994].
-      for (int k = 0; k < near_count_; ++k)
-        if (const int c = near_[k]; patience > 0 ? wrong_[c] != 0 : c == last)
-          active_[c] = static_cast<char>(active_[c] == 0);
     }
-    const bool stands = !frictional || rub();
-    double largest = 0; // of any component
-    double square = 0;
-    double product = 0;
-    for (int c = 0; c < count; ++c) {
-      const Vector3 now = moved_[c] - displacement_[c];
-      largest = std::max(largest, now.lpNorm<Eigen::Infinity>());
-      product += now.dot(step_[c]);
-      square += now.squaredNorm();
-      step_[c] = now;
-    }
-    const double farthest = std::numbers::sqrt3 * largest;
-    if (largest < still && complementary && stands) {
-      went += farthest;
-      for (int c = 0; c < count; ++c)
-        displacement_[c] = moved_[c];
-      result.converged = true;
-      break;
-    }
-    if (result.rounds > 1) {
-      const double turn = square - 2 * product + last_square;
-      if (turn > 0)
-        relaxation = std::clamp(-relaxation * (product - last_square) / turn, 0.25, 4.0);
-    }
-    last_square = square;
-    went += std::max(1.0, relaxation) * farthest;
-    for (int c = 0; c < count; ++c)
-      displacement_[c] += relaxation * step_[c];
+    if (wrong == 0)
+      return true;
     if (pivots >= most_pivots)
-      break;
+      return false;
+    ++pivots;
+    if (wrong < fewest) {
+      fewest = wrong;
+      patience = patience_of_block;
+    } else {
+      --patience;
+    }
+    // All at once while that helps, else one by one [Judice and Pires 1994].
+    for (int k = 0; k < near_count_; ++k)
+      if (const int c = near_[k]; patience > 0 ? wrong_[c] != 0 : c == last)
+        active_[c] = static_cast<char>(active_[c] == 0);
   }
+}
+
+// The step of a round, and its products with itself and with the last one.
+TangentModel::RoundStep TangentModel::take_step() noexcept {
+  RoundStep step;
+  for (int c = 0; c < snapshot_->count; ++c) {
+    const Vector3 now = moved_[c] - displacement_[c];
+    step.largest = std::max(step.largest, now.lpNorm<Eigen::Infinity>());
+    step.product += now.dot(step_[c]);
+    step.square += now.squaredNorm();
+    step_[c] = now;
+  }
+  return step;
+}
+
+// Force, torque and stored energy of the pressures found.
+void TangentModel::add_forces(const topology::ToolPose& pose, bool frictional, ModelForce& result) noexcept {
   double stored = 0;
   for (int a = 0; a < chosen_count_; ++a) {
     const int c = chosen_[a];
@@ -458,6 +430,53 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     const int c = near_[k];
     result.sinking = std::max(result.sinking, -(gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c])));
   }
+}
+
+ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
+  const int count = snapshot_->count;
+  const solvers::PressingTool tool = solvers::pressing(tool_, pose, rest(), normals());
+  const bool frictional = snapshot_->condition == solvers::ContactCondition::frictional;
+  if (frictional)
+    for (int c = 0; c < count; ++c)
+      if (active_[c] != 0)
+        bond_[c] += solvers::tool_motion(pose_, pose, condensed_->rest[c] + bond_[c]);
+  expect(pose.point - pose_.point);
+  look_around(tool);
+  if (frictional)
+    drag_along();
+  ModelForce result;
+  result.converged = false;
+  int pivots = 0;
+  double went = 0; // m, of any candidate in this tick, at most
+  double relaxation = 1;
+  double last_square = 0; // of the last step
+  while (result.rounds < most_rounds) {
+    ++result.rounds;
+    measure_gaps(tool);
+    const bool complementary = pivot(pivots);
+    const bool stands = !frictional || rub();
+    const RoundStep step = take_step();
+    const double farthest = std::numbers::sqrt3 * step.largest;
+    if (step.largest < still && complementary && stands) {
+      went += farthest;
+      for (int c = 0; c < count; ++c)
+        displacement_[c] = moved_[c];
+      result.converged = true;
+      break;
+    }
+    if (result.rounds > 1) { // Aitken's factor
+      const double turn = step.square - 2 * step.product + last_square;
+      if (turn > 0)
+        relaxation = std::clamp(-relaxation * (step.product - last_square) / turn, 0.25, 4.0);
+    }
+    last_square = step.square;
+    went += std::max(1.0, relaxation) * farthest;
+    for (int c = 0; c < count; ++c)
+      displacement_[c] += relaxation * step_[c];
+    if (pivots >= most_pivots)
+      break;
+  }
+  add_forces(pose, frictional, result);
   for (int c = 0; c < count; ++c)
     change_[c] = displacement_[c] - start_[c];
   changes_ = true;

@@ -27,6 +27,14 @@ class TangentModel : public ForceModel {
   using PerCandidate = std::array<T, most_candidates>;
 
   ModelForce press(const topology::ToolPose& pose) noexcept;
+  void measure_gaps(const solvers::PressingTool& tool) noexcept;
+  bool pivot(int& pivots) noexcept;
+  struct RoundStep {
+    double largest = 0;             // m, of any component
+    double square = 0, product = 0; // m2
+  };
+  RoundStep take_step() noexcept;
+  void add_forces(const topology::ToolPose& pose, bool frictional, ModelForce& result) noexcept;
   ModelForce follow(const topology::ToolPose& pose) noexcept;
   [[nodiscard]] solvers::Gap gap_of(const solvers::PressingTool& tool, int c, const Vector3& u) const noexcept;
   [[nodiscard]] bool solve_active() noexcept;

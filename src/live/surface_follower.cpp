@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <span>
 #include <unordered_map>
 
 namespace spherecut::app {
@@ -50,6 +51,32 @@ class ChangedPlaces {
   std::vector<Place> places_;
   bool all_ = false;
 };
+
+/// Where nodes have come, gone or changed their spheres; `now`: the number today of each node before, -1 where it is
+/// gone.
+ChangedPlaces changed_nodes(const std::vector<Vector3>& places_before, const std::vector<double>& radii_before,
+                            const std::vector<Vector3>& nodes, const std::vector<double>& radii,
+                            std::vector<int>& now) {
+  ChangedPlaces changed;
+  now.assign(places_before.size(), -1);
+  const PlaceMap numbers = numbered(nodes);
+  std::vector<char> met(nodes.size(), 0);
+  for (std::size_t i = 0; i < places_before.size(); ++i) {
+    const auto found = numbers.find(places_before[i]);
+    if (found == numbers.end()) {
+      changed.add(places_before[i], radii_before[i]);
+      continue;
+    }
+    now[i] = found->second;
+    met[static_cast<std::size_t>(found->second)] = 1;
+    if (const double radius = radii[static_cast<std::size_t>(found->second)]; radius != radii_before[i])
+      changed.add(places_before[i], std::max(radii_before[i], radius));
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (met[i] == 0)
+      changed.add(nodes[i], radii[i]);
+  return changed;
+}
 
 /// Vertices that sheets have gained; sheets that do not go on as they were change everything.
 void add_growth(const topology::Incision* before, const topology::Incision* now, ChangedPlaces& changed) {
@@ -142,13 +169,32 @@ void SurfaceFollower::take_surface(const Session& session) {
   topology_ = std::move(next);
 }
 
+/// The row of a place whose shape functions are evaluated anew, at the end of `into`.
+void SurfaceFollower::add_row(const solvers::ShapeFunctions& shape, const std::vector<double>& radii, Row& row,
+                              Rows& into) {
+  const auto spheres = static_cast<int>(radii.size());
+  for (const solvers::VectorTerm& term : shape.vectors)
+    into.terms.push_back({term.group, term.value});
+  for (std::size_t k = 0; k < shape.nodes.size(); ++k) {
+    const int node = shape.nodes[k];
+    if (node >= spheres) {
+      into.terms.push_back({node, shape.value[k] * Matrix3::Identity()});
+      continue;
+    }
+    ++row.count;
+    into.nodes.push_back(node);
+    into.weights.push_back(shape.value[k]);
+    row.radius = std::max(row.radius, front_share * radii[static_cast<std::size_t>(node)]);
+  }
+}
+
 // A row stays when the nodes in it are the same, none with x in its sphere has come or gone, and no new part of the
 // cut is near.
 void SurfaceFollower::take_rows(const Session& session) {
   evaluated_ = 0;
   const BodyModel& model = session.model();
   if (model.body == nullptr) {
-    rows_.clear();
+    rows_ = {};
     row_places_.clear();
     return;
   }
@@ -158,89 +204,57 @@ void SurfaceFollower::take_rows(const Session& session) {
   std::vector<double> radii(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i)
     radii[i] = model.body->sphere_radius(static_cast<int>(i));
-  if (!rows_.empty() && nodes == node_places_ && radii == node_radii_ && kept_incision_ == model.incision &&
+  if (!rows_.rows.empty() && nodes == node_places_ && radii == node_radii_ && kept_incision_ == model.incision &&
       evaluation_ == row_places_)
     return;
 
-  const bool appends = 3 * spheres != model.body->coefficient_count() || !terms_.empty();
-  std::vector<Term> terms;
+  const bool appends = 3 * spheres != model.body->coefficient_count() || !rows_.terms.empty();
   ChangedPlaces changed;
-  std::vector<int> now(node_places_.size(), -1); // number of each node before, today
-  if (rows_.empty() || appends) {                // functions of a cut have other numbers after each increment
+  std::vector<int> now(node_places_.size(), -1);
+  if (rows_.rows.empty() || appends) // functions of a cut have other numbers after each increment
     changed.all();
-  } else {
-    const PlaceMap numbers = numbered(nodes);
-    std::vector<char> met(nodes.size(), 0);
-    for (std::size_t i = 0; i < node_places_.size(); ++i) {
-      const auto found = numbers.find(node_places_[i]);
-      if (found == numbers.end()) {
-        changed.add(node_places_[i], node_radii_[i]);
-        continue;
-      }
-      now[i] = found->second;
-      met[static_cast<std::size_t>(found->second)] = 1;
-      if (radii[static_cast<std::size_t>(found->second)] != node_radii_[i])
-        changed.add(node_places_[i], std::max(node_radii_[i], radii[static_cast<std::size_t>(found->second)]));
-    }
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      if (met[i] == 0)
-        changed.add(nodes[i], radii[i]);
-  }
+  else
+    changed = changed_nodes(node_places_, node_radii_, nodes, radii, now);
   ChangedPlaces cut;
   add_growth(kept_incision_.get(), model.incision.get(), cut);
 
-  const PlaceMap old_rows = rows_.empty() ? PlaceMap{} : numbered(row_places_);
-  std::vector<Row> rows(evaluation_.size());
-  std::vector<int> row_nodes;
-  std::vector<double> weights;
-  row_nodes.reserve(nodes_.size());
-  weights.reserve(weights_.size());
+  const PlaceMap old_rows = rows_.rows.empty() ? PlaceMap{} : numbered(row_places_);
+  Rows next;
+  next.rows.resize(evaluation_.size());
+  next.nodes.reserve(rows_.nodes.size());
+  next.weights.reserve(rows_.weights.size());
   solvers::ShapeFunctions shape;
   for (std::size_t v = 0; v < evaluation_.size(); ++v) {
     const Vector3& x = evaluation_[v];
-    Row& row = rows[v];
-    row.first = static_cast<int>(row_nodes.size());
-    row.first_term = static_cast<int>(terms.size());
+    Row& row = next.rows[v];
+    row.first = static_cast<int>(next.nodes.size());
+    row.first_term = static_cast<int>(next.terms.size());
     const auto old = old_rows.find(x);
     if (old != old_rows.end() && !changed.touch(x, 0)) {
-      const Row& before = rows_[static_cast<std::size_t>(old->second)];
+      const Row& before = rows_.rows[static_cast<std::size_t>(old->second)];
+      const std::span<const int> of_before(rows_.nodes.data() + before.first, static_cast<std::size_t>(before.count));
       // Where a support had to be grown, or another point stands in, a node may be gone that did not reach here.
-      const bool whole = std::all_of(nodes_.begin() + before.first, nodes_.begin() + before.first + before.count,
+      const bool whole = std::all_of(of_before.begin(), of_before.end(),
                                      [&](int node) { return now[static_cast<std::size_t>(node)] >= 0; });
       if (whole && !cut.touch(x, before.radius)) {
         row.count = before.count;
         row.radius = before.radius;
-        for (int k = before.first; k < before.first + before.count; ++k) {
-          row_nodes.push_back(now[static_cast<std::size_t>(nodes_[static_cast<std::size_t>(k)])]);
-          weights.push_back(weights_[static_cast<std::size_t>(k)]);
-        }
+        for (const int node : of_before)
+          next.nodes.push_back(now[static_cast<std::size_t>(node)]);
+        next.weights.insert(next.weights.end(), rows_.weights.begin() + before.first,
+                            rows_.weights.begin() + before.first + before.count);
         continue;
       }
     }
     model.shape_at(x, shape);
     ++evaluated_;
-    for (const solvers::VectorTerm& term : shape.vectors)
-      terms.push_back({term.group, term.value});
-    for (int k = 0; k < shape.size(); ++k) {
-      if (shape.nodes[static_cast<std::size_t>(k)] >= spheres) {
-        terms.push_back(
-            {shape.nodes[static_cast<std::size_t>(k)], shape.value[static_cast<std::size_t>(k)] * Matrix3::Identity()});
-        continue;
-      }
-      ++row.count;
-      row_nodes.push_back(shape.nodes[static_cast<std::size_t>(k)]);
-      weights.push_back(shape.value[static_cast<std::size_t>(k)]);
-      row.radius =
-          std::max(row.radius, front_share * radii[static_cast<std::size_t>(shape.nodes[static_cast<std::size_t>(k)])]);
-    }
+    add_row(shape, radii, row, next);
   }
-  rows_ = std::move(rows);
-  nodes_ = std::move(row_nodes);
-  weights_ = std::move(weights);
-  for (std::size_t v = 0; v < rows_.size(); ++v)
-    rows_[v].terms =
-        (v + 1 < rows_.size() ? rows_[v + 1].first_term : static_cast<int>(terms.size())) - rows_[v].first_term;
-  terms_ = std::move(terms);
+  for (std::size_t v = 0; v < next.rows.size(); ++v)
+    next.rows[v].terms =
+        (v + 1 < next.rows.size() ? next.rows[v + 1].first_term : static_cast<int>(next.terms.size())) -
+        next.rows[v].first_term;
+  rows_ = std::move(next);
   node_places_ = nodes;
   node_radii_ = std::move(radii);
   row_places_ = evaluation_;
@@ -250,29 +264,29 @@ void SurfaceFollower::take_rows(const Session& session) {
 void SurfaceFollower::deform(const Session& session, std::vector<Eigen::Vector3f>& vertices) const {
   vertices = topology_->vertices;
   const BodyModel& model = session.model();
-  if (rows_.empty() || !model.state)
+  if (rows_.rows.empty() || !model.state)
     return;
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     Vector3 displacement = Vector3::Zero();
-    const Row& row = rows_[v];
+    const Row& row = rows_.rows[v];
     for (int k = row.first; k < row.first + row.count; ++k)
-      displacement += weights_[static_cast<std::size_t>(k)] *
-                      model.field.coefficients.segment<3>(3 * nodes_[static_cast<std::size_t>(k)]);
+      displacement += rows_.weights[static_cast<std::size_t>(k)] *
+                      model.field.coefficients.segment<3>(3 * rows_.nodes[static_cast<std::size_t>(k)]);
     for (int k = row.first_term; k < row.first_term + row.terms; ++k)
-      displacement +=
-          terms_[static_cast<std::size_t>(k)].value *
-          model.field.coefficients.segment<3>(3 * static_cast<Eigen::Index>(terms_[static_cast<std::size_t>(k)].group));
+      displacement += rows_.terms[static_cast<std::size_t>(k)].value *
+                      model.field.coefficients.segment<3>(
+                          3 * static_cast<Eigen::Index>(rows_.terms[static_cast<std::size_t>(k)].group));
     vertices[v] = (places_[v] + displacement).cast<float>();
   }
 }
 
 void SurfaceFollower::spread(const std::vector<double>& nodal, std::vector<float>& values) const {
   values.assign(places_.size(), 0);
-  for (std::size_t v = 0; v < rows_.size(); ++v) {
+  for (std::size_t v = 0; v < rows_.rows.size(); ++v) {
     double value = 0;
-    for (int k = rows_[v].first; k < rows_[v].first + rows_[v].count; ++k)
-      value +=
-          weights_[static_cast<std::size_t>(k)] * nodal[static_cast<std::size_t>(nodes_[static_cast<std::size_t>(k)])];
+    for (int k = rows_.rows[v].first; k < rows_.rows[v].first + rows_.rows[v].count; ++k)
+      value += rows_.weights[static_cast<std::size_t>(k)] *
+               nodal[static_cast<std::size_t>(rows_.nodes[static_cast<std::size_t>(k)])];
     values[v] = static_cast<float>(value);
   }
 }

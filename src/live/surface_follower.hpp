@@ -38,8 +38,8 @@ class SurfaceFollower {
 
  private:
   struct Row {
-    int first = 0, count = 0;      // in nodes_ and weights_
-    int first_term = 0, terms = 0; // in terms_
+    int first = 0, count = 0;      // in Rows::nodes and Rows::weights
+    int first_term = 0, terms = 0; // in Rows::terms
     double radius = 0;             // m, farthest that a change of the cut matters
   };
   /// What an appended function does to a vertex: displacement of its three unknowns.
@@ -47,15 +47,19 @@ class SurfaceFollower {
     int group;
     Matrix3 value;
   };
+  struct Rows {
+    std::vector<Row> rows; // one a vertex; none before there is a body
+    std::vector<int> nodes;
+    std::vector<double> weights;
+    std::vector<Term> terms; // of a body whose cut only appends
+  };
+  static void add_row(const solvers::ShapeFunctions& shape, const std::vector<double>& radii, Row& row, Rows& into);
   void take_surface(const Session& session);
   void take_rows(const Session& session);
 
   std::shared_ptr<const ViewerTopology> topology_;
   std::vector<Vector3> places_, evaluation_; // m, at rest
-  std::vector<Row> rows_;                    // one a vertex; none before there is a body
-  std::vector<int> nodes_;
-  std::vector<double> weights_;
-  std::vector<Term> terms_; // of a body whose cut only appends
+  Rows rows_;
   // The body that rows_ are of:
   std::shared_ptr<const topology::Incision> kept_incision_;
   std::vector<Vector3> node_places_;
