@@ -61,6 +61,7 @@ const std::vector<Experiment>& all_experiments() {
       {"haptic_loop", "60 s of palpating and cutting a liver in real time: time and lateness of every tick",
        run_haptic_loop},
       {"solve_rate", "whole steps from contact to force a second, uncut and while cutting", run_solve_rate},
+      {"sensitivity", "what half and twice each tuned number does to the error that it was chosen by", run_sensitivity},
       {"real_world",
        "what people bring: organs from files, thin walls, loads alone, hardware at its own rate, disorder from outside",
        run_real_world},

@@ -36,6 +36,7 @@ std::vector<Check> run_passivity(const ExperimentContext& context);
 std::vector<Check> run_haptic_loop(const ExperimentContext& context);
 std::vector<Check> run_solve_rate(const ExperimentContext& context);
 std::vector<Check> run_real_world(const ExperimentContext& context);
+std::vector<Check> run_sensitivity(const ExperimentContext& context);
 std::vector<Check> run_finite_patch(const ExperimentContext& context);
 std::vector<Check> run_finite_exact(const ExperimentContext& context);
 std::vector<Check> run_finite_locking(const ExperimentContext& context);

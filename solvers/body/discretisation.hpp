@@ -6,6 +6,7 @@
 #include "solvers/elasticity/material.hpp"
 #include "solvers/nodes/nodes.hpp"
 #include "solvers/shapes/sight.hpp"
+#include "solvers/shapes/tuning.hpp"
 
 #include <functional>
 #include <memory>
@@ -63,6 +64,7 @@ struct Problem {
   /// Unit vector out of the body towards the tool that is going to touch it. Forces on a node at a sharp edge act on
   /// the side of its share that faces the tool; where none does alone, on the edge. Empty: on the whole share.
   std::optional<Vector3> touched_from;
+  Tuning tuning{};
 
   [[nodiscard]] const std::shared_ptr<const topology::Incision>& hiding() const { return opaque ? opaque : incision; }
 };

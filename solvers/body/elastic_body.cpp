@@ -127,14 +127,15 @@ Matrix3 initial_stress(const Problem& problem) {
 }
 
 Sight sight_about_cut(const Problem& problem, Method method, SightRule rule) {
-  Sight sight{.incision = problem.hiding(), .rule = rule};
+  const Tuning& tuning = problem.tuning;
+  Sight sight{.incision = problem.hiding(), .rule = rule, .reach = tuning.front_reach, .blend = tuning.front_blend};
   if (method == Method::collocation && rule == SightRule::enriched) {
-    sight.reach = 1.75;
+    sight.reach = tuning.collocation_front_reach;
     sight.enriched_growth = 2;
-    sight.radius_factor = front_radius_factor;
+    sight.radius_factor = tuning.collocation_front_radius;
   }
   if (problem.material.poisson_ratio >= 0.45)
-    sight.reach = 2.5;
+    sight.reach = tuning.front_reach_soft;
   return sight;
 }
 

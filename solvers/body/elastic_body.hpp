@@ -12,7 +12,6 @@ namespace spherecut::solvers {
 /// with little but lip nodes of one plane in sight, it comes to 3e8, and shape functions to gradients of 1e4 per
 /// spacing.
 inline constexpr double worst_moment_condition = 1e7;
-inline constexpr double front_radius_factor = 1.2; // supports of collocation at a front are larger by this
 
 /// Shape functions at every node in compressed rows: support of node i is entries start[i] .. start[i+1].
 struct NodalSupports {

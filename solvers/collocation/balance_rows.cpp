@@ -13,10 +13,7 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double damping = 0.3;             // gamma
-constexpr double damping_at_front = 2;      // gamma where the basis is enriched
-constexpr double pair_reach = 0.01;         // nodes nearer than this, in spacings, are partners of a lip pair
-constexpr double pressure_smoothing = 0.01; // alpha
+constexpr double pair_reach = 0.01; // nodes nearer than this, in spacings, are partners of a lip pair
 
 using Block = Eigen::Matrix4d;
 
@@ -152,7 +149,7 @@ void RowAssembly::add_side(int i, const Side& side) {
   const bool at_front = operators_.at_front[side.face] != 0;
   // Partners of a lip pair ahead of the front are too near for a difference of theirs to mean anything.
   const bool pair = d.norm() < pair_reach * problem_.nodes.spacings[i];
-  const double gamma = pair ? 0 : at_front ? damping_at_front : damping;
+  const double gamma = pair ? 0 : at_front ? problem_.tuning.damping_at_front : problem_.tuning.damping;
   const double w = gamma * mu_ * area.dot(d) / d.squaredNorm();
   block(side.other).topLeftCorner<3, 3>().diagonal().array() -= w;
   block(i).topLeftCorner<3, 3>().diagonal().array() += w;
@@ -179,7 +176,7 @@ void RowAssembly::add_side(int i, const Side& side) {
   }
   if (!mixed_)
     return;
-  const double smoothing = pressure_smoothing * area.norm() * d.norm() / mu_;
+  const double smoothing = problem_.tuning.pressure_smoothing * area.norm() * d.norm() / mu_;
   Block& other = block(side.other);
   other.block<3, 1>(0, 3) += 0.5 * area; // -(-p A)
   other(3, 3) -= smoothing;

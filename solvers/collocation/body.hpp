@@ -11,6 +11,7 @@ namespace spherecut::solvers {
 
 inline constexpr double mixed_above = 0.40; // Poisson ratio from which the pressure unknown is used
 
+inline constexpr double default_collocation_radius = 1.8; // spacings
 /// rho, in spacings.
 double collocation_support_radius(const DiscretisationOptions& options);
 

@@ -17,12 +17,11 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double default_support_radius = 1.8;
 
 } // namespace
 
 double collocation_support_radius(const DiscretisationOptions& options) {
-  return options.support_radius > 0 ? options.support_radius : default_support_radius;
+  return options.support_radius > 0 ? options.support_radius : default_collocation_radius;
 }
 
 Collocation::Collocation(Problem problem, const DiscretisationOptions& options, Assembled)

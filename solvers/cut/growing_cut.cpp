@@ -30,8 +30,8 @@ constexpr std::size_t first_part = 5; // one of so many parts of the way is wher
 double window_share(const Problem& problem, const DiscretisationOptions& method, const topology::SurfaceMesh& way) {
   const std::vector<double>& spacings = problem.nodes.spacings;
   const bool collocates = method.method == Method::collocation;
-  const double rho =
-      collocates ? front_radius_factor * collocation_support_radius(method) : galerkin_support_radius(problem, method);
+  const double rho = collocates ? problem.tuning.collocation_front_radius * collocation_support_radius(method)
+                                : galerkin_support_radius(problem, method);
   const std::vector<double>& lengths = collocates ? spacings : problem.nodes.*galerkin_lengths(problem.material);
   const double finest = *std::min_element(spacings.begin(), spacings.end());
   const Nearness to_way(sample_points(way, 0, finest));

@@ -3,7 +3,7 @@
 // K_IJ = integral over the body of [lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1], g = grad h, by background cells.
 // Displacements are prescribed as means over each held node's share of the surface, m_i(u) = g_i: multipliers constant
 // over each share, so that a constant traction is met exactly (point constraints fail the patch test by their own
-// quadrature of the traction). A penalty P = `penalty` E h_i per component adds P m m^T, and the force of the
+// quadrature of the traction). A penalty P = `holding` E h_i per component adds P m m^T, and the force of the
 // constraint on the body is P (g - m(u)). Forces of the tool act on the same shares. The shape functions sum to one, so
 // the rows of K add up to zero and all forces balance to rounding.
 #include "solvers/galerkin/galerkin.hpp"
@@ -27,8 +27,6 @@
 namespace spherecut::solvers {
 
 namespace {
-
-constexpr double penalty = 1e4;
 
 class Galerkin final : public ElasticBody {
  public:
@@ -463,8 +461,9 @@ double galerkin_support_radius(const Problem& problem, const DiscretisationOptio
   if (options.support_radius > 0)
     return options.support_radius;
   if (is_nearly_incompressible(problem.material))
-    return 2.2;
-  return problem.hiding() != nullptr || options.cut_ahead ? 1.75 : 2.0;
+    return problem.tuning.sphere_radius_soft;
+  return problem.hiding() != nullptr || options.cut_ahead ? problem.tuning.sphere_radius_cut
+                                                          : problem.tuning.sphere_radius;
 }
 
 BackgroundOptions background_of(const DiscretisationOptions& options) {
@@ -476,7 +475,7 @@ std::vector<double> NodeCloud::*galerkin_lengths(const Material& material) {
 }
 
 double constraint_stiffness(const Problem& problem, int node) {
-  return penalty * problem.material.young_modulus * problem.nodes.spacings[node];
+  return problem.tuning.holding * problem.material.young_modulus * problem.nodes.spacings[node];
 }
 
 std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const DiscretisationOptions& options) {

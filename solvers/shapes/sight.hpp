@@ -1,6 +1,7 @@
 // How spheres of influence reach around a cut.
 #pragma once
 
+#include "solvers/shapes/tuning.hpp"
 #include "topology/incision/incision.hpp"
 
 #include <memory>
@@ -22,8 +23,9 @@ SightRule sight_rule_from_string(std::string_view name);
 struct Sight {
   std::shared_ptr<const topology::Incision> incision; // null: uncut
   SightRule rule = SightRule::enriched;
-  double reach = 1.35; // enrichment ends this far from the front, in units of h as the spheres take it
-  double blend = 0.5;  // and fades from this part of the reach on, so that the shape functions stay continuous
+  double reach = Tuning{}.front_reach; // enrichment ends this far from the front, in units of h as the spheres take it
+  double blend =
+      Tuning{}.front_blend; // and fades from this part of the reach on, so that the shape functions stay continuous
   /// So often all spheres about a node may grow where it sees too few others for the enriched basis; then the linear
   /// one does for it, and points beside it look farther for themselves.
   int enriched_growth = 0;
