@@ -21,6 +21,8 @@ std::vector<Check> run_precut_torsion(const ExperimentContext& context);
 std::vector<Check> run_precut_ellipse(const ExperimentContext& context);
 std::vector<Check> run_precut_lens(const ExperimentContext& context);
 std::vector<Check> run_precut_edge(const ExperimentContext& context);
+std::vector<Check> run_precut_kinked(const ExperimentContext& context);
+std::vector<Check> run_precut_crossing(const ExperimentContext& context);
 std::vector<Check> run_precut_beam(const ExperimentContext& context);
 std::vector<Check> run_sif(const ExperimentContext& context);
 std::vector<Check> run_kink(const ExperimentContext& context);

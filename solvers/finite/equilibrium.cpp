@@ -245,17 +245,24 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
   if (!now.usable)
     return false;
   bool converged = iterate(target, method, now, status);
-  for (int round = 0; converged && deepest(target) > options_.penetration; ++round) {
+  for (int round = 0; converged; ++round) {
+    std::vector<double> balanced; // forces of the lips along the normals so far
+    if (lips_) {
+      balanced = lips_->forces();
+      lips_->turn(body_.piola_maps(now.coefficients));
+      evaluate(now.coefficients, target, now, status);
+      status.residual = now.residual.norm() / now.acting;
+    }
+    if (status.residual < options_.tolerance && deepest(target) <= options_.penetration)
+      break;
     if (round == most_contact_rounds) {
       converged = false;
       break;
     }
     if (contact_)
       contact_->accept_forces();
-    if (lips_) {
-      lips_->accept_forces();
-      lips_->turn(body_.piola_maps(now.coefficients));
-    }
+    if (lips_)
+      lips_->set_known_forces(balanced);
     evaluate(now.coefficients, target, now, status);
     converged = iterate(target, method, now, status);
   }

@@ -73,10 +73,11 @@ double FiniteLips::add(const VectorX& coefficients, VectorX& forces) {
   return energy;
 }
 
-void FiniteLips::accept_forces() {
-  std::fill(known_.begin(), known_.end(), 0.0);
+std::vector<double> FiniteLips::forces() const {
+  std::vector<double> all(pairs_.size(), 0);
   for (const Active& active : active_)
-    known_[active.pair] = active.force;
+    all[active.pair] = active.force;
+  return all;
 }
 
 void FiniteLips::append_active(const std::vector<Matrix3>& maps, std::vector<ActiveConstraint>& constraints) const {

@@ -1,6 +1,6 @@
 // Frictionless contact of the faces of a cut at finite strain: an augmented Lagrangian as that of a tool
 // (solvers/finite/contact.hpp), from each lip node to its partner across the sheet. Their gap is that of the means over
-// their shares along the normal of the deformed sheet, which is renewed step by step.
+// their shares along the normal of the deformed sheet, renewed until forces and gaps hold along the present one.
 #pragma once
 
 #include "solvers/contact/lip_contact.hpp"
@@ -20,8 +20,10 @@ class FiniteLips {
 
   /// Adds the slope of the energy to `forces` and returns the energy, J. Remembers what touches.
   double add(const VectorX& coefficients, VectorX& forces);
+  /// Of every pair at the last call, N.
+  [[nodiscard]] std::vector<double> forces() const;
   /// The forces at the last call become those that are known.
-  void accept_forces();
+  void accept_forces() { known_ = forces(); }
   [[nodiscard]] std::vector<double> known_forces() const { return known_; }
   void set_known_forces(const std::vector<double>& forces) { known_ = forces; }
 

@@ -113,6 +113,14 @@ TEST_CASE("Quick spherical cap crack: K_I and K_II along the front") {
   require_quick_run_passes("precut_lens");
 }
 
+TEST_CASE("Quick kinked slit: opening") {
+  require_quick_run_passes("precut_kinked");
+}
+
+TEST_CASE("Quick crossing slits: openings") {
+  require_quick_run_passes("precut_crossing");
+}
+
 TEST_CASE("Quick edge-notched strip: intensity") {
   require_quick_run_passes("precut_edge");
 }

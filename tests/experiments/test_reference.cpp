@@ -2,6 +2,7 @@
 #include "experiments/hemisphere_palpation/palpation.hpp"
 #include "experiments/hemisphere_palpation/reference.hpp"
 #include "experiments/reference/axisymmetric.hpp"
+#include "experiments/support/plane_slits.hpp"
 
 #include "topology/base/errors.hpp"
 
@@ -196,4 +197,22 @@ TEST_CASE(
   CHECK(surface_displacement(run, 0.01).norm() > 0.1);
   run.local_nodes = false;
   CHECK_THROWS_AS(surface_displacement(run, far), InputError);
+}
+
+TEST_CASE("Tables of slits in a plate are read, and refused when something is missing") {
+  const std::string head = "# made by: hand\n# tension: 0 1\n# poisson_ratio: 0.3\n# slit_0: 0 0 0.5 0\n"
+                           "# calculix_change: 1e-3\n# getfem_change: 2e-3\n",
+                    rest = "# codes_apart: 1e-5\nslit,part,share,calculix_x,calculix_y,getfem_x,getfem_y\n";
+  const experiments::PlaneSlits plate = experiments::read_plane_slits(head + rest + "0,0,0.25,0.1,0.2,0.11,0.21\n");
+  CHECK(plate.tension == Eigen::Vector2d(0, 1));
+  CHECK(plate.mesh_change == 2e-3);
+  REQUIRE(plate.slits.size() == 1);
+  CHECK(plate.slits[0][1] == Eigen::Vector2d(0.5, 0));
+  REQUIRE(plate.places.size() == 1);
+  CHECK(plate.places[0].share == 0.25);
+  CHECK(plate.places[0].opening == Eigen::Vector2d(0.1, 0.2));
+  CHECK_THROWS_AS(experiments::read_plane_slits(head), InputError);
+  CHECK_THROWS_AS(experiments::read_plane_slits(head + rest + "0,0,0.25,0.1\n"), InputError);
+  CHECK_THROWS_AS(experiments::read_plane_slits(head + rest + "0,1,0.25,0.1,0.2,0.11,0.21\n"), InputError);
+  CHECK_THROWS_AS(experiments::read_plane_slits(head + rest + "0,0,x,0.1,0.2,0.11,0.21\n"), InputError);
 }

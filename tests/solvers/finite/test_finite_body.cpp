@@ -62,6 +62,18 @@ std::vector<Vector3> pressed_top(const FiniteBody& body, double depth) {
   return body.prescribed_values([&](const Vector3& x) { return Vector3(0, 0, x.z() > 1 - 1e-9 ? -depth : 0); });
 }
 
+/// A block cut in two whose whole surface is held.
+Problem cut_through_and_held_all_around() {
+  const tests::CutBlock block = tests::cut_block(6, true, 2);
+  Problem problem = tests::problem_of(block, {1, 0.45, 0});
+  problem.prescribed.clear();
+  for (int i = 0; i < problem.nodes.size(); ++i)
+    if (problem.nodes.kinds[i] != NodeKind::lip && problem.nodes.positions[i].cwiseAbs().maxCoeff() > 0.5 - 1e-9)
+      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  problem.prescribed_region = [](const Vector3& x, const Vector3&) { return x.cwiseAbs().maxCoeff() > 0.5 - 1e-9; };
+  return problem;
+}
+
 } // namespace
 
 TEST_CASE("Forces are the slope of the energy, the tangent that of the forces") {
@@ -301,13 +313,7 @@ TEST_CASE("The tangent of a step of a viscoelastic body is that of its forces") 
 }
 
 TEST_CASE("A cut that is pressed together bears what the uncut block does, and opens when it is drawn") {
-  const tests::CutBlock block = tests::cut_block(6, true, 2);
-  Problem problem = tests::problem_of(block, {1, 0.45, 0});
-  problem.prescribed.clear();
-  for (int i = 0; i < problem.nodes.size(); ++i)
-    if (problem.nodes.kinds[i] != NodeKind::lip && problem.nodes.positions[i].cwiseAbs().maxCoeff() > 0.5 - 1e-9)
-      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
-  problem.prescribed_region = [](const Vector3& x, const Vector3&) { return x.cwiseAbs().maxCoeff() > 0.5 - 1e-9; };
+  const Problem problem = cut_through_and_held_all_around();
   const auto law = experiments::neo_hookean(1, 0.45);
   const FiniteBody body(problem, law);
   const std::vector<LipPair> pairs = lip_pairs(problem.nodes);
@@ -341,6 +347,54 @@ TEST_CASE("A cut that is pressed together bears what the uncut block does, and o
   }
   CHECK(error[1] < 0.02);
   CHECK(error[0] > 0.05);
+}
+
+TEST_CASE("Lips that turn while they are pressed together do not overlap, and bear what the uncut block does") {
+  const Problem problem = cut_through_and_held_all_around();
+  const auto law = experiments::neo_hookean(1, 0.45);
+  const FiniteBody body(problem, law);
+  const std::vector<LipPair> pairs = lip_pairs(problem.nodes);
+  const Matrix3 squeeze = 0.99 * Matrix3::Identity();
+  double energy = 0;
+  Matrix3 stress;
+  law->evaluate({&squeeze, 1}, {}, {&energy, 1}, {&stress, 1});
+  // Along the normals of the present state, in spacings.
+  const auto farthest = [&](const VectorX& coefficients) {
+    FiniteLips now(body, pairs);
+    now.turn(body.piola_maps(coefficients));
+    const std::vector<double> openings = now.openings(coefficients);
+    double most = 0;
+    for (std::size_t p = 0; p < pairs.size(); ++p)
+      most = std::max(most, std::abs(openings[p]) / problem.nodes.spacings[pairs[p].plus]);
+    return most;
+  };
+  EquilibriumOptions options;
+  for (const FiniteMethod method : {FiniteMethod::quasi_newton, FiniteMethod::newton}) {
+    options.method = method;
+    Equilibrium equilibrium(body, options);
+    equilibrium.set_lips(pairs);
+    for (const double degrees : {0.0, 10.0, 30.0, 60.0}) {
+      INFO(to_string(method) << ", " << degrees << " degrees");
+      const Matrix3 turn = Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vector3::UnitX()).matrix();
+      const auto exact = [&](const Vector3& x) { return Vector3(turn * squeeze * x - x); };
+      const EquilibriumStatus status = equilibrium.solve({body.prescribed_values(exact), 1, {}});
+      CHECK(farthest(equilibrium.coefficients()) < options.penetration);
+      CHECK(status.penetration < options.penetration);
+      CHECK(status.residual < options.tolerance);
+      CHECK(status.closed == std::ssize(pairs));
+      CHECK(status.energy == Approx(energy).epsilon(0.01));
+      const Vector3 top = face_force(body, equilibrium.constraint_forces(), 2, 0.5);
+      CHECK((top - stress(2, 2) * turn.col(2)).norm() < 0.01 * std::abs(stress(2, 2)));
+      CHECK(experiments::nodal_error(body, equilibrium.coefficients(), exact) < 0.02);
+    }
+  }
+  // What cannot be met is told.
+  options.penetration = 1e-14;
+  options.halvings = 0;
+  Equilibrium strict(body, options);
+  strict.set_lips(pairs);
+  const auto squeezed = body.prescribed_values([&](const Vector3& x) { return Vector3(squeeze * x - x); });
+  CHECK_THROWS_WITH(strict.solve({squeezed, 1, {}}), Catch::Contains("deep in itself at a cut (limit 1e-14)"));
 }
 
 TEST_CASE("A state that is handed on is found at once, and one that begins at rest goes there again") {
