@@ -213,6 +213,21 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
 }
 
 bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
+  Trial now;
+  if (!begin_step(target, now, status))
+    return false;
+  const bool converged = settle(target, method, now, status);
+  last_residual_ = status.residual;
+  if (!converged)
+    return false;
+  if (method == FiniteMethod::newton)
+    ++status.newton_steps;
+  accept_step(target, now, status);
+  return true;
+}
+
+/// A state to iterate from: where the last steps lead to, or nearer where that has no energy. False: there is none.
+bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus& status) {
   const std::vector<Matrix3> maps = body_.piola_maps(state_.coefficients);
   maps_ = maps;
   const Matrix3 from_stress_free = body_.prestrain() / body_.prestrain().determinant();
@@ -234,7 +249,6 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     lips_->turn(maps);
     lips_->set_known_forces(expected(state_.lip_forces, before_.lip_forces));
   }
-  Trial now;
   double part = 1;
   for (int trial = 0; trial < 7; ++trial, part *= 0.5) {
     const VectorX start = trial < 6 ? VectorX(state_.coefficients + part * prediction) : state_.coefficients;
@@ -242,8 +256,12 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     if (now.usable && (!body_.minds_volume() || now.least_jacobian > least_predicted_jacobian))
       break;
   }
-  if (!now.usable)
-    return false;
+  return now.usable;
+}
+
+/// Rounds of iterations, until forces balance and nothing lies in the tool or in itself along the normals as they are
+/// then.
+bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
   bool converged = iterate(target, method, now, status);
   for (int round = 0; converged; ++round) {
     std::vector<double> balanced; // forces of the lips along the normals so far
@@ -255,10 +273,8 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     }
     if (status.residual < options_.tolerance && deepest(target) <= options_.penetration)
       break;
-    if (round == most_contact_rounds) {
-      converged = false;
-      break;
-    }
+    if (round == most_contact_rounds)
+      return false;
     if (contact_)
       contact_->accept_forces();
     if (lips_)
@@ -266,11 +282,11 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     evaluate(now.coefficients, target, now, status);
     converged = iterate(target, method, now, status);
   }
-  last_residual_ = status.residual;
-  if (!converged)
-    return false;
-  if (method == FiniteMethod::newton)
-    ++status.newton_steps;
+  return converged;
+}
+
+/// The state becomes that of the trial, which is in equilibrium.
+void Equilibrium::accept_step(const State& target, const Trial& now, EquilibriumStatus& status) {
   State next = target;
   next.coefficients = now.coefficients;
   if (contact_ && target.tool) {
@@ -294,7 +310,6 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
   status.converged = true;
   status.energy = now.strain_energy;
   status.least_jacobian = now.least_jacobian;
-  return true;
 }
 
 void Equilibrium::evaluate(const VectorX& coefficients, const State& target, Trial& trial, EquilibriumStatus& status) {

@@ -96,6 +96,9 @@ class Equilibrium {
   [[nodiscard]] State between(const State& from, const State& to, double part) const;
   bool go(const State& target, int halvings, EquilibriumStatus& status);
   bool step(const State& target, FiniteMethod method, EquilibriumStatus& status);
+  bool begin_step(const State& target, Trial& now, EquilibriumStatus& status);
+  bool settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
+  void accept_step(const State& target, const Trial& now, EquilibriumStatus& status);
   /// Iterates with the forces of contact known so far.
   bool iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
   void evaluate(const VectorX& coefficients, const State& target, Trial& trial, EquilibriumStatus& status);
