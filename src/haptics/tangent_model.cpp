@@ -344,6 +344,71 @@ void TangentModel::look_around(const solvers::PressingTool& tool) noexcept {
   }
 }
 
+// Gaps of the candidates that are looked at, as they are now.
+void TangentModel::linearise(const solvers::PressingTool& tool) noexcept {
+  for (int k = 0; k < near_count_; ++k) {
+    const int c = near_[k];
+    const solvers::Gap gap = gap_of(tool, c, displacement_[c]);
+    normal_[c] = gap.normal;
+    gap_[c] = gap.distance + gap.normal.dot(condensed_->base[c] - displacement_[c]);
+    fresh_[c] = 0;
+  }
+}
+
+// Candidates change sides until none is pulled and none lies in the tool (true), or until a tick has no more pivots.
+bool TangentModel::pivot(int& pivots) noexcept {
+  int fewest = std::numeric_limits<int>::max();
+  int patience = patience_of_block;
+  while (true) {
+    while (!solve_active()) {
+    } // ends: every failure lets one candidate go
+    displace();
+    int wrong = 0;
+    int last = -1;
+    const auto is_wrong = [&](int c) {
+      return active_[c] != 0 ? pressure_[c] < 0
+                             : gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c]) < -gap_slack;
+    };
+    for (int k = 0; k < near_count_; ++k) {
+      const int c = near_[k];
+      wrong_[c] = is_wrong(c) ? 1 : 0;
+      if (wrong_[c] != 0) {
+        ++wrong;
+        last = c;
+      }
+    }
+    if (wrong == 0 || pivots >= most_pivots)
+      return wrong == 0;
+    ++pivots;
+    if (wrong < fewest) {
+      fewest = wrong;
+      patience = patience_of_block;
+    } else {
+      --patience;
+    }
+    // All at once while that helps, else one by one [Judice and Pires 1994].
+    for (int k = 0; k < near_count_; ++k)
+      if (const int c = near_[k]; patience > 0 ? wrong_[c] != 0 : c == last)
+        active_[c] = static_cast<char>(active_[c] == 0);
+  }
+}
+
+void TangentModel::add_forces(const topology::ToolPose& pose, bool frictional, ModelForce& result) const noexcept {
+  double stored = 0;
+  for (int a = 0; a < chosen_count_; ++a) {
+    const int c = chosen_[a];
+    const double pressure = std::max(pressure_[c], 0.0);
+    if (pressure > 0) {
+      ++result.active;
+      const Vector3 on_body = frictional ? Vector3(pressure * normal_[c] + along_[c]) : Vector3(pressure * normal_[c]);
+      result.force -= on_body;
+      result.torque -= (condensed_->rest[c] + moved_[c] - pose.point).cross(on_body);
+      stored += 0.5 * on_body.dot(moved_[c] - condensed_->base[c]);
+    }
+  }
+  result.stored = stored;
+}
+
 ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
   const int count = snapshot_->count;
   const solvers::PressingTool tool = solvers::pressing(tool_, pose, rest(), normals());
@@ -364,49 +429,8 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
   double last_square = 0; // of the last step, and its product with this one, for Aitken's factor
   while (result.rounds < most_rounds) {
     ++result.rounds;
-    for (int k = 0; k < near_count_; ++k) {
-      const int c = near_[k];
-      const solvers::Gap gap = gap_of(tool, c, displacement_[c]);
-      normal_[c] = gap.normal;
-      gap_[c] = gap.distance + gap.normal.dot(condensed_->base[c] - displacement_[c]);
-      fresh_[c] = 0;
-    }
-    int fewest = std::numeric_limits<int>::max();
-    int patience = patience_of_block;
-    bool complementary = false;
-    while (true) {
-      while (!solve_active()) {
-      } // ends: every failure lets one candidate go
-      displace();
-      int wrong = 0;
-      int last = -1;
-      const auto is_wrong = [&](int c) {
-        return active_[c] != 0 ? pressure_[c] < 0
-                               : gap_[c] + normal_[c].dot(moved_[c] - condensed_->base[c]) < -gap_slack;
-      };
-      for (int k = 0; k < near_count_; ++k) {
-        const int c = near_[k];
-        wrong_[c] = is_wrong(c) ? 1 : 0;
-        if (wrong_[c] != 0) {
-          ++wrong;
-          last = c;
-        }
-      }
-      complementary = wrong == 0;
-      if (complementary || pivots >= most_pivots)
-        break;
-      ++pivots;
-      if (wrong < fewest) {
-        fewest = wrong;
-        patience = patience_of_block;
-      } else {
-        --patience;
-      }
-      // All at once while that helps, else one by one [Judice and Pires 1994].
-      for (int k = 0; k < near_count_; ++k)
-        if (const int c = near_[k]; patience > 0 ? wrong_[c] != 0 : c == last)
-          active_[c] = static_cast<char>(active_[c] == 0);
-    }
+    linearise(tool);
+    const bool complementary = pivot(pivots);
     const bool stands = !frictional || rub();
     double largest = 0; // of any component
     double square = 0;
@@ -438,21 +462,9 @@ ModelForce TangentModel::press(const topology::ToolPose& pose) noexcept {
     if (pivots >= most_pivots)
       break;
   }
-  double stored = 0;
-  for (int a = 0; a < chosen_count_; ++a) {
-    const int c = chosen_[a];
-    const double pressure = std::max(pressure_[c], 0.0);
-    if (pressure > 0) {
-      ++result.active;
-      const Vector3 on_body = frictional ? Vector3(pressure * normal_[c] + along_[c]) : Vector3(pressure * normal_[c]);
-      result.force -= on_body;
-      result.torque -= (condensed_->rest[c] + moved_[c] - pose.point).cross(on_body);
-      stored += 0.5 * on_body.dot(moved_[c] - condensed_->base[c]);
-    }
-  }
+  add_forces(pose, frictional, result);
   if (frictional)
     settle_bonds();
-  result.stored = stored;
   result.stiffness = stiffness_along(result.force);
   for (int k = 0; k < near_count_; ++k) {
     const int c = near_[k];

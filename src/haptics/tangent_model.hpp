@@ -28,6 +28,9 @@ class TangentModel : public ForceModel {
 
   ModelForce press(const topology::ToolPose& pose) noexcept;
   ModelForce follow(const topology::ToolPose& pose) noexcept;
+  void linearise(const solvers::PressingTool& tool) noexcept;
+  [[nodiscard]] bool pivot(int& pivots) noexcept;
+  void add_forces(const topology::ToolPose& pose, bool frictional, ModelForce& result) const noexcept;
   [[nodiscard]] solvers::Gap gap_of(const solvers::PressingTool& tool, int c, const Vector3& u) const noexcept;
   [[nodiscard]] bool solve_active() noexcept;
   void displace() noexcept;

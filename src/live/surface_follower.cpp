@@ -103,6 +103,50 @@ std::vector<Tag> tags_of(const topology::Wound& wound) {
   return tags;
 }
 
+/// Where nodes have come, gone or other spheres. `now` becomes the number of each node before today, -1 if it is gone.
+ChangedPlaces changed_nodes(const std::vector<Vector3>& before, const std::vector<double>& radii_before,
+                            const std::vector<Vector3>& nodes, const std::vector<double>& radii,
+                            std::vector<int>& now) {
+  ChangedPlaces changed;
+  const PlaceMap numbers = numbered(nodes);
+  std::vector<char> met(nodes.size(), 0);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const auto found = numbers.find(before[i]);
+    if (found == numbers.end()) {
+      changed.add(before[i], radii_before[i]);
+      continue;
+    }
+    now[i] = found->second;
+    met[static_cast<std::size_t>(found->second)] = 1;
+    if (radii[static_cast<std::size_t>(found->second)] != radii_before[i])
+      changed.add(before[i], std::max(radii_before[i], radii[static_cast<std::size_t>(found->second)]));
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (met[i] == 0)
+      changed.add(nodes[i], radii[i]);
+  return changed;
+}
+
+/// What a place's shape functions add to its row: nodes with spheres and their weights, and functions of the cut.
+template <class Row, class Term>
+void add_shape(const solvers::ShapeFunctions& shape, const std::vector<double>& radii, Row& row,
+               std::vector<int>& nodes, std::vector<double>& weights, std::vector<Term>& terms) {
+  for (const solvers::VectorTerm& term : shape.vectors)
+    terms.push_back({term.group, term.value});
+  for (int k = 0; k < shape.size(); ++k) {
+    if (shape.nodes[static_cast<std::size_t>(k)] >= static_cast<int>(radii.size())) {
+      terms.push_back(
+          {shape.nodes[static_cast<std::size_t>(k)], shape.value[static_cast<std::size_t>(k)] * Matrix3::Identity()});
+      continue;
+    }
+    ++row.count;
+    nodes.push_back(shape.nodes[static_cast<std::size_t>(k)]);
+    weights.push_back(shape.value[static_cast<std::size_t>(k)]);
+    row.radius =
+        std::max(row.radius, front_share * radii[static_cast<std::size_t>(shape.nodes[static_cast<std::size_t>(k)])]);
+  }
+}
+
 } // namespace
 
 void SurfaceFollower::follow(const Session& session) {
@@ -164,28 +208,12 @@ void SurfaceFollower::take_rows(const Session& session) {
 
   const bool appends = 3 * spheres != model.body->coefficient_count() || !terms_.empty();
   std::vector<Term> terms;
-  ChangedPlaces changed;
   std::vector<int> now(node_places_.size(), -1); // number of each node before, today
-  if (rows_.empty() || appends) {                // functions of a cut have other numbers after each increment
+  ChangedPlaces changed;
+  if (rows_.empty() || appends) // functions of a cut have other numbers after each increment
     changed.all();
-  } else {
-    const PlaceMap numbers = numbered(nodes);
-    std::vector<char> met(nodes.size(), 0);
-    for (std::size_t i = 0; i < node_places_.size(); ++i) {
-      const auto found = numbers.find(node_places_[i]);
-      if (found == numbers.end()) {
-        changed.add(node_places_[i], node_radii_[i]);
-        continue;
-      }
-      now[i] = found->second;
-      met[static_cast<std::size_t>(found->second)] = 1;
-      if (radii[static_cast<std::size_t>(found->second)] != node_radii_[i])
-        changed.add(node_places_[i], std::max(node_radii_[i], radii[static_cast<std::size_t>(found->second)]));
-    }
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      if (met[i] == 0)
-        changed.add(nodes[i], radii[i]);
-  }
+  else
+    changed = changed_nodes(node_places_, node_radii_, nodes, radii, now);
   ChangedPlaces cut;
   add_growth(kept_incision_.get(), model.incision.get(), cut);
 
@@ -219,20 +247,7 @@ void SurfaceFollower::take_rows(const Session& session) {
     }
     model.shape_at(x, shape);
     ++evaluated_;
-    for (const solvers::VectorTerm& term : shape.vectors)
-      terms.push_back({term.group, term.value});
-    for (int k = 0; k < shape.size(); ++k) {
-      if (shape.nodes[static_cast<std::size_t>(k)] >= spheres) {
-        terms.push_back(
-            {shape.nodes[static_cast<std::size_t>(k)], shape.value[static_cast<std::size_t>(k)] * Matrix3::Identity()});
-        continue;
-      }
-      ++row.count;
-      row_nodes.push_back(shape.nodes[static_cast<std::size_t>(k)]);
-      weights.push_back(shape.value[static_cast<std::size_t>(k)]);
-      row.radius =
-          std::max(row.radius, front_share * radii[static_cast<std::size_t>(shape.nodes[static_cast<std::size_t>(k)])]);
-    }
+    add_shape(shape, radii, row, row_nodes, weights, terms);
   }
   rows_ = std::move(rows);
   nodes_ = std::move(row_nodes);
