@@ -10,27 +10,32 @@
 #include <utility>
 
 namespace spherecut::app {
+namespace {
+
+BladeEdge edge_of(const SessionState& state) {
+  const auto map_of = [&state](const BodyModel& model) {
+    return [&state, &model](const Vector3& x) {
+      return rest_position(x, model, *state.organ.domain, state.zone.spacing());
+    };
+  };
+  return {state.scenario, state.organ.domain, state.zone.fine(), map_of, toughness_field(state.scenario)};
+}
+
+} // namespace
 
 ResistedBlade::ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact, AsideBodies& aside,
                              BodyUpdater& updater, WindowRenewal& renewal, const TearFronts& fronts)
     : state_(state), blade_(blade), contact_(contact), aside_(aside), updater_(updater), renewal_(renewal),
-      fronts_(fronts), force_(
-                           state.scenario, state.organ.domain, state.zone.fine(),
-                           [&state](const BodyModel& model) {
-                             return [&state, &model](const Vector3& x) {
-                               return rest_position(x, model, *state.organ.domain, state.zone.spacing());
-                             };
-                           },
-                           toughness_field(state.scenario)) {
-  if (force_.finer_than_nodes())
+      fronts_(fronts), force_(state.scenario, edge_of(state)) {
+  if (force_.edge().finer_than_nodes())
     state_.log.warn(
         "edge", fmt::format("the contact of the blade's edge is narrower than the nodes; it is taken as {:.3g} m wide: "
                             "before it cuts, the blade sinks in less than it would",
-                            2 * force_.half_width()));
+                            2 * force_.edge().half_width()));
 }
 
 bool ResistedBlade::enters(const StepSample& sample) const {
-  return sample.blade && force_.inside(*sample.blade, state_.model);
+  return sample.blade && force_.edge().inside(*sample.blade, state_.model);
 }
 
 void ResistedBlade::load_body() {
@@ -74,9 +79,9 @@ double ResistedBlade::press(const StepSample& sample, CutReport& report) {
 double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
   const topology::RestMap to_rest = state_.to_rest();
   std::vector<topology::BladePose> passed = blade_.passed();
-  const bool placed = force_.has_place();
+  const bool placed = !force_.way().empty();
   const bool out =
-      !force_.inside(*sample.blade, state_.model); // what it pushes ahead of itself there is cut in the step
+      !force_.edge().inside(*sample.blade, state_.model); // what it pushes ahead of itself there is cut in the step
   double surface = 0;
   if (placed) {
     const bool leaves = !force_.meets(*sample.blade, state_.model);
@@ -89,13 +94,14 @@ double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
       force_.pass_by(passed);
     const double far = most_advances * aside_advance * state_.zone.fine();
     if (const AsideBodies::Proposing* made = aside_.proposing();
-        made != nullptr && (aside_.has_arrived() || leaves || out || force_.way_left() - made->way_left > far))
+        made != nullptr &&
+        (aside_.has_arrived() || leaves || out || force_.way().left(force_.edge()) - made->way_left > far))
       take(sample, report);
     const bool lags = proposes_aside() && (force_.proposed() || force_.lags());
     if (goes_on || (leaves && lags)) // what it has come to is cut before
       surface += cut_on(sample, false, report);
   }
-  force_.go_to(*sample.blade, state_.model);
+  force_.go_to({&*sample.blade, 1}, state_.model);
   if (!force_.meets(*sample.blade, state_.model)) {
     leave(sample);
     state_.incisions->place(*sample.blade, to_rest);
@@ -161,8 +167,9 @@ double ResistedBlade::cut_on(const StepSample& sample, bool aside, CutReport& re
     }
     if (!force_.advance(state_.model))
       break;
-    surface += force_.proposed_surface();
-    state_.model = force_.take();
+    BladeForce::Taken taken = force_.take();
+    surface += taken.surface;
+    state_.model = std::move(taken.body);
     renewal_.lead(sample, updater_.followed(), to_rest);
     forget_mark();
     waits = aside;
@@ -239,7 +246,7 @@ void ResistedBlade::build_aside(const std::vector<topology::BladePose>& poses, c
     if (!sweep(poses, sample, report))
       return;
     const int triangles = std::exchange(report.triangles, 0);
-    aside_.propose({poses.size(), sample.time, force_.way_left(), triangles},
+    aside_.propose({poses.size(), sample.time, force_.way().left(force_.edge()), triangles},
                    updater_.following_cut(state_.incisions->incision(), "the blade is resisted"));
     return;
   } catch (const InputError& error) {

@@ -11,7 +11,7 @@ namespace spherecut::app {
 /// that was set before.
 class ResistedBlade {
  public:
-  /// All of these must outlive it. Throws InputError as BladeForce.
+  /// All of these must outlive it. Throws InputError as BladeEdge.
   ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact, AsideBodies& aside,
                 BodyUpdater& updater, WindowRenewal& renewal, const TearFronts& fronts);
 
