@@ -52,7 +52,7 @@ class TearPropagation {
   AsideBodies& aside_;
   BodyUpdater& updater_;
   const TearFronts& fronts_;
-  ResistedBlade* blade_; // null: none is resisted
+  ResistedBlade* blade_;               // null: none is resisted
   std::optional<TearAccount> account_; // empty before the first solution
 };
 

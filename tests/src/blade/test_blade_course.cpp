@@ -14,14 +14,10 @@ using namespace spherecut::tests;
 namespace {
 
 struct EdgeInBlock {
-  TissueParts parts{
-      replaced(cut_block, "poisson_ratio = 0.3",
-               "poisson_ratio = 0.3\ntoughness = 12") +
-      blade({"[0.004, 0, 0.04]", "[0.004, 0, 0.02]"}, 0.04, "0.5")};
-  BladeEdge edge{
-      parts.state.scenario, parts.state.organ.domain, parts.state.zone.fine(),
-      [](const BodyModel &) { return [](const Vector3 &x) { return x; }; },
-      parts.state.toughness};
+  TissueParts parts{replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 12") +
+                    blade({"[0.004, 0, 0.04]", "[0.004, 0, 0.02]"}, 0.04, "0.5")};
+  BladeEdge edge{parts.state.scenario, parts.state.organ.domain, parts.state.zone.fine(),
+                 [](const BodyModel&) { return [](const Vector3& x) { return x; }; }, parts.state.toughness};
 };
 
 topology::BladePose at(double time, double height) {
@@ -35,8 +31,7 @@ TEST_CASE("The front of a cut moves along a blade's way up to where so much of "
   const EdgeInBlock in;
   BladeCourse course;
   CHECK(course.left(in.edge) == 0);
-  const std::vector<topology::BladePose> poses{at(0, 0.04), at(1, 0.036),
-                                               at(2, 0.03)};
+  const std::vector<topology::BladePose> poses{at(0, 0.04), at(1, 0.036), at(2, 0.03)};
   course.lead_through({&poses.front(), 1});
   CHECK(course.at().position == poses.front().position);
   course.lead_through({&poses[1], 2});
@@ -55,7 +50,7 @@ TEST_CASE("An edge meets the body where it is in it, with the toughness of "
           "what lies ahead") {
   EdgeInBlock in;
   in.parts.updater.build(in.parts.state.model);
-  const BodyModel &body = in.parts.state.model;
+  const BodyModel& body = in.parts.state.model;
   CHECK_FALSE(in.edge.inside(at(0, 0.031), body));
   CHECK(in.edge.inside(at(1, 0.029), body));
   CHECK_FALSE(in.edge.is_in_open_cut(at(1, 0.029), body)); // nothing is cut
@@ -65,12 +60,10 @@ TEST_CASE("An edge meets the body where it is in it, with the toughness of "
   CHECK(meeting.area == 0);
   CHECK(in.edge.toughness(meeting) == Approx(12));
   CHECK(in.edge.needed(meeting) == Approx(12 / in.edge.settings().sharpness));
-  const VectorX motions = in.edge.motions(meeting, way.back()),
-                advances = in.edge.advances(meeting, body, way.back());
+  const VectorX motions = in.edge.motions(meeting, way.back()), advances = in.edge.advances(meeting, body, way.back());
   for (Eigen::Index c = 0; c < motions.size(); ++c) {
     CHECK(meeting.surface[static_cast<std::size_t>(c)] != 0);
-    CHECK(motions[c] ==
-          Approx(0.002).margin(1e-5)); // below the surface, which stays
+    CHECK(motions[c] == Approx(0.002).margin(1e-5)); // below the surface, which stays
     CHECK(advances[c] <= motions[c]);
   }
   CHECK(in.edge.pushes(meeting, body, way.back()));
