@@ -58,7 +58,7 @@ app::StepResult lift(const app::Scenario& scenario, const ExperimentContext& con
   for (const auto& [name, drawn] : app::tear_figures(times, reports))
     app::write_png(drawn, context.out / name);
   app::write_wound(context.out / "flap.vtp", session);
-  app::write_incision(context.out / "incision.vtp", *session.incision());
+  app::write_incision(context.out / "incision.vtp", *session.model().incision);
   return last;
 }
 

@@ -46,7 +46,7 @@ CuttingCase liver_block(double spacing) {
   block.above = 0.0036;
   block.spacing = spacing;
   block.material = {liver_modulus, liver_poisson_ratio, 0};
-  // What the nodes can tell, as in a run (src/blade/force.cpp).
+  // What the nodes can tell, as in a run (src/blade/edge.cpp).
   block.half_width = std::max(0.75 * spacing, solvers::edge_half_width(block.material, edge_radius, 164));
   return block;
 }

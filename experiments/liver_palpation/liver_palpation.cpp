@@ -95,7 +95,7 @@ double way_mm(const app::StepResult& step, const Press& press) {
 /// Surface displacement, m. A point beyond every sphere does not move.
 Vector3 displacement(const app::Session& session, const Vector3& x) {
   try {
-    return session.body()->at(x, session.field()).displacement;
+    return session.model().body->at(x, session.model().field).displacement;
   } catch (const InputError&) {
     return Vector3::Zero();
   }
@@ -150,7 +150,7 @@ std::vector<Check> run_liver_palpation(const ExperimentContext& context) {
       int unconverged = 0;
       for (double fine : press.fine) {
         const Curve curve = run(scenario(press, method, fine, steps, triangles));
-        const int nodes = curve.session->sprinkling().nodes.size();
+        const int nodes = curve.session->model().sprinkling.nodes.size();
         app::Series series{fmt::format("{}, {} nodes", name, nodes), {}, {}};
         for (const app::StepResult& step : curve.steps) {
           const double way = way_mm(step, press);

@@ -29,9 +29,10 @@ Found found(const ExperimentContext& context, const std::string& text, int seed,
   Found result;
   for (const app::StepSample& sample : session.steps())
     result.volume = session.step(sample).cut->opening_volume;
-  result.nodes = session.sprinkling().nodes.size();
+  result.nodes = session.model().sprinkling.nodes.size();
   for (const solvers::FrontState& state : solvers::front_states(
-           *session.body(), session.field(), [](const Vector3&) { return 1.0; }, 2 * session.zone().spacing.fine))
+           *session.model().body, session.model().field, [](const Vector3&) { return 1.0; },
+           2 * session.zone().spacing.fine))
     result.intensities.push_back(std::abs(state.intensities[mode]));
   return result;
 }

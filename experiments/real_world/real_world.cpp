@@ -21,7 +21,7 @@ Outcome run_text(const ExperimentContext& context, const std::string& text) {
   Outcome outcome;
   for (const app::StepSample& sample : session.steps())
     outcome.last = session.step(sample);
-  outcome.nodes = session.sprinkling().nodes.size();
+  outcome.nodes = session.model().sprinkling.nodes.size();
   for (const solvers::PointState& state : session.node_states())
     outcome.largest_displacement = std::max(outcome.largest_displacement, state.displacement.norm());
   outcome.warnings = session.warnings();

@@ -243,7 +243,7 @@ Rate rate_by_the_clock(const Motion& motion, int steps, std::uint64_t period) {
       ++taken;
       began = -1;
     }
-    if (simulation.session().recondensing() && began < 0)
+    if (simulation.session().pending().under_way && began < 0)
       began = static_cast<double>(due);
     const auto now = static_cast<std::uint64_t>(1e3 * seconds_since(start));
     due = std::max(due + period, now / period * period);

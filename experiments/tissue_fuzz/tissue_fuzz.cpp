@@ -9,6 +9,7 @@
 #include "experiments/experiment.hpp"
 #include "experiments/registered.hpp"
 #include "src/base/output_file.hpp"
+#include "src/model/finite_model.hpp"
 #include "src/output/figure.hpp"
 #include "src/session/session.hpp"
 #include "topology/base/errors.hpp"

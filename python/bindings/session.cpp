@@ -261,7 +261,7 @@ py::dict surface_of(RunningSession& self) {
     made.triangles = mesh.triangles;
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
       interruption_point();
-      const solvers::PointState state = session.at(wound != nullptr ? wound->evaluation[v] : mesh.vertices[v]);
+      const solvers::PointState state = session.model().at(wound != nullptr ? wound->evaluation[v] : mesh.vertices[v]);
       made.displacement.push_back(state.displacement);
       made.von_mises.push_back(app::von_mises(state.stress));
       made.points.emplace_back(mesh.vertices[v] + state.displacement);
@@ -290,7 +290,8 @@ std::vector<solvers::FrontState> fronts_of(RunningSession& self, const std::opti
   if (!toughness.is_none())
     resistance = number_function(toughness, "toughness");
   return with_session(self, [&](const Session& session) -> std::vector<solvers::FrontState> {
-    if (session.incision() == nullptr || session.incision()->front().empty() || session.body() == nullptr)
+    if (session.model().incision == nullptr || session.model().incision->front().empty() ||
+        session.model().body == nullptr)
       return {};
     const app::BodyModel& model = session.model();
     std::vector<Vector3> closed;
@@ -303,7 +304,7 @@ std::vector<solvers::FrontState> fronts_of(RunningSession& self, const std::opti
       if (!(session.scenario().toughness > 0))
         resistance = [](const Vector3&) { return 1.0; }; // intensities do not depend on it
     }
-    return solvers::front_states(*session.body(), session.field(), resistance,
+    return solvers::front_states(*session.model().body, session.model().field, resistance,
                                  spacing.value_or(session.zone().spacing.fine), closed,
                                  spacing ? nullptr : &model.front_rules);
   });
@@ -314,8 +315,9 @@ void bind_session_state(py::class_<RunningSession, std::shared_ptr<RunningSessio
       .def_property_readonly(
           "nodes",
           [](RunningSession& self) {
-            return with_session(
-                self, [](const Session& s) { return std::make_shared<solvers::NodeCloud>(s.sprinkling().nodes); });
+            return with_session(self, [](const Session& s) {
+              return std::make_shared<solvers::NodeCloud>(s.model().sprinkling.nodes);
+            });
           },
           "Nodes of the body now (a copy).")
       .def_property_readonly(
@@ -352,7 +354,7 @@ void bind_session_state(py::class_<RunningSession, std::shared_ptr<RunningSessio
               PointValues values;
               for (const Vector3& point : x) {
                 interruption_point();
-                values.add(s.at(point));
+                values.add(s.model().at(point));
               }
               return values;
             });
@@ -363,7 +365,8 @@ void bind_session_state(py::class_<RunningSession, std::shared_ptr<RunningSessio
           [](RunningSession& self) {
             return with_session(self, [](const Session& s) {
               std::vector<solvers::PointState> states = s.node_states();
-              states.resize(static_cast<std::size_t>(s.sprinkling().nodes.size())); // at rest before the first solution
+              states.resize(
+                  static_cast<std::size_t>(s.model().sprinkling.nodes.size())); // at rest before the first solution
               return values_of(states);
             });
           },
@@ -391,6 +394,18 @@ void bind_session_state(py::class_<RunningSession, std::shared_ptr<RunningSessio
           "dict: wall clock of each stage, s, summed.");
 }
 
+/// Sets one of the options of a session.
+template <class Value>
+auto switch_of(Value app::SessionOptions::*option) {
+  return [option](RunningSession& self, Value value) {
+    with_session(self, [&](Session& s) {
+      app::SessionOptions options = s.options();
+      options.*option = value;
+      s.set_options(options);
+    });
+  };
+}
+
 void bind_session_steps(py::class_<RunningSession, std::shared_ptr<RunningSession>>& session) {
   session
       .def(py::init(&session_from), "scenario"_a, "say"_a = py::none(), "leader"_a = "path",
@@ -410,10 +425,16 @@ void bind_session_steps(py::class_<RunningSession, std::shared_ptr<RunningSessio
           [](RunningSession& self) { return with_session(self, [](const Session& s) { return s.touches(); }); },
           "Whether its tool touches the organ.")
       .def_property_readonly(
-          "cuts", [](RunningSession& self) { return with_session(self, [](const Session& s) { return s.cuts(); }); },
+          "cuts",
+          [](RunningSession& self) {
+            return with_session(self, [](const Session& s) { return has_cuts(s.scenario()); });
+          },
           "Whether there is a blade or a precut, or tissue that tears.")
       .def_property_readonly(
-          "tears", [](RunningSession& self) { return with_session(self, [](const Session& s) { return s.tears(); }); },
+          "tears",
+          [](RunningSession& self) {
+            return with_session(self, [](const Session& s) { return s.scenario().tearing.enabled; });
+          },
           "Whether its tissue tears.")
       .def(
           "prepare",
@@ -446,32 +467,17 @@ void bind_session_steps(py::class_<RunningSession, std::shared_ptr<RunningSessio
           "coarsen",
           [](RunningSession& self, double factor) { with_session(self, [&](Session& s) { s.coarsen(factor); }); },
           "factor"_a, "Spacings factor times the scenario's from the next sprinkling on.")
-      .def(
-          "set_grip",
-          [](RunningSession& self, std::optional<bool> closed) {
-            with_session(self, [&](Session& s) { s.set_grip(closed); });
-          },
-          "closed"_a, "Whether a grasper is closed from the next step on; None: by the times of the scenario.")
-      .def(
-          "set_force_only",
-          [](RunningSession& self, bool on) { with_session(self, [&](Session& s) { s.set_force_only(on); }); }, "on"_a,
-          "On: steps leave out what only output needs: node_values(), the residual, the opening volume.")
-      .def(
-          "set_recondensing",
-          [](RunningSession& self, bool on) { with_session(self, [&](Session& s) { s.set_recondensing(on); }); },
-          "on"_a, "On: a body that follows its cut is condensed anew beside the steps, on a thread of its own.")
-      .def(
-          "set_following_aside",
-          [](RunningSession& self, bool on) { with_session(self, [&](Session& s) { s.set_following_aside(on); }); },
-          "on"_a, "On: nodes that follow the tool, or a cut that was put off, are made beside the steps.")
-      .def(
-          "set_tear_gradually",
-          [](RunningSession& self, bool on) { with_session(self, [&](Session& s) { s.set_tear_gradually(on); }); },
-          "on"_a, "On: a tear makes one increment a step at most.")
-      .def(
-          "set_going_on",
-          [](RunningSession& self, bool on) { with_session(self, [&](Session& s) { s.set_going_on(on); }); }, "on"_a,
-          "On: the last of steps is not the end.");
+      .def("set_grip", switch_of(&app::SessionOptions::grip), "closed"_a,
+           "Whether a grasper is closed from the next step on; None: by the times of the scenario.")
+      .def("set_force_only", switch_of(&app::SessionOptions::force_only), "on"_a,
+           "On: steps leave out what only output needs: node_values(), the residual, the opening volume.")
+      .def("set_recondensing", switch_of(&app::SessionOptions::recondensing), "on"_a,
+           "On: a body that follows its cut is condensed anew beside the steps, on a thread of its own.")
+      .def("set_following_aside", switch_of(&app::SessionOptions::following_aside), "on"_a,
+           "On: nodes that follow the tool, or a cut that was put off, are made beside the steps.")
+      .def("set_tear_gradually", switch_of(&app::SessionOptions::tear_gradually), "on"_a,
+           "On: a tear makes one increment a step at most.")
+      .def("set_going_on", switch_of(&app::SessionOptions::going_on), "on"_a, "On: the last of steps is not the end.");
 }
 
 /// The files of a run, made step by step.

@@ -34,7 +34,7 @@ struct SolveEvent {
   std::uint64_t arrival_tick = never; // tick that first used it; never: overtaken by a newer one, failed, or too late
   int degradation = 0;
   bool swaps = false; // it takes over the body that has been made or condensed anew in the background
-  bool aside = false; // what follows the tool or a cut that is put off is made there (Session::set_following_aside)
+  bool aside = false; // what follows the tool or a cut that is put off is made there (SessionOptions::following_aside)
 };
 
 /// One solve, and what it did.

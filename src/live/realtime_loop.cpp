@@ -143,7 +143,7 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
       std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(next - began, second / 1000)));
       continue;
     }
-    next = began + (session.recondensing() ? std::max(interval, second / solves_beside) : interval);
+    next = began + (session.pending().under_way ? std::max(interval, second / solves_beside) : interval);
     solved = state;
     const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level(), simulation.recondensed(), aside};
     ContactSnapshot& snapshot = shared.snapshots.back();

@@ -255,7 +255,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
     return say_nothing_was_run(command, settings, watch, run, progress);
   const auto* bridge = dynamic_cast<const BridgeDevice*>(device.get());
   HapticFindings findings = findings_of(settings, records, report);
-  findings.unfollowed = simulation.session().lags_behind_blade();
+  findings.unfollowed = simulation.session().pending().lags;
   if (bridge != nullptr)
     findings.bridge = bridge->counters();
   if (const auto* haply = dynamic_cast<const HaplyDevice*>(device.get()))

@@ -31,7 +31,7 @@ class Hash {
 
 std::uint64_t topology_of(const Session& session, const StepResult& result) {
   Hash hash;
-  for (const Vector3& x : session.sprinkling().nodes.positions)
+  for (const Vector3& x : session.model().sprinkling.nodes.positions)
     for (int axis = 0; axis < 3; ++axis)
       hash.add(x[axis]);
   if (result.cut) {
@@ -67,10 +67,7 @@ void DegradationRule::solved(Rebuild rebuild, double seconds) {
 
 HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const std::string&)> say)
     : session_(std::move(scenario), std::move(say), Leader::device) {
-  session_.set_force_only(true);
-  session_.set_tear_gradually(true);
-  session_.set_recondensing(true);
-  session_.set_going_on(true);
+  session_.set_options({.force_only = true, .going_on = true, .tear_gradually = true, .recondensing = true});
   static_cast<void>(path());
   parked_ = parked_tool();
 }
@@ -120,6 +117,12 @@ std::optional<topology::ToolPose> HapticSimulation::parked_tool() const {
   return pose;
 }
 
+void HapticSimulation::set_following_aside(bool on) {
+  SessionOptions options = session_.options();
+  options.following_aside = on;
+  session_.set_options(options);
+}
+
 void HapticSimulation::prepare(const DeviceState& device) {
   session_.prepare(sample(device));
 }
@@ -149,10 +152,12 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
     mode_ = mode;
     passed.clear();
   }
-  if (mode_ != HandMode::usual)
-    session_.set_grip(mode_ == HandMode::grasper && (device.buttons & 1U) != 0);
-  session_.pass_blade(std::move(passed));
-  result_ = session_.step(sample(device));
+  if (mode_ != HandMode::usual) {
+    SessionOptions options = session_.options();
+    options.grip = mode_ == HandMode::grasper && (device.buttons & 1U) != 0;
+    session_.set_options(options);
+  }
+  result_ = session_.step(sample(device), std::move(passed));
   last_time_ = device.time;
   const BodyModel& model = session_.model();
   snapshot.friction = session_.scenario().contact.friction;

@@ -49,12 +49,12 @@ class HapticSimulation {
   void solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot);
 
   /// Whether a body that has been condensed anew in the background waits to be taken over; and takes it over, after
-  /// waiting for it where need be (Session::set_recondensing).
-  [[nodiscard]] bool recondensed() const { return session_.recondensed(); }
+  /// waiting for it where need be (SessionOptions::recondensing).
+  [[nodiscard]] bool recondensed() const { return session_.pending().there; }
   void swap_body() { session_.swap_body(); }
-  [[nodiscard]] bool has_put_off() const { return session_.has_put_off(); }
-  /// As Session::set_following_aside.
-  void set_following_aside(bool on) { session_.set_following_aside(on); }
+  [[nodiscard]] bool has_put_off() const { return session_.pending().put_off; }
+  /// SessionOptions::following_aside.
+  void set_following_aside(bool on);
 
   /// Result of the last solve.
   [[nodiscard]] const StepResult& result() const { return result_; }

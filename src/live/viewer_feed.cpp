@@ -87,7 +87,7 @@ FieldSlice sliced(const ViewerRequest::Slice& slice, const Session& session) {
       const Vector3 x = result.corner + static_cast<double>(column) / (result.count - 1) * result.along +
                         static_cast<double>(row) / (result.count - 1) * result.up;
       result.organ.push_back(static_cast<float>(domain.signed_distance(x)));
-      const auto on = session.incision() != nullptr ? session.incision()->closest(x, reach) : std::nullopt;
+      const auto on = session.model().incision != nullptr ? session.model().incision->closest(x, reach) : std::nullopt;
       result.cut.push_back(on ? static_cast<float>(on->distance) : 1.0F);
     }
   return result;
@@ -184,7 +184,7 @@ void ViewerFeed::add_extras(const HapticSimulation& simulation, ViewerFrame& fra
     std::vector<double> nodal;
     nodal.reserve(nodes.positions.size());
     for (const Vector3& x : nodes.positions)
-      nodal.push_back(von_mises(session.at(x).stress));
+      nodal.push_back(von_mises(session.model().at(x).stress));
     follower_.spread(nodal, frame.von_mises);
   }
   if (!request_.nodes && request_.picks.empty())

@@ -57,6 +57,7 @@ struct BodyModel {
   std::optional<solvers::LipPatch> lips;           // pairs, then banks; empty: none has had to be held yet
   std::optional<solvers::CutContactState> state;   // empty: not solved yet
   solvers::Field field;                            // solution; at finite strain of that body's shape functions
+  std::optional<solvers::Field> without_blade;     // that without the blade, while `field` is under it
   mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
   mutable RestMemo rest_memo{};                    // of the solution, likewise
 

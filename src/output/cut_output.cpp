@@ -72,7 +72,7 @@ void write_wound(const std::filesystem::path& file, const Session& session) {
   std::vector<Vector3> displacement;
   std::vector<double> stress;
   for (std::size_t v = 0; v < wound.surface.vertices.size(); ++v) {
-    const solvers::PointState state = session.at(wound.evaluation[v]);
+    const solvers::PointState state = session.model().at(wound.evaluation[v]);
     displacement.push_back(state.displacement);
     stress.push_back(von_mises(state.stress));
     data.points.emplace_back(wound.surface.vertices[v] + state.displacement);

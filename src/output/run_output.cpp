@@ -72,7 +72,7 @@ void write_organ(const std::filesystem::path& file, const Session& session) {
   std::vector<solvers::PointState> states;
   states.reserve(surface.vertices.size());
   for (const Vector3& x : surface.vertices)
-    states.push_back(session.at(x));
+    states.push_back(session.model().at(x));
   const SampledField skin = sample(states);
   write_vtp(file, moved(surface.vertices, skin.displacement), surface.triangles,
             {vector_data("displacement [m]", skin.displacement), scalar_data("von Mises stress [Pa]", skin.von_mises)});
@@ -122,9 +122,9 @@ RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : fol
   };
   if (session.scenario().tool)
     open(forces_, "forces.csv", header_line(force_columns(is_nonlinear(session.scenario().law))));
-  if (session.cuts())
+  if (has_cuts(session.scenario()))
     open(cuts_, "cuts.csv", header_line(cut_columns()));
-  if (session.tears())
+  if (session.scenario().tearing.enabled)
     open(tears_, "tears.csv", header_line(tear_columns()));
 }
 
@@ -207,12 +207,12 @@ void RunOutput::write_frame(const Session& session, const StepResult& step) {
     series_.push_back({step.time, part, fmt::format("frames/{}_{:05}.vtp", what, findings_.steps)});
     return folder_ / series_.back().file;
   };
-  if (session.cuts())
+  if (has_cuts(session.scenario()))
     write_wound(next(0, "surface"), session);
   else
     write_organ(next(0, "surface"), session);
 
-  const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+  const solvers::NodeCloud& nodes = session.model().sprinkling.nodes;
   if (nodes.size() > 0) {
     std::vector<solvers::PointState> node_states = session.node_states();
     node_states.resize(nodes.positions.size()); // at rest before the first contact
@@ -228,8 +228,8 @@ void RunOutput::write_frame(const Session& session, const StepResult& step) {
     const topology::SurfaceMesh mesh = topology::tool_mesh(tool, step.pose, topology::tip_radius(tool) / 6);
     write_vtp(next(2, "tool"), mesh.vertices, mesh.triangles, {});
   }
-  if (session.incision() != nullptr)
-    write_incision(next(3, "incision"), *session.incision());
+  if (session.model().incision != nullptr)
+    write_incision(next(3, "incision"), *session.model().incision);
 }
 
 // The surface at rest, deformed, and the tool in the plane through the contact that holds its normal and the axis
@@ -249,7 +249,7 @@ void RunOutput::keep_profile(const Session& session, const StepResult& step) {
   for (int i = -samples; i <= samples; ++i) {
     const double s = reach * i / samples;
     const Vector3 x = session.organ().domain->closest_surface_point(origin + s * along);
-    const Vector3 y = x + session.at(x).displacement;
+    const Vector3 y = x + session.model().at(x).displacement;
     rest.x.push_back(1e3 * along.dot(x - origin));
     rest.y.push_back(1e3 * up.dot(x - origin));
     deformed.x.push_back(1e3 * along.dot(y - origin));
@@ -268,13 +268,13 @@ void RunOutput::keep_profile(const Session& session, const StepResult& step) {
 }
 
 void RunOutput::check_pieces(const Session& session, double time) {
-  if (session.incision() == nullptr || pieces_checked(time))
+  if (session.model().incision == nullptr || pieces_checked(time))
     return;
   if (level_set_ == nullptr)
     level_set_ = std::make_unique<topology::LevelSet>(session.organ().domain->surface());
   const topology::Wound& wound = *session.wound();
   const double voxel = level_set_->voxel_size();
-  const topology::VoxelPieces voxels = topology::count_pieces(*level_set_, *session.incision(), 27, true);
+  const topology::VoxelPieces voxels = topology::count_pieces(*level_set_, *session.model().incision, 27, true);
   const auto difference = topology::component_difference(wound);
   const auto pieces = static_cast<int>(wound.pieces.size());
   findings_.piece_checks.push_back({time, pieces, voxels.volumes, voxel,
@@ -298,7 +298,7 @@ void RunOutput::draw_figures(const Session& session) {
       draw(force_figure(session, history_), "force.png");
     if (!profile_.series.empty())
       draw(profile_, "profile.png");
-    if (session.cuts()) {
+    if (has_cuts(session.scenario())) {
       std::vector<double> times;
       std::vector<CutReport> reports;
       for (const StepResult& step : history_) {
@@ -308,7 +308,7 @@ void RunOutput::draw_figures(const Session& session) {
       for (const auto& [name, figure] : cut_figures(times, reports))
         draw(figure, name);
     }
-    if (session.tears()) {
+    if (session.scenario().tearing.enabled) {
       std::vector<double> times;
       std::vector<TearReport> reports;
       for (const StepResult& step : history_)

@@ -45,9 +45,9 @@ OrderedJson inputs(const Session& session) {
 }
 
 OrderedJson nodes(const Session& session) {
-  const solvers::SprinkleReport& report = session.sprinkling().report;
+  const solvers::SprinkleReport& report = session.model().sprinkling.report;
   const FineZone& zone = session.zone();
-  OrderedJson out = {{"total", session.sprinkling().nodes.size()},
+  OrderedJson out = {{"total", session.model().sprinkling.nodes.size()},
                      {"surface", report.surface_nodes},
                      {"edge", report.edge_nodes},
                      {"interior", report.interior_nodes},
@@ -88,10 +88,10 @@ OrderedJson solver(const Session& session, const RunFindings& findings) {
                      {"largest_rotation_degrees", findings.largest_rotation_degrees},
                      {"largest_penetration_m", findings.largest_penetration},
                      {"self_penetration_m", findings.self_penetration}};
-  if (session.body() != nullptr) {
-    const solvers::AssemblyReport& report = session.body()->report();
+  if (session.model().body != nullptr) {
+    const solvers::AssemblyReport& report = session.model().body->report();
     out["unknowns"] = report.unknowns;
-    out["fixed_nodes"] = held_nodes(session.body()->problem().prescribed);
+    out["fixed_nodes"] = held_nodes(session.model().body->problem().prescribed);
     out["matrix_nonzeros"] = report.matrix_nonzeros;
     out["factor_nonzeros"] = report.factor_nonzeros;
     out["condition_estimate"] = report.condition_estimate;
@@ -198,8 +198,8 @@ std::string summary_json(const Session& session, const RunOutput& output, RunSta
   summary["steps"] = {{"done", findings.steps}, {"planned", findings.planned}};
   summary["peak_force"] = findings.touched ? peak(findings.peak) : OrderedJson(nullptr);
   summary["peak_torque"] = findings.touched ? peak(findings.peak_torque) : OrderedJson(nullptr);
-  summary["cut"] = session.cuts() ? cut(session, findings) : OrderedJson(nullptr);
-  summary["tear"] = session.tears() ? tear(findings) : OrderedJson(nullptr);
+  summary["cut"] = has_cuts(session.scenario()) ? cut(session, findings) : OrderedJson(nullptr);
+  summary["tear"] = session.scenario().tearing.enabled ? tear(findings) : OrderedJson(nullptr);
   summary["nodes"] = nodes(session);
   summary["solver"] = solver(session, findings);
   summary["timings_s"] = timings(session.profile());

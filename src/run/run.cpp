@@ -5,6 +5,7 @@
 #include "src/base/printable.hpp"
 #include "src/base/progress.hpp"
 #include "src/blade/account.hpp"
+#include "src/model/finite_model.hpp"
 #include "src/output/run_output.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "topology/base/errors.hpp"
@@ -43,31 +44,31 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     if (const auto& turning = found.peak_torque; turning.torque.norm() > 0)
       text += fmt::format("  largest torque about its point {:.4g} mN m at t = {:.3g} s\n", 1e3 * turning.torque.norm(),
                           turning.time);
-    text += session.body() == nullptr
+    text += session.model().body == nullptr
                 ? fmt::format("  {} nodes, law {}, {} iterations a step, least volume ratio {:.3g}, largest residual "
                               "{:.1e}\n",
                               peak.nodes, name_of(session.scenario().law), median(found.iterations),
                               found.least_jacobian, found.largest_residual)
                 : fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
                               solvers::to_string(session.scenario().method.method),
-                              session.body()->report().condition_estimate, found.largest_residual);
+                              session.model().body->report().condition_estimate, found.largest_residual);
   } else if (session.scenario().tool) {
     text += fmt::format("no contact: the force is zero in all {} steps\n", found.steps);
   }
-  if (!session.scenario().tool && !session.cuts()) {
+  if (!session.scenario().tool && !has_cuts(session.scenario())) {
     double largest = 0;
     Vector3 place = Vector3::Zero();
     for (std::size_t i = 0; i < session.node_states().size(); ++i)
       if (const double motion = session.node_states()[i].displacement.norm(); motion > largest) {
         largest = motion;
-        place = session.sprinkling().nodes.positions[i];
+        place = session.model().sprinkling.nodes.positions[i];
       }
     text += fmt::format("under its loads it moves by up to {:.4g} mm, at [{:.4g}, {:.4g}, {:.4g}] m\n", 1e3 * largest,
                         place.x(), place.y(), place.z());
-    text += fmt::format("  {} nodes, {}, largest residual {:.1e}\n", session.sprinkling().nodes.size(),
+    text += fmt::format("  {} nodes, {}, largest residual {:.1e}\n", session.model().sprinkling.nodes.size(),
                         solvers::to_string(session.scenario().method.method), found.largest_residual);
   }
-  if (session.cuts()) {
+  if (has_cuts(session.scenario())) {
     const CutReport& cut = found.cut;
     if (session.scenario().blade && found.increments == 0)
       text += fmt::format("the blade has cut nothing in all {} steps\n", found.steps);
@@ -89,7 +90,7 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     if (found.refused_cuts > 0)
       text += fmt::format("  {} increments refused, see cuts.csv\n", found.refused_cuts);
   }
-  if (session.tears()) {
+  if (session.scenario().tearing.enabled) {
     const EnergyLedger& ledger = found.tear.ledger;
     text += fmt::format("torn {:.4g} cm2 in {} increments{}{}; work {:.3g} mJ: elastic {:.3g}, new surface {:.3g}, "
                         "dissipated {:.3g}, left open {:.2g}\n",
@@ -111,7 +112,7 @@ std::string estimate_text(const Session& session) {
   constexpr double reference = 2597, memory = 277e6, program = 40e6, seconds = 1.8;
   constexpr double memory_growth = 1.5, time_growth = 1.9; // powers of the number of nodes
   constexpr double many_nodes = 10000, long_time = 600;    // s
-  const int nodes = session.sprinkling().nodes.size();
+  const int nodes = session.model().sprinkling.nodes.size();
   const bool is_balance = session.scenario().method.method == solvers::Method::collocation;
   const double bytes =
       program + (is_balance ? 1.15 : 1.0) * memory * std::pow(static_cast<double>(nodes) / reference, memory_growth);
@@ -177,7 +178,7 @@ void require_tissue(const Session& session, const StepResult& step) {
                                      "rows up to then are kept",
                                      step.time, what, limit, farthest));
   };
-  const std::vector<Vector3>& positions = session.sprinkling().nodes.positions;
+  const std::vector<Vector3>& positions = session.model().sprinkling.nodes.positions;
   const std::vector<solvers::PointState>& states = session.node_states();
   for (std::size_t i = 0; i < states.size(); ++i)
     if (const double motion = states[i].displacement.norm(); !(motion <= limit))
@@ -259,7 +260,7 @@ void check_scenario(const std::filesystem::path& file, const std::filesystem::pa
       say(fmt::format("a run of it is refused: {}", error.what()));
     }
   if (session.computes()) {
-    say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.sprinkling().nodes.size(),
+    say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.model().sprinkling.nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
     if (!is_nonlinear(session.scenario().law)) // measured on linear bodies
       say(estimate_text(session));

@@ -32,7 +32,7 @@ LiveSession::LiveSession(Scenario scenario, const LiveOptions& options, std::fun
       record_(options.record) {
   const Session& session = simulation_->session();
   domain_ = session.organ().domain;
-  nodes_ = session.sprinkling().nodes.size();
+  nodes_ = session.model().sprinkling.nodes.size();
   fine_ = session.zone().spacing.fine;
   coarse_ = session.zone().spacing.coarse;
   if (nodes_ > most_live_nodes)

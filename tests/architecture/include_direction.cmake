@@ -8,7 +8,7 @@ set(known ${floors} python tests) # other folders are made by the build
 set(rooms_topology base search surface files organ domain tool incision cells blade wound)
 set(rooms_solvers algebra elasticity nodes quadrature shapes body galerkin collocation published contact fracture cut appended
     finite)
-set(rooms_src base scenario model blade session output run haptics devices live viewer apps)
+set(rooms_src base scenario model blade tissue session output run haptics devices live viewer apps)
 set(most_headers 16)
 set(offences "")
 set(below "")

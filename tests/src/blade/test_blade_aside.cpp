@@ -30,10 +30,10 @@ position = [0.034, -0.012, 0.018]
 
 // Steps beside which bodies are made; each is there at the third step after it was begun. `look` sees every step.
 void go(Session& session, const std::function<void(const StepResult&)>& look) {
-  session.set_following_aside(true);
+  session.set_options({.following_aside = true});
   int since = 0;
   for (const StepSample& sample : session.steps()) {
-    since = session.recondensing() ? since + 1 : 0;
+    since = session.pending().under_way ? since + 1 : 0;
     if (since == 3)
       session.swap_body();
     look(session.step(sample));
@@ -58,14 +58,14 @@ TEST_CASE("A resisted blade whose cuts are made beside the steps waits at the fo
     CHECK(step.cut->area >= last);
     taken += step.rebuild == Rebuild::aside ? 1 : 0;
     in_the_step += step.rebuild == Rebuild::in_step ? 1 : 0;
-    if (aside.recondensing() && step.cut->area > 0) { // what is shown and felt is the body that is there
+    if (aside.pending().under_way && step.cut->area > 0) { // what is shown and felt is the body that is there
       ++waited;
       if (step.cut->area == shown)
         CHECK(step.cut->surface_hash == hash);
       shown = step.cut->area;
       hash = step.cut->surface_hash;
       CHECK(step.cut->blade.release <= std::max(toughness, force) * (1 + 1e-4)); // it does not rise
-      CHECK(aside.lags_behind_blade() == aside.blade()->lags());
+      CHECK(aside.pending().lags == aside.blade()->lags());
       CHECK((aside.blade()->lags() || step.cut->blade.release <= toughness * (1 + 1e-4)));
     }
     last = step.cut->area;
@@ -75,7 +75,7 @@ TEST_CASE("A resisted blade whose cuts are made beside the steps waits at the fo
   CHECK(waited > 5);
   CHECK(taken > 4);
   CHECK(in_the_step <= 2); // when it leaves
-  CHECK_FALSE(aside.recondensing());
+  CHECK_FALSE(aside.pending().under_way);
   CHECK(end.cut->area == Approx(area).epsilon(0.02));
   CHECK(end.cut->pieces == 1);
   const solvers::BladeLedger& ledger = end.cut->blade.ledger;
@@ -89,12 +89,12 @@ TEST_CASE("A blade whose first cut is long in the making waits for it, and nothi
   Session in_step(scenario);
   const double area = run(in_step).back().cut->area;
   Session aside(scenario);
-  aside.set_following_aside(true);
+  aside.set_options({.following_aside = true});
   int waited = 0;
   StepResult end;
   for (const StepSample& sample : aside.steps()) { // bodies are taken where the blade has got too far ahead
     end = aside.step(sample);
-    if (end.cut->area > 0 || !aside.recondensing())
+    if (end.cut->area > 0 || !aside.pending().under_way)
       continue;
     waited += aside.blade()->lags() ? 1 : 0;
     CHECK(end.cut->blade.release <= 2.4 * toughness * (1 + 1e-4));
@@ -117,11 +117,11 @@ TEST_CASE("A proposal under way is dropped with the blade, or where steps are to
   const Scenario scenario = scenario_of(through_a_corner);
   const bool is_lifted = GENERATE(true, false);
   Session session(scenario);
-  session.set_following_aside(true);
+  session.set_options({.following_aside = true});
   std::size_t i = 0;
   double area = 0;
-  for (; i < session.steps().size() && !(session.recondensing() && area > 0); ++i) {
-    if (session.recondensing())
+  for (; i < session.steps().size() && !(session.pending().under_way && area > 0); ++i) {
+    if (session.pending().under_way)
       session.swap_body();
     area = session.step(session.steps()[i]).cut->area;
   }
@@ -130,11 +130,11 @@ TEST_CASE("A proposal under way is dropped with the blade, or where steps are to
   if (is_lifted)
     session.lift_blade();
   else
-    session.set_following_aside(false);
-  CHECK_FALSE(session.recondensing());
+    session.set_options({.following_aside = false});
+  CHECK_FALSE(session.pending().under_way);
   CHECK_FALSE(session.swap_body());
   CHECK(topology::surface_hash(session.wound()->surface) == hash);
-  CHECK(session.incision()->area() == area);
+  CHECK(session.model().incision->area() == area);
   StepResult step;
   for (; i < session.steps().size(); ++i)
     step = session.step(session.steps()[i]);
@@ -146,34 +146,34 @@ TEST_CASE("A proposal under way is dropped with the blade, or where steps are to
 TEST_CASE("A resisted blade that is left in the tissue still cuts what it has come to") {
   const Scenario scenario = scenario_of(through_a_corner);
   Session session(scenario);
-  session.set_following_aside(true);
-  session.set_going_on(true);
+  session.set_options({.going_on = true, .following_aside = true});
   double area = 0;
   std::optional<StepSample> last;
   for (const StepSample& sample : session.steps()) {
-    if (session.recondensing() && sample.time < 0.15)
+    if (session.pending().under_way && sample.time < 0.15)
       session.swap_body();
     area = session.step(sample).cut->area;
     last = sample;
-    if (area > 0 && session.recondensing() && session.lags_behind_blade() && sample.time > 0.2)
+    if (area > 0 && session.pending().under_way && session.pending().lags && sample.time > 0.2)
       break;
   }
-  REQUIRE(session.recondensing());
-  REQUIRE(session.lags_behind_blade());
+  REQUIRE(session.pending().under_way);
+  REQUIRE(session.pending().lags);
   const double left_at = last->time;
   last->blade.reset();
   int steps = 0, begun_later = 0;
-  for (; steps < 20 && session.lags_behind_blade(); ++steps) {
-    if (session.recondensing())
+  for (; steps < 20 && session.pending().lags; ++steps) {
+    if (session.pending().under_way)
       session.swap_body();
-    CHECK_FALSE(session.recondensed()); // it is taken once
+    CHECK_FALSE(session.pending().there); // it is taken once
     last->time += 0.01;
     const StepResult step = session.step(*last);
     CHECK_FALSE(step.cut->refused);
     CHECK(step.cut->area >= area);
     area = step.cut->area;
-    CHECK(session.has_put_off() == (session.lags_behind_blade() && !session.recondensing())); // else nobody asks for it
-    begun_later += session.has_put_off() ? 1 : 0;
+    CHECK(session.pending().put_off ==
+          (session.pending().lags && !session.pending().under_way)); // else nobody asks for it
+    begun_later += session.pending().put_off ? 1 : 0;
   }
   CHECK(begun_later > 0);
   CHECK(steps > 0);
@@ -190,7 +190,7 @@ TEST_CASE("With blade.advance = 0 a resisted blade's cuts are made in the steps"
   Session session = session_of(replaced(through_a_corner, "step = 0.01", "step = 0.04\nadvance = 0"));
   int cuts = 0;
   go(session, [&](const StepResult& step) {
-    CHECK_FALSE(session.recondensing());
+    CHECK_FALSE(session.pending().under_way);
     cuts += step.rebuild == Rebuild::in_step ? 1 : 0;
   });
   CHECK(cuts > 2);

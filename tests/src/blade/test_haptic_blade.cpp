@@ -282,7 +282,7 @@ position = [0.012, -0.034, 0.018]
       else if (told)
         simulation.pass(device.read(tick));
     CHECK_FALSE(simulation.result().cut->refused);
-    return simulation.session().incision() != nullptr ? simulation.session().incision()->area() : 0;
+    return simulation.session().model().incision != nullptr ? simulation.session().model().incision->area() : 0;
   };
   CHECK(area_when(true) == Approx(area).epsilon(is_resisted ? 0.06 : 0.03)); // which leaves the last of its way uncut
   CHECK(area_when(false) < 0.95 * area);                                     // corners are cut off

@@ -45,7 +45,7 @@ TEST_CASE(
     CHECK(result.residual < 1e-8);
   }
   REQUIRE(cut);
-  CHECK(session.incision()->front_length() == Approx(width).epsilon(0.01)); // from the surface on: none is buried
+  CHECK(session.model().incision->front_length() == Approx(width).epsilon(0.01)); // from the surface on: none is buried
   const double swept = width * 0.018;
   CHECK(area < swept);
   CHECK(area > 0.5 * swept);
@@ -53,7 +53,7 @@ TEST_CASE(
   CHECK(last.force.z() == Approx(toughness * width).epsilon(0.25)); // not steady: the base is near
   CHECK(last.advance > 0);
   // The tissue is shown as the blade deforms it.
-  CHECK(session.at({0.003, 0, 0.011}).displacement.z() < -0.1 * last.advance);
+  CHECK(session.model().at({0.003, 0, 0.011}).displacement.z() < -0.1 * last.advance);
 }
 
 TEST_CASE("A blade that is pressed too little does not cut, and leaves nothing behind") {
@@ -61,10 +61,10 @@ TEST_CASE("A blade that is pressed too little does not cut, and leaves nothing b
                            blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.028]", "[0.004, 0, 0.035]"}, 0.04, "0.5");
   Session session = session_of(text);
   const std::vector<StepResult> results = run(session);
-  CHECK(session.incision() == nullptr);
+  CHECK(session.model().incision == nullptr);
   CHECK(results[2].cut->blade.force.z() > 0);
   CHECK(results.back().cut->blade.force.norm() == 0);
-  CHECK(session.at({0.004, 0, 0.029}).displacement.norm() < 1e-12);
+  CHECK(session.model().at({0.004, 0, 0.029}).displacement.norm() < 1e-12);
   CHECK(std::none_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
 }
 
@@ -190,13 +190,13 @@ TEST_CASE("Tissue that a resisted blade has gone through without cutting it is t
     Session session =
         session_of(tough + blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.028]", "[0.004, 0, -0.005]"}, 0.04, "0.5"));
     run(session);
-    CHECK(session.incision() == nullptr);
+    CHECK(session.model().incision == nullptr);
     CHECK(std::any_of(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue));
   }
   SECTION("where it goes from outside to outside in one step") {
     Session session = session_of(tough + blade({"[0.004, 0, 0.031]", "[0.004, 0, -0.005]"}, 0.04, "1"));
     run(session);
-    REQUIRE(session.incision() == nullptr);
+    REQUIRE(session.model().incision == nullptr);
     const auto told = std::find_if(session.warnings().begin(), session.warnings().end(), tells_of_uncut_tissue);
     REQUIRE(told != session.warnings().end());
     CHECK_THAT(*told, Contains("up to 30 mm") && Contains("blade.step"));

@@ -109,7 +109,7 @@ TEST_CASE("At small depth a neo-Hookean block resists a ball as the linear one d
                                              "fine_spacing = 0.004", "fine_spacing = 0.002"),
                                     "radius = 0.01\nstep", "radius = 0.1\nstep");
   Session linear = session_of(text), finite = session_of(with_law(text));
-  REQUIRE(linear.sprinkling().nodes.positions == finite.sprinkling().nodes.positions);
+  REQUIRE(linear.model().sprinkling.nodes.positions == finite.model().sprinkling.nodes.positions);
   const StepResult a = run(linear).back(), b = run(finite).back();
   REQUIRE(a.force.z() > 0);
   CHECK(b.force.z() == Approx(a.force.z()).epsilon(0.01));
@@ -120,8 +120,8 @@ TEST_CASE("At small depth a neo-Hookean block resists a ball as the linear one d
   CHECK(finite.warnings().empty());
   // Displacement and stress under the tip.
   const Vector3 below(0, 0, 0.026);
-  CHECK((finite.at(below).displacement - linear.at(below).displacement).norm() <
-        0.02 * linear.at(below).displacement.norm());
+  CHECK((finite.model().at(below).displacement - linear.model().at(below).displacement).norm() <
+        0.02 * linear.model().at(below).displacement.norm());
 }
 
 TEST_CASE("A cube pressed by a quarter has the force of the closed form, the linear law does not") {
@@ -169,7 +169,7 @@ TEST_CASE("A block of a law gives back what a tool does to it: the way up is the
     CHECK(steps[8 - k].active_nodes == steps[k].active_nodes);
   }
   CHECK(steps.back().force.norm() == 0);
-  CHECK(session.at({0, 0, 0.03}).displacement.norm() < 1e-3 * 0.004);
+  CHECK(session.model().at({0, 0, 0.03}).displacement.norm() < 1e-3 * 0.004);
 }
 
 TEST_CASE("The angle of a deformation is that of its rotation, whatever the stretch") {
@@ -187,7 +187,7 @@ TEST_CASE("A neo-Hookean block hangs by its weight from the tool's way on") {
   Session session = session_of(text);
   const std::vector<StepResult> results = run(session);
   const Vector3 top(0.02, 0.02, 0.03);
-  CHECK(session.at(top).displacement.z() < 0);
+  CHECK(session.model().at(top).displacement.z() < 0);
   CHECK(results.front().force.norm() == 0); // the way counts from the sagged surface
   CHECK(results.back().force.z() > 0);
 }

@@ -33,7 +33,7 @@ position = [-0.043, 0.001, 0.010]
 std::unique_ptr<solvers::Discretisation> rebuilt_from_scratch(const Session& session) {
   solvers::DiscretisationOptions method = session.scenario().method;
   method.unheld = session.scenario().cut.unheld;
-  return solvers::discretise(session.body()->problem(), method);
+  return solvers::discretise(session.model().body->problem(), method);
 }
 
 /// Coefficients after every step; the body that is under way is taken over before every second step that could.
@@ -41,14 +41,14 @@ std::vector<VectorX> run(Session& session, bool early, std::chrono::milliseconds
   std::vector<VectorX> fields;
   int under_way = 0;
   for (const StepSample& sample : session.steps()) {
-    under_way += session.recondensing() ? 1 : 0;
-    if (early && session.recondensing() && under_way % 2 == 0)
+    under_way += session.pending().under_way ? 1 : 0;
+    if (early && session.pending().under_way && under_way % 2 == 0)
       taken += session.swap_body() ? 1 : 0;
     const StepResult result = session.step(sample);
     CHECK_FALSE(result.cut->refused);
     CHECK(result.residual < 1e-9);
     taken += result.cut->update == SystemUpdate::taken_over ? 1 : 0;
-    fields.push_back(session.field().coefficients);
+    fields.push_back(session.model().field.coefficients);
     std::this_thread::sleep_for(pause);
   }
   return fields;
@@ -59,30 +59,30 @@ std::vector<VectorX> run(Session& session, bool early, std::chrono::milliseconds
 TEST_CASE("A body that takes over from the background is the one built from scratch, and follows what is cut later") {
   const std::string text = bar + "[method]\nname = \"" + GENERATE("galerkin", "collocation") + "\"\n";
   Session session(scenario_of(text));
-  session.set_recondensing(true);
+  session.set_options({.recondensing = true});
   int taken = 0, followed = 0;
   for (const StepSample& sample : session.steps()) {
     const StepResult result = session.step(sample);
     CHECK(result.residual < 1e-9);
     followed += result.cut->update == SystemUpdate::updated || result.cut->update == SystemUpdate::taken_over ? 1 : 0;
-    if (!session.recondensing())
+    if (!session.pending().under_way)
       continue;
-    const solvers::Field before = session.body()->solve();
+    const solvers::Field before = session.model().body->solve();
     REQUIRE(session.swap_body()); // nothing has been cut since it was begun
     ++taken;
-    CHECK_FALSE(session.recondensing());
+    CHECK_FALSE(session.pending().under_way);
     CHECK_FALSE(session.swap_body());
-    const solvers::Field now = session.body()->solve(), scratch = rebuilt_from_scratch(session)->solve();
+    const solvers::Field now = session.model().body->solve(), scratch = rebuilt_from_scratch(session)->solve();
     CHECK((now.coefficients - scratch.coefficients).norm() <= 1e-9 * scratch.coefficients.norm());
     CHECK((now.coefficients - before.coefficients).norm() < 2e-3 * scratch.coefficients.norm()); // finer cells
   }
   CHECK(taken >= 1);
   CHECK(followed >= 3);
-  REQUIRE(session.incision() != nullptr);
+  REQUIRE(session.model().incision != nullptr);
   Session rebuilt(scenario_of(text));
   for (const StepSample& sample : rebuilt.steps())
     rebuilt.step(sample);
-  CHECK(session.incision()->area() == Approx(rebuilt.incision()->area()).epsilon(2e-3));
+  CHECK(session.model().incision->area() == Approx(rebuilt.model().incision->area()).epsilon(2e-3));
 }
 
 TEST_CASE("A cut during condensing is repeated on the new body, and when a thread runs does not change a bit") {
@@ -91,16 +91,16 @@ TEST_CASE("A cut during condensing is repeated on the new body, and when a threa
   const std::string text = replaced(bar, "step = 0.125", GENERATE("step = 0.125", "step = 0.03125"));
   int taken = 0, taken_slowly = 0;
   Session quick(scenario_of(text)), slow(scenario_of(text));
-  quick.set_recondensing(true);
-  slow.set_recondensing(true);
+  quick.set_options({.recondensing = true});
+  slow.set_options({.recondensing = true});
   const std::vector<VectorX> a = run(quick, early, std::chrono::milliseconds(0), taken);
   const std::vector<VectorX> b = run(slow, early, std::chrono::milliseconds(60), taken_slowly);
   CHECK(taken >= 1);
   CHECK(taken == taken_slowly);
   CHECK(a == b);
   // It has followed: its nodes are those of the session, and it is near to a body built anew on them.
-  const solvers::Field now = quick.body()->solve(), scratch = rebuilt_from_scratch(quick)->solve();
-  CHECK(quick.body()->problem().nodes.positions == quick.sprinkling().nodes.positions);
+  const solvers::Field now = quick.model().body->solve(), scratch = rebuilt_from_scratch(quick)->solve();
+  CHECK(quick.model().body->problem().nodes.positions == quick.model().sprinkling.nodes.positions);
   CHECK((now.coefficients - scratch.coefficients).norm() < 2e-3 * scratch.coefficients.norm());
 }
 
@@ -108,18 +108,18 @@ TEST_CASE("What is condensed in the background and given up leaves no trace, at 
   Session plain(scenario_of(bar)), other(scenario_of(bar));
   for (const StepSample& sample : plain.steps()) {
     plain.step(sample);
-    other.set_recondensing(true);
+    other.set_options({.recondensing = true});
     other.step(sample);
-    other.set_recondensing(false); // in the middle of it
-    CHECK_FALSE(other.recondensing());
+    other.set_options({.recondensing = false}); // in the middle of it
+    CHECK_FALSE(other.pending().under_way);
   }
-  CHECK(other.field().coefficients == plain.field().coefficients);
+  CHECK(other.model().field.coefficients == plain.model().field.coefficients);
   Session left(scenario_of(bar));
-  left.set_recondensing(true);
+  left.set_options({.recondensing = true});
   bool begun = false;
   for (std::size_t i = 0; i < left.steps().size() && !begun; ++i) {
     left.step(left.steps()[i]);
-    begun = left.recondensing();
+    begun = left.pending().under_way;
   }
   CHECK(begun); // and the session ends while it runs
 }
@@ -138,14 +138,14 @@ TEST_CASE("A session that is made ready has a body that follows the first cut") 
   Session ready(scenario_of(text)), other(scenario_of(text));
   std::vector<SystemUpdate> first;
   for (Session* session : {&ready, &other}) {
-    session->set_recondensing(session == &ready);
+    session->set_options({.recondensing = session == &ready});
     session->prepare(session->steps().front());
-    CHECK_FALSE(session->recondensing()); // it is there
+    CHECK_FALSE(session->pending().under_way); // it is there
     first.push_back(SystemUpdate::none);
     for (std::size_t i = 0; i < session->steps().size() && first.back() == SystemUpdate::none; ++i)
       first.back() = session->step(session->steps()[i]).cut->update;
   }
   CHECK(first == std::vector{SystemUpdate::updated, SystemUpdate::rebuilt});
-  const solvers::Field now = ready.body()->solve(), scratch = rebuilt_from_scratch(ready)->solve();
+  const solvers::Field now = ready.model().body->solve(), scratch = rebuilt_from_scratch(ready)->solve();
   CHECK((now.coefficients - scratch.coefficients).norm() < 2e-3 * scratch.coefficients.norm());
 }

@@ -40,18 +40,18 @@ namespace {
 /// Everything that a refused increment must leave as it was.
 struct Before {
   explicit Before(const Session& session)
-      : nodes(session.sprinkling().nodes.positions), reaches(session.sprinkling().nodes.reaches),
-        coefficients(session.field().coefficients),
-        area(session.incision() == nullptr ? 0 : session.incision()->area()),
+      : nodes(session.model().sprinkling.nodes.positions), reaches(session.model().sprinkling.nodes.reaches),
+        coefficients(session.model().field.coefficients),
+        area(session.model().incision == nullptr ? 0 : session.model().incision->area()),
         segments(session.zone().spacing.segments) {}
 
   void require_in(const Session& session) const {
-    CHECK(session.sprinkling().nodes.positions == nodes);
-    CHECK(session.sprinkling().nodes.reaches == reaches);
-    REQUIRE(session.field().coefficients.size() == coefficients.size());
+    CHECK(session.model().sprinkling.nodes.positions == nodes);
+    CHECK(session.model().sprinkling.nodes.reaches == reaches);
+    REQUIRE(session.model().field.coefficients.size() == coefficients.size());
     // A new body has finer cells at the front as it is now.
-    CHECK((session.field().coefficients - coefficients).norm() < 2e-3 * coefficients.norm());
-    CHECK((session.incision() == nullptr ? 0 : session.incision()->area()) == area);
+    CHECK((session.model().field.coefficients - coefficients).norm() < 2e-3 * coefficients.norm());
+    CHECK((session.model().incision == nullptr ? 0 : session.model().incision->area()) == area);
     CHECK(session.zone().spacing.segments == segments);
     CHECK(session.wound()->pieces.size() == 1);
   }
@@ -64,7 +64,7 @@ struct Before {
 };
 
 bool can_grow(const Session& session) {
-  return dynamic_cast<const solvers::Growable*>(session.body()) != nullptr;
+  return dynamic_cast<const solvers::Growable*>(session.model().body.get()) != nullptr;
 }
 
 /// m; how far the ends of the segments lie from others at most.
@@ -83,10 +83,8 @@ double farthest_end(const std::vector<std::array<Vector3, 2>>& segments,
   return farthest;
 }
 
-Session tearing_session(const std::string& method) {
-  Session session(scenario_of(long_bar(0.15, 0.3, growing_notch(method))));
-  session.set_tear_gradually(true);
-  return session;
+std::string tearing_bar(const std::string& method) {
+  return long_bar(0.15, 0.3, growing_notch(method));
 }
 
 } // namespace
@@ -94,7 +92,8 @@ Session tearing_session(const std::string& method) {
 TEST_CASE(
     "An increment of a tear that fails once the body has followed it leaves a body in balance, and is made then") {
   const std::string method = GENERATE("galerkin", "collocation");
-  Session session = tearing_session(method);
+  Session session = session_of(tearing_bar(method));
+  session.set_options({.tear_gradually = true});
   const StepSample& sample = session.steps().front();
   for (int step = 0; step < 2; ++step)
     session.step(sample);
@@ -116,27 +115,30 @@ TEST_CASE(
 }
 
 TEST_CASE("Where a body cannot be had again after a refused increment the step fails, and the next one builds it") {
-  Session session = tearing_session("galerkin");
+  Session session = session_of(tearing_bar("galerkin"));
+  session.set_options({.tear_gradually = true});
   const StepSample& sample = session.steps().front();
   for (int step = 0; step < 2; ++step)
     session.step(sample);
   const Before before(session);
   failing_condensations = 2;
   CHECK_THROWS_WITH(session.step(sample), Contains("refused") && Contains("not condensed"));
-  CHECK(session.body() == nullptr);
-  CHECK(session.sprinkling().nodes.positions == before.nodes);
-  CHECK(session.incision()->area() == before.area);
+  CHECK(session.model().body == nullptr);
+  CHECK(session.model().sprinkling.nodes.positions == before.nodes);
+  CHECK(session.model().incision->area() == before.area);
   const StepResult next = session.step(sample);
   CHECK(next.tear->increments.size() == 2);
   CHECK(next.residual < 1e-9);
 }
 
 TEST_CASE("Increments of a tear that are refused once each leave the fine zone's way to it") {
-  Session session = tearing_session("galerkin");
-  Session undisturbed = tearing_session("galerkin");
+  Session session = session_of(tearing_bar("galerkin"));
+  session.set_options({.tear_gradually = true});
+  Session undisturbed = session_of(tearing_bar("galerkin"));
+  undisturbed.set_options({.tear_gradually = true});
   // A refusal leaves a body that is built anew, as every body of this one is.
-  Session anew = tearing_session("galerkin");
-  anew.set_updating(false);
+  Session anew = session_of(tearing_bar("galerkin"));
+  anew.set_options({.tear_gradually = true, .updating = false});
   const StepSample& sample = session.steps().front();
   for (Session* each : {&session, &undisturbed, &anew})
     each->step(sample);
@@ -176,7 +178,7 @@ TEST_CASE("A blade's cut that fails once the body has followed it leaves a body 
   REQUIRE(refused.cut->refused);
   CHECK(refused.cut->update == SystemUpdate::none);
   CHECK(refused.cut->kept_nodes == 0);
-  CHECK(refused.cut->nodes == session.sprinkling().nodes.size());
+  CHECK(refused.cut->nodes == session.model().sprinkling.nodes.size());
   CHECK(refused.residual < 1e-9);
   before.require_in(session);
 }
@@ -217,12 +219,12 @@ TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the 
       cut_block + by_window + replaced(incision_at_end, "step = 0.2", "step = 0.05\nadvance = 0.3");
   const Scenario scenario = scenario_of(replaced(replaced(text, "-0.042", "-0.012"), "-0.043", "-0.013"));
   Session plain(scenario), session(scenario);
-  session.set_following_aside(true);
+  session.set_options({.following_aside = true});
   std::size_t i = 0;
   const auto go_until_it_cuts = [&] {
-    while (i + 1 < session.steps().size() && !session.recondensing())
+    while (i + 1 < session.steps().size() && !session.pending().under_way)
       session.step(session.steps()[i++]);
-    REQUIRE(session.recondensing());
+    REQUIRE(session.pending().under_way);
   };
   go_until_it_cuts();
   REQUIRE(session.swap_body());
@@ -233,8 +235,8 @@ TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the 
   go_until_it_cuts();
   CHECK_FALSE(session.swap_body());
   CHECK(failing_condensations == 0);
-  CHECK_FALSE(session.recondensing());
-  CHECK(session.sprinkling().nodes.positions == before.nodes);
+  CHECK_FALSE(session.pending().under_way);
+  CHECK(session.model().sprinkling.nodes.positions == before.nodes);
   CHECK(session.wound()->surface.triangles.size() == triangles);
   const StepResult refused = session.step(session.steps()[i++]);
   CHECK(refused.cut->refused);

@@ -93,11 +93,12 @@ TEST_CASE("Weight alone is something to compute: a column sinks by half its stra
   CHECK_THAT(complaint(column), Contains("nothing to compute") && Contains("gravity"));
   Session session = session_of(column + "[gravity]\nacceleration = [0, 0, -9.81]\n");
   run(session);
-  CHECK(session.at({0, 0, 0.04}).displacement.z() == Approx(-1000 * 9.81 * 0.04 * 0.04 / (2 * 5000)).epsilon(0.03));
+  CHECK(session.model().at({0, 0, 0.04}).displacement.z() ==
+        Approx(-1000 * 9.81 * 0.04 * 0.04 / (2 * 5000)).epsilon(0.03));
   // And pretension: it shortens by the strain that it is let go from.
   Session stretched = session_of(replaced(column, "density = 1000", "pretension = [0, 0, 0.05]"));
   run(stretched);
-  CHECK(stretched.at({0, 0, 0.04}).displacement.z() == Approx(-0.05 * 0.04).epsilon(0.03));
+  CHECK(stretched.model().at({0, 0, 0.04}).displacement.z() == Approx(-0.05 * 0.04).epsilon(0.03));
 }
 
 TEST_CASE("A derived spacing is no reason to refuse the coarse one that is given") {
@@ -118,7 +119,7 @@ TEST_CASE("One cut has the same nodes however far its sheet reaches out of the b
         rectangle_precut(fmt::format("[0, 0, {}]", 0.015 + 0.5 * (0.015 + reach)), "[1, 0, 0]", "[0, 0, 1]",
                          fmt::format("{}", 0.06 + 2 * reach), fmt::format("{}", 0.015 + reach));
     const Session session = session_of(text);
-    counts.insert(session.sprinkling().nodes.size());
+    counts.insert(session.model().sprinkling.nodes.size());
     CHECK(session.zone().spacing.fine == Approx(0.15 * 0.015)); // of its depth in the body
   }
   CHECK(counts.size() == 1);
@@ -130,7 +131,7 @@ TEST_CASE("A sheet that ends just below the surface is cut through to it, and th
                                                           "[0, 0, 1]", "0.02", "0.012");
     const Session session = session_of(text);
     said = warns(session, "cut through to the surface");
-    return session.incision()->front_length();
+    return session.model().incision->front_length();
   };
   bool said = false;
   CHECK(front_of(1e-5, said) == Approx(0.02 + 2 * 0.012).epsilon(0.01));
@@ -144,7 +145,7 @@ TEST_CASE("A small piece is judged by the nodes that it gets") {
   const std::string corner = rectangle_precut("[0.0255, 0.0255, 0.0255]", "[1, 1, 1]", "[1, -1, 0]", "0.08", "0.08") +
                              "[cut]\nunheld = \"hold\"\n";
   const Session session = session_of(cut_block + corner);
-  const auto& nodes = session.sprinkling().nodes;
+  const auto& nodes = session.model().sprinkling.nodes;
   int in_corner = 0;
   for (const Vector3& x : nodes.positions)
     in_corner += x.sum() > 3 * 0.0255 ? 1 : 0;
@@ -172,11 +173,11 @@ TEST_CASE("The margin of a liver is no wall that is too thin for its nodes") {
                                      held_below("-0.02") +
                                      "[nodes]\nfine_spacing = 0.008\n"
                                      "coarse_spacing = 0.03\n[gravity]\nacceleration = [0, 0, -9.81]\n");
-  CHECK(session.sprinkling().nodes.size() > 100);
+  CHECK(session.model().sprinkling.nodes.size() > 100);
   const Session derived = session_of("[organ]\nshape = \"liver\"\ntriangles = 5000\n[material]\nyoung_modulus = 6e3\n"
                                      "poisson_ratio = 0.45\n" +
                                      held_below("-0.02") + "[gravity]\nacceleration = [0, 0, -9.81]\n");
-  CHECK(derived.sprinkling().nodes.size() < 4000);
+  CHECK(derived.model().sprinkling.nodes.size() < 4000);
 }
 
 TEST_CASE("The summary and the check tell of walls and gaps") {

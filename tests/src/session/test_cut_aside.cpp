@@ -54,8 +54,9 @@ double cut_area(const Scenario& scenario) {
 }
 
 bool same_sheets(const Session& a, const Session& b) {
-  return std::equal(a.incision()->sheets().begin(), a.incision()->sheets().end(), b.incision()->sheets().begin(),
-                    b.incision()->sheets().end(), [](const topology::SurfaceMesh& p, const topology::SurfaceMesh& q) {
+  return std::equal(a.model().incision->sheets().begin(), a.model().incision->sheets().end(),
+                    b.model().incision->sheets().begin(), b.model().incision->sheets().end(),
+                    [](const topology::SurfaceMesh& p, const topology::SurfaceMesh& q) {
                       return p.vertices == q.vertices && p.triangles == q.triangles;
                     });
 }
@@ -68,14 +69,14 @@ double area_when_solved(const Scenario& scenario, bool aside, const std::vector<
   ContactSnapshot snapshot;
   simulation.prepare(device.read(0));
   for (const std::uint64_t tick : ticks) {
-    if (simulation.session().recondensing())
+    if (simulation.session().pending().under_way)
       simulation.swap_body();
     simulation.solve(device.read(tick), 0, snapshot);
-    beside += simulation.session().recondensing() ? 1 : 0;
+    beside += simulation.session().pending().under_way ? 1 : 0;
   }
-  CHECK_FALSE(simulation.session().recondensing());
-  REQUIRE(simulation.session().incision() != nullptr);
-  return simulation.session().incision()->area();
+  CHECK_FALSE(simulation.session().pending().under_way);
+  REQUIRE(simulation.session().model().incision != nullptr);
+  return simulation.session().model().incision->area();
 }
 
 } // namespace
@@ -86,28 +87,28 @@ TEST_CASE("A body made beside the steps is the one that a step would have made, 
   const Scenario scenario =
       scenario_of((is_pressed ? pressed_and_cut : in_and_out) + "[method]\nname = \"" + std::string(method) + "\"\n");
   Session waits(scenario), goes_on(scenario);
-  waits.set_updating(false);
-  goes_on.set_following_aside(true);
+  waits.set_options({.updating = false});
+  goes_on.set_options({.following_aside = true});
   int followed = 0;
   bool is_same = true;
   double area = 0;
   for (const StepSample& sample : waits.steps()) {
     const bool cuts = waits.step(sample).cut->triangles > 0;
-    const int nodes = goes_on.sprinkling().nodes.size();
-    const bool is_built = goes_on.body() != nullptr;
+    const int nodes = goes_on.model().sprinkling.nodes.size();
+    const bool is_built = goes_on.model().body != nullptr;
     const StepResult before = goes_on.step(sample);
     const bool is_last = sample.time == waits.steps().back().time; // what is left at the end is not put off
-    REQUIRE(goes_on.recondensing() == (cuts && is_built && !is_last));
-    if (!goes_on.recondensing()) {
+    REQUIRE(goes_on.pending().under_way == (cuts && is_built && !is_last));
+    if (!goes_on.pending().under_way) {
       area = before.cut->area;
       continue;
     }
     ++followed;
     CHECK(before.cut->triangles == 0); // body, cut and wound as they were have gone on
     CHECK(before.cut->area == area);
-    CHECK(goes_on.sprinkling().nodes.size() == nodes);
+    CHECK(goes_on.model().sprinkling.nodes.size() == nodes);
     REQUIRE(goes_on.swap_body());
-    CHECK_FALSE(goes_on.recondensing());
+    CHECK_FALSE(goes_on.pending().under_way);
     StepSample again = sample;
     again.time += 1e-6;
     again.blade->time = again.time;
@@ -115,7 +116,7 @@ TEST_CASE("A body made beside the steps is the one that a step would have made, 
     // Where the tool presses, rounding of the blade's places at rest comes to decide between nodes that are as good.
     is_same = is_same && same_sheets(goes_on, waits);
     if (is_same)
-      CHECK(goes_on.sprinkling().nodes.positions == waits.sprinkling().nodes.positions);
+      CHECK(goes_on.model().sprinkling.nodes.positions == waits.model().sprinkling.nodes.positions);
     else
       CHECK(std::abs(there.nodes - here.nodes) <= 0.01 * here.nodes);
     CHECK((is_same || (is_pressed && followed > 1)));
@@ -137,17 +138,17 @@ TEST_CASE("A blade that is too far ahead waits for its body, and when a thread r
   const Scenario scenario = scenario_of(pressed_and_cut);
   const auto run = [&](std::chrono::milliseconds pause, int& followed, double& area) {
     Session session(scenario);
-    session.set_following_aside(true);
+    session.set_options({.following_aside = true});
     std::vector<VectorX> fields;
     for (const StepSample& sample : session.steps()) {
       const StepResult result = session.step(sample);
       CHECK_FALSE(result.cut->refused);
       followed += result.cut->update == SystemUpdate::taken_over ? 1 : 0;
       area = result.cut->area;
-      fields.push_back(session.field().coefficients);
+      fields.push_back(session.model().field.coefficients);
       std::this_thread::sleep_for(pause);
     }
-    CHECK_FALSE(session.recondensing());
+    CHECK_FALSE(session.pending().under_way);
     return fields;
   };
   int quick = 0, slow = 0;
@@ -164,7 +165,7 @@ TEST_CASE("A blade that leaves the tissue or is lifted while its body is under w
   const Scenario scenario = scenario_of(in_and_out);
   const int swaps = GENERATE(0, 2, 5); // steps from the beginning of a body to where it takes over; 0: when waited for
   Session plain(scenario), aside(scenario);
-  aside.set_following_aside(true);
+  aside.set_options({.following_aside = true});
   int under_way = 0, followed = 0;
   StepResult here, there;
   for (const StepSample& sample : plain.steps()) {
@@ -173,7 +174,7 @@ TEST_CASE("A blade that leaves the tissue or is lifted while its body is under w
     CHECK_FALSE(there.cut->refused);
     followed += there.cut->update == SystemUpdate::taken_over ? 1 : 0;
     CHECK(there.cut->area <= here.cut->area * (1 + 1e-3));
-    under_way = aside.recondensing() ? under_way + 1 : 0;
+    under_way = aside.pending().under_way ? under_way + 1 : 0;
     if (swaps > 0 && under_way >= swaps)
       CHECK(aside.swap_body());
   }
@@ -187,41 +188,41 @@ TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the c
   const bool lifts = GENERATE(true, false);
   const Scenario scenario = scenario_of(in_and_out);
   Session session(scenario);
-  session.set_following_aside(true);
+  session.set_options({.following_aside = true});
   std::size_t i = 0;
-  while (i < session.steps().size() && !session.recondensing())
+  while (i < session.steps().size() && !session.pending().under_way)
     session.step(session.steps()[i++]);
-  REQUIRE(session.recondensing());
-  const double before = session.incision() == nullptr ? 0 : session.incision()->area();
+  REQUIRE(session.pending().under_way);
+  const double before = session.model().incision == nullptr ? 0 : session.model().incision->area();
   if (lifts)
     session.lift_blade();
   else
-    session.set_following_aside(false);
+    session.set_options({.following_aside = false});
   const StepResult result = session.step(session.steps()[i]);
-  CHECK_FALSE(session.recondensing());
+  CHECK_FALSE(session.pending().under_way);
   CHECK(result.cut->triangles > 0);
   CHECK(result.cut->area > before);
-  CHECK(session.incision()->area() == result.cut->area);
+  CHECK(session.model().incision->area() == result.cut->area);
 }
 
 TEST_CASE("What was put off is cut when the blade is lifted or gone") {
   const bool aside = GENERATE(true, false), is_gone = GENERATE(true, false);
   const int poses = GENERATE(3, 65);
   Session session(scenario_of(in_and_out));
-  session.set_following_aside(aside);
+  session.set_options({.following_aside = aside});
   std::size_t i = 0;
-  while (session.incision() == nullptr)
+  while (session.model().incision == nullptr)
     session.step(session.steps()[i++]);
   StepSample sample = session.steps()[i - 1];
-  const double before = session.incision()->area();
+  const double before = session.model().incision->area();
   for (int k = 0; k < poses; ++k) {
     sample.time += 1e-4;
     sample.blade->time = sample.time;
     sample.blade->position.z() -= 1e-3 / poses;
     CHECK(session.step(sample).cut->triangles == 0);
   }
-  CHECK(session.incision()->area() == before);
-  CHECK_FALSE(session.recondensing());
+  CHECK(session.model().incision->area() == before);
+  CHECK_FALSE(session.pending().under_way);
   if (is_gone)
     sample.blade.reset();
   else
@@ -233,7 +234,7 @@ TEST_CASE("What was put off is cut when the blade is lifted or gone") {
       sample.blade->time = sample.time;
     result = session.step(sample);
     CHECK_FALSE(result.cut->refused);
-    if (session.recondensing()) {
+    if (session.pending().under_way) {
       CHECK(aside);
       CHECK(session.swap_body());
     }
@@ -246,13 +247,13 @@ TEST_CASE("Beside the steps a cut is put off by half a spacing unless the scenar
   const std::string left_out = replaced(pressed_and_cut, "advance = 0.4\n", "");
   const auto increments = [](const std::string& text, bool aside, int& beside) {
     Session session(scenario_of(text));
-    session.set_following_aside(aside);
+    session.set_options({.following_aside = aside});
     int count = 0;
     beside = 0;
     for (const StepSample& sample : session.steps()) {
       count += session.step(sample).cut->triangles > 0 ? 1 : 0;
-      beside += session.recondensing() ? 1 : 0;
-      if (session.recondensing())
+      beside += session.pending().under_way ? 1 : 0;
+      if (session.pending().under_way)
         CHECK(session.swap_body());
     }
     return count;
@@ -271,35 +272,35 @@ TEST_CASE("Beside the steps a cut is put off by half a spacing unless the scenar
 
 TEST_CASE("A blade that comes to rest is followed to where it is") {
   Session session(scenario_of(pressed_and_cut));
-  session.set_following_aside(true);
+  session.set_options({.following_aside = true});
   std::size_t i = 0;
-  while (session.incision() == nullptr) {
+  while (session.model().incision == nullptr) {
     session.step(session.steps()[i++]);
-    if (session.recondensing())
+    if (session.pending().under_way)
       CHECK(session.swap_body());
   }
   StepSample sample = session.steps()[i];
   sample.blade->position.z() -= 1e-4;
   session.step(sample);
-  REQUIRE(session.has_put_off());
-  CHECK(session.lags_behind_blade());
-  const double area = session.incision()->area();
+  REQUIRE(session.pending().put_off);
+  CHECK(session.pending().lags);
+  const double area = session.model().incision->area();
   int steps = 0;
-  for (; session.has_put_off() && steps < 50; ++steps) {
+  for (; session.pending().put_off && steps < 50; ++steps) {
     sample.time += 0.005;
     sample.blade->time = sample.time;
     session.step(sample);
   }
   CHECK(steps >= 15); // a tenth of a second
   CHECK(steps <= 25);
-  REQUIRE(session.recondensing());
-  CHECK(session.lags_behind_blade());
+  REQUIRE(session.pending().under_way);
+  CHECK(session.pending().lags);
   CHECK(session.swap_body());
   sample.time += 0.005;
   sample.blade->time = sample.time;
   CHECK(session.step(sample).cut->area > area);
-  CHECK_FALSE(session.lags_behind_blade());
-  CHECK_FALSE(session.has_put_off());
+  CHECK_FALSE(session.pending().lags);
+  CHECK_FALSE(session.pending().put_off);
 }
 
 TEST_CASE("What is made beside the steps in time makes no nodes coarser, and early it makes them finer again") {
@@ -338,14 +339,14 @@ TEST_CASE("A scripted blade that is past the end of its way at the next solve ha
 
 TEST_CASE("A step tells what it had to do with a body that was made anew") {
   Session session(scenario_of(pressed_and_cut));
-  session.set_following_aside(true);
+  session.set_options({.following_aside = true});
   int early = 0, late = 0, in_step = 0, steps = 0;
   for (const StepSample& sample : session.steps()) {
     const Rebuild rebuild = session.step(sample).rebuild;
     early += rebuild == Rebuild::aside_early ? 1 : 0;
     late += rebuild == Rebuild::aside ? 1 : 0;
     in_step += rebuild == Rebuild::in_step ? 1 : 0;
-    steps = session.recondensing() ? steps + 1 : 0;
+    steps = session.pending().under_way ? steps + 1 : 0;
     if (steps == (early == 0 ? 1 : late == 0 ? 4 : 50)) // at once, later, and not before it has to wait
       session.swap_body();
   }
@@ -356,10 +357,10 @@ TEST_CASE("A step tells what it had to do with a body that was made anew") {
 
 TEST_CASE("While the blade moves fields of the contact are not made for a body that will soon be another") {
   Session session(scenario_of(replaced(pressed_and_cut, "advance = 0.4", "advance = 1")));
-  session.set_force_only(true);
+  session.set_options({.force_only = true});
   StepSample sample = *std::find_if(session.steps().begin(), session.steps().end(), [&](const StepSample& s) {
     session.step(s);
-    return session.incision() != nullptr;
+    return session.model().incision != nullptr;
   });
   const auto press_on = [&](double way) {
     for (int i = 0; i < few_presses + 15; ++i) {

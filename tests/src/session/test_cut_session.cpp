@@ -1,5 +1,6 @@
 // Cuts in sessions: precuts, blades that nothing resists, pieces, refusals, bodies that follow.
 #include "src/session/session.hpp"
+#include "src/tissue/cut_checks.hpp"
 #include "tests/src/blade_text.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
@@ -54,9 +55,9 @@ TEST_CASE("A cut that is put off is the same cut in fewer increments") {
   CHECK(increments(some) >= 4);
   CHECK(2 * increments(some) <= increments(every));
   // The body is at rest, so that poses are the same whenever they are carried there.
-  CHECK(waiting.incision()->area() == Approx(plain.incision()->area()).epsilon(1e-3));
-  CHECK(waiting.incision()->front_length() == Approx(plain.incision()->front_length()).epsilon(1e-3));
-  CHECK(waiting.incision()->sheets().size() == plain.incision()->sheets().size());
+  CHECK(waiting.model().incision->area() == Approx(plain.model().incision->area()).epsilon(1e-3));
+  CHECK(waiting.model().incision->front_length() == Approx(plain.model().incision->front_length()).epsilon(1e-3));
+  CHECK(waiting.model().incision->sheets().size() == plain.model().incision->sheets().size());
   for (std::size_t i = 0; i < every.size(); ++i)
     CHECK(some[i].cut->area <= every[i].cut->area * (1 + 1e-3));
 }
@@ -118,8 +119,8 @@ TEST_CASE("A blade that comes down through a stretched block leaves two pieces t
   CHECK(last.opening_volume > 0);
   CHECK(results[3].cut->kept_nodes > results[3].cut->nodes / 2);
   // The block narrows towards the cut on both sides.
-  CHECK(session.at({0.008, 0, 0.029}).displacement.x() > 0);
-  CHECK(session.at({-0.002, 0, 0.029}).displacement.x() < 0);
+  CHECK(session.model().at({0.008, 0, 0.029}).displacement.x() > 0);
+  CHECK(session.model().at({-0.002, 0, 0.029}).displacement.x() < 0);
 }
 
 TEST_CASE("A wound stays as it is while the blade goes back through it, and goes on as if it had not") {
@@ -182,13 +183,13 @@ TEST_CASE("A box cut out of a block: lip nodes keep off the folds of its sheet, 
   CHECK(last.cut->volumes.back() == Approx(0.024 * 0.024 * 0.018).epsilon(1e-9));
   CHECK(last.cut->opening_volume > 1e-8);
   CHECK(last.residual < 1e-8);
-  const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+  const solvers::NodeCloud& nodes = session.model().sprinkling.nodes;
   int lips = 0;
   for (int i = 0; i < nodes.size(); ++i)
     if (nodes.kinds[i] == solvers::NodeKind::lip) {
       ++lips;
       const double offset = solvers::lip_offset * nodes.spacings[i];
-      CHECK(session.incision()->closest(nodes.positions[i], 2 * offset)->distance >= 0.5 * offset);
+      CHECK(session.model().incision->closest(nodes.positions[i], 2 * offset)->distance >= 0.5 * offset);
     }
   CHECK(lips >= 24);
 }
@@ -206,7 +207,7 @@ TEST_CASE("A severed piece that nothing holds is held, dropped or refused as the
     Session session = session_of(cut_block + topping + "[cut]\nunheld = \"drop\"\n");
     CHECK(run(session).back().cut->pieces == 2);
     CHECK_THAT(session.warnings().front(), Contains("leaves the computation"));
-    CHECK(session.at({0, 0, 0.025}).displacement.norm() == 0);
+    CHECK(session.model().at({0, 0, 0.025}).displacement.norm() == 0);
   }
   SECTION("refuse") {
     Session session = session_of(cut_block + topping + "[cut]\nunheld = \"refuse\"\n");
@@ -239,16 +240,16 @@ TEST_CASE("A cut that would leave a piece smaller than the node spacing is refus
   const StepResult before = session.step(session.steps()[0]);
   StepResult last = session.step(session.steps()[1]);
   const CutReport partial = *last.cut;
-  const auto nodes = session.sprinkling().nodes.positions;
-  const VectorX coefficients = session.field().coefficients;
+  const auto nodes = session.model().sprinkling.nodes.positions;
+  const VectorX coefficients = session.model().field.coefficients;
   last = session.step(session.steps()[2]);
   REQUIRE(last.cut->refused);
   CHECK_THAT(last.cut->reason, Contains("smaller than the node spacing"));
   CHECK(last.cut->surface_hash == partial.surface_hash);
   CHECK(last.cut->area == partial.area);
   CHECK(last.cut->pieces == 1);
-  CHECK(session.sprinkling().nodes.positions == nodes);
-  CHECK(session.field().coefficients == coefficients);
+  CHECK(session.model().sprinkling.nodes.positions == nodes);
+  CHECK(session.model().field.coefficients == coefficients);
   static_cast<void>(before);
 }
 
@@ -382,8 +383,8 @@ TEST_CASE("A blade starts from the tissue as it is deformed: the cut at rest is 
   const std::string text = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\npretension = [0.1, 0, 0]");
   Session session = session_of(text + blade({"[0.02, 0, 0.036]", "[0.02, 0, 0.02]"}, 0.04, "0.5"));
   run(session);
-  REQUIRE(session.incision() != nullptr);
-  const auto on = session.incision()->closest({0.022, 0, 0.027}, 0.01);
+  REQUIRE(session.model().incision != nullptr);
+  const auto on = session.model().incision->closest({0.022, 0, 0.027}, 0.01);
   REQUIRE(on);
   CHECK(on->point.x() > 0.0203);
   CHECK(on->point.x() < 0.024);
@@ -450,32 +451,32 @@ TEST_CASE("A body that follows the blade gives what building it anew on the same
     if (result.cut->triangles == 0)
       continue;
     updates += result.cut->update == SystemUpdate::updated ? 1 : 0;
-    CHECK(session.body()->problem().nodes.positions == session.sprinkling().nodes.positions);
+    CHECK(session.model().body->problem().nodes.positions == session.model().sprinkling.nodes.positions);
     solvers::DiscretisationOptions method = session.scenario().method;
     method.unheld = session.scenario().cut.unheld;
     if (sight == "appended")
       method.sight = solvers::SightRule::appended;
-    const auto anew = solvers::discretise(session.body()->problem(), method);
+    const auto anew = solvers::discretise(session.model().body->problem(), method);
     const solvers::Field expected = anew->solve();
-    const solvers::Field followed = session.body()->solve();
+    const solvers::Field followed = session.model().body->solve();
     // What a cut has appended may stand in another order. A new body of the weak form whose spheres bend has finer
     // cells at the front as it is now; the cells of nodes are the same.
     const double tolerance = method_name == "galerkin" && sight == "enriched" ? 2e-3 : 1e-9;
-    const VectorX moved = session.body()->nodal_displacements(followed),
+    const VectorX moved = session.model().body->nodal_displacements(followed),
                   expected_moved = anew->nodal_displacements(expected);
     CHECK((moved - expected_moved).norm() < tolerance * expected_moved.norm());
     for (const Vector3& x : {Vector3(-0.03, 0.004, 0.02), Vector3(-0.05, -0.01, 0.025), Vector3(0.03, 0, 0.015)})
-      CHECK((session.body()->at(x, followed).displacement - anew->at(x, expected).displacement).norm() <
+      CHECK((session.model().body->at(x, followed).displacement - anew->at(x, expected).displacement).norm() <
             tolerance * expected_moved.lpNorm<Eigen::Infinity>());
   }
   CHECK(updates >= 2);
-  CHECK(session.field().coefficients.norm() > 0);
+  CHECK(session.model().field.coefficients.norm() > 0);
 }
 
 TEST_CASE("A run whose systems are updated tells of about the same wound as one that rebuilds them") {
   Session updated = session_of(long_block + incision_at_end);
   Session rebuilt = session_of(long_block + incision_at_end);
-  rebuilt.set_updating(false);
+  rebuilt.set_options({.updating = false});
   const std::vector<StepResult> a = run(updated);
   const std::vector<StepResult> b = run(rebuilt);
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -519,18 +520,18 @@ TEST_CASE("A refused cut leaves a body that has followed the blade as it was, an
   std::size_t i = 0;
   for (; i < 4; ++i)
     session.step(session.steps()[i]);
-  const VectorX coefficients = session.field().coefficients;
-  const auto nodes = session.sprinkling().nodes.positions;
-  const double area = session.incision()->area();
+  const VectorX coefficients = session.model().field.coefficients;
+  const auto nodes = session.model().sprinkling.nodes.positions;
+  const double area = session.model().incision->area();
   // A pose that no sweep can take.
   StepSample bad = session.steps()[i];
   bad.blade->position.x() = std::numeric_limits<double>::quiet_NaN();
   const StepResult refused = session.step(bad);
   REQUIRE(refused.cut->refused);
   CHECK(refused.cut->update == SystemUpdate::none);
-  CHECK(session.field().coefficients == coefficients);
-  CHECK(session.sprinkling().nodes.positions == nodes);
-  CHECK(session.incision()->area() == area);
+  CHECK(session.model().field.coefficients == coefficients);
+  CHECK(session.model().sprinkling.nodes.positions == nodes);
+  CHECK(session.model().incision->area() == area);
 }
 
 TEST_CASE("Sessions in two threads at once give the bits of one alone") {
@@ -538,7 +539,7 @@ TEST_CASE("Sessions in two threads at once give the bits of one alone") {
   const auto coefficients_of = [&](VectorX& result) {
     Session session = session_of(text);
     run(session);
-    result = session.field().coefficients;
+    result = session.model().field.coefficients;
   };
   VectorX alone, first, second;
   coefficients_of(alone);
@@ -560,5 +561,5 @@ TEST_CASE("The same cuts give the same bits") {
     CHECK(first[i].cut->opening == second[i].cut->opening);
     CHECK(first[i].cut->opening_volume == second[i].cut->opening_volume);
   }
-  CHECK(a.field().coefficients == b.field().coefficients);
+  CHECK(a.model().field.coefficients == b.model().field.coefficients);
 }

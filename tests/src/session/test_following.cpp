@@ -40,20 +40,20 @@ figures = false
 TEST_CASE("Nodes made beside the steps are those that a step would have made, and give the same force") {
   const Scenario scenario = scenario_of(slide);
   Session waits(scenario), goes_on(scenario);
-  goes_on.set_following_aside(true);
+  goes_on.set_options({.following_aside = true});
   int followed = 0;
   for (const StepSample& sample : waits.steps()) {
     const bool follows = waits.step(sample).resprinkled;
-    const auto before = goes_on.sprinkling().nodes.positions;
+    const auto before = goes_on.model().sprinkling.nodes.positions;
     CHECK_FALSE(goes_on.step(sample).resprinkled);
-    REQUIRE(goes_on.recondensing() == follows);
+    REQUIRE(goes_on.pending().under_way == follows);
     if (!follows)
       continue;
     ++followed;
-    CHECK(goes_on.sprinkling().nodes.positions == before); // the body as it was has gone on
+    CHECK(goes_on.model().sprinkling.nodes.positions == before); // the body as it was has gone on
     REQUIRE(goes_on.swap_body());
-    CHECK_FALSE(goes_on.recondensing());
-    CHECK(goes_on.sprinkling().nodes.positions == waits.sprinkling().nodes.positions);
+    CHECK_FALSE(goes_on.pending().under_way);
+    CHECK(goes_on.model().sprinkling.nodes.positions == waits.model().sprinkling.nodes.positions);
     const StepResult here = waits.step(sample), there = goes_on.step(sample);
     CHECK(there.resprinkled);
     CHECK(here.force.norm() > 0.01);
@@ -66,11 +66,11 @@ TEST_CASE("A tool that leaves the fine zone waits for the next one, and when its
   const Scenario scenario = scenario_of(slide);
   const auto run = [&](std::chrono::milliseconds pause, int& followed) {
     Session session(scenario);
-    session.set_following_aside(true);
+    session.set_options({.following_aside = true});
     std::vector<VectorX> fields;
     for (const StepSample& sample : session.steps()) {
       followed += session.step(sample).resprinkled ? 1 : 0;
-      fields.push_back(session.field().coefficients);
+      fields.push_back(session.model().field.coefficients);
       std::this_thread::sleep_for(pause);
     }
     return fields;
@@ -105,7 +105,7 @@ TEST_CASE("The loop tells by how much the force changed when the nodes followed 
 TEST_CASE("A fixed region too small for coarser nodes keeps the node that it had") {
   Scenario scenario = scenario_of(small_scenario);
   const Session session(scenario);
-  const solvers::NodeCloud& fine = session.sprinkling().nodes;
+  const solvers::NodeCloud& fine = session.model().sprinkling.nodes;
   solvers::SprinkleOptions options;
   options.spacing.fine = options.spacing.coarse = 0.02;
   const solvers::NodeCloud coarse = solvers::resprinkle(*session.organ().domain, options, fine).nodes;
@@ -141,7 +141,7 @@ TEST_CASE("A fixed region too small for coarser nodes keeps the node that it had
 TEST_CASE("A tear that goes on solve by solve is told as unstable, then that it has parted the body") {
   // A bar that is stretched between its ends, with a notch from one side: it runs away.
   Session session(scenario_of(stretched_bar(0.15, 0.05, bar_notch + "[tearing]\nstep = 1.0\n")));
-  session.set_tear_gradually(true);
+  session.set_options({.tear_gradually = true});
   TearStatus status;
   bool unstable = false, severed = false;
   double area = 0;

@@ -174,7 +174,7 @@ Scribbled scribble(unsigned seed, int each) {
     next = tick + static_cast<std::size_t>(hand.between(5, 60)); // 20 to 240 ms
     event.sequence += 1;
     event.pose_tick = tick;
-    event.swaps = session.recondensing() && hand.between(0, 1) < 0.5;
+    event.swaps = session.pending().under_way && hand.between(0, 1) < 0.5;
     const double begin = scribble_processor_seconds();
     const std::uint64_t lines = topology::sight_lines_walked();
     const SolveRecord record = solve_recording(simulation, device, event, snapshot);

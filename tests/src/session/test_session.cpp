@@ -53,7 +53,7 @@ TEST_CASE(
   CHECK(last.force.z() > 0.85 * 0.131);
   CHECK(last.force.z() < 1.6 * 0.131);
   Vector3 carried = Vector3::Zero();
-  for (const Vector3& force : session.body()->constraint_forces(session.field()))
+  for (const Vector3& force : session.model().body->constraint_forces(session.model().field))
     carried += force;
   CHECK((carried - last.force).norm() < 1e-8 * last.force.norm());
   CHECK(last.residual < 1e-9);
@@ -213,7 +213,7 @@ TEST_CASE("Gravity alone bends the organ by its weight") {
   const StepResult first = session.step(session.steps().front());
   static_cast<void>(first);
   Vector3 carried = Vector3::Zero();
-  for (const Vector3& force : session.body()->constraint_forces(session.field()))
+  for (const Vector3& force : session.model().body->constraint_forces(session.model().field))
     carried += force;
   const double weight = 1060 * 9.81 * 0.06 * 0.06 * 0.03;
   CHECK(carried.z() == Approx(weight).epsilon(2e-3));
@@ -221,5 +221,5 @@ TEST_CASE("Gravity alone bends the organ by its weight") {
 
 TEST_CASE("The wanted number of nodes is about reached") {
   const Session session = session_of(replaced(small_scenario, "fine_radius = 0.006", "count = 300"));
-  CHECK(session.sprinkling().nodes.size() == Approx(300).epsilon(0.15));
+  CHECK(session.model().sprinkling.nodes.size() == Approx(300).epsilon(0.15));
 }

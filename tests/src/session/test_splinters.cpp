@@ -1,6 +1,6 @@
 // Wavy strokes of a scalpel through a body that moves between one increment and the next, as it does for a busy solver.
 #include "src/model/incision_builder.hpp"
-#include "src/session/cut_report.hpp"
+#include "src/tissue/cut_checks.hpp"
 #include "topology/wound/splinters.hpp"
 
 #include "tests/src/scenario_session.hpp"

@@ -1,5 +1,5 @@
 // Contact on the surface itself: nodes that are held along some axes, rims, and a surface that comes to itself.
-#include "src/session/cut_report.hpp"
+#include "src/tissue/cut_report.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 
@@ -61,7 +61,7 @@ double exact_force(bool round, bool confined, double nu) {
 /// Deepest point of the deformed surface in the tool, over corners and middles of its triangles, in spacings.
 double deepest(const Session& session, const StepResult& step) {
   const topology::SurfaceMesh& surface = session.organ().domain->surface();
-  const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+  const solvers::NodeCloud& nodes = session.model().sprinkling.nodes;
   double worst = 0;
   const auto look = [&](const Vector3& x) {
     double nearest = 1, spacing = 1;
@@ -70,9 +70,9 @@ double deepest(const Session& session, const StepResult& step) {
         nearest = away;
         spacing = nodes.spacings[i];
       }
-    worst = std::max(
-        worst,
-        -topology::tool_distance(session.scenario().tool->shape, step.pose, x + session.at(x).displacement) / spacing);
+    worst = std::max(worst, -topology::tool_distance(session.scenario().tool->shape, step.pose,
+                                                     x + session.model().at(x).displacement) /
+                                spacing);
   };
   for (const Vector3& x : surface.vertices)
     look(x);
@@ -225,7 +225,7 @@ TEST_CASE("Fingers that come to each other push on one another, and where that i
   CHECK(pushed.force.norm() > 1.1 * through.force.norm());
   // What the finger that is pushed onto takes, the base carries.
   Vector3 carried = Vector3::Zero();
-  for (const Vector3& force : together.body()->constraint_forces(together.field()))
+  for (const Vector3& force : together.model().body->constraint_forces(together.model().field))
     carried += force;
   CHECK((carried - pushed.force).norm() < 1e-6 * pushed.force.norm());
 }
@@ -236,8 +236,8 @@ TEST_CASE("The opening that is told is that of the surface that is written") {
   const topology::Wound& wound = *session.wound();
   double apart = 0;
   for (const topology::LipPair& pair : topology::lip_pairs(wound))
-    apart = std::max(apart, (session.at(wound.evaluation[pair.plus]).displacement -
-                             session.at(wound.evaluation[pair.minus]).displacement)
+    apart = std::max(apart, (session.model().at(wound.evaluation[pair.plus]).displacement -
+                             session.model().at(wound.evaluation[pair.minus]).displacement)
                                 .z());
   REQUIRE(apart > 1e-5);
   CHECK(last.cut->opening == Approx(apart).epsilon(1e-3));
@@ -249,7 +249,7 @@ TEST_CASE("The way of an approach counts from the first touch of the organ as it
   Session session = session_of(heavy);
   session.step(session.steps().front());
   // Held at its base a block sinks by rho g H^2 / 2 E times a factor between 0.74 (no way aside) and 1.
-  const double sag = -session.at({0, 0, 0.03}).displacement.z();
+  const double sag = -session.model().at({0, 0, 0.03}).displacement.z();
   CHECK(sag > 0.7 * 1000 * 9.81 * 9e-4 / 2e4);
   CHECK(session.steps().back().tool->point.z() == Approx(0.03 - sag - 0.002).margin(2e-6));
   CHECK(session.steps().front().tool->point.z() == Approx(0.03 - sag + 0.001).margin(2e-6));

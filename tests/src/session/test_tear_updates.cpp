@@ -23,11 +23,11 @@ TearIncrement increment_of(const StepResult& result) {
 
 /// The solution on the same nodes and cells, with all that an update takes over computed anew. Without tool.
 VectorX from_scratch(const Session& session) {
-  const auto* growing = dynamic_cast<const solvers::GrowingBody*>(session.body());
+  const auto* growing = dynamic_cast<const solvers::GrowingBody*>(session.model().body.get());
   if (growing == nullptr) {
     solvers::DiscretisationOptions method = session.scenario().method;
     method.unheld = session.scenario().cut.unheld;
-    return solvers::discretise(session.body()->problem(), method)->solve().coefficients;
+    return solvers::discretise(session.model().body->problem(), method)->solve().coefficients;
   }
   const VectorX all = growing->system().from_scratch({}).coefficients;
   const std::vector<char>& removed = growing->system().removed();
@@ -49,15 +49,14 @@ int count(const std::vector<TearIncrement>& increments, SystemUpdate update) {
 TEST_CASE("An increment of a tear that is updated gives fields and intensities of the body built from scratch") {
   const std::string method = GENERATE("galerkin", "collocation");
   Session session(scenario_of(long_bar(0.15, 0.3, growing_notch(method))));
-  session.set_tear_gradually(true); // as in the loop in real time
-  session.set_force_only(true);
+  session.set_options({.force_only = true, .tear_gradually = true}); // as in the loop in real time
   int updated = 0, rebuilt = 0;
   for (int step = 0; step < 6; ++step) {
     const TearIncrement increment = increment_of(session.step(session.steps().front()));
     const BodyUpdate& body = increment.body;
     INFO(to_string(body.update) << ": " << body.update_reason);
-    CHECK(body.nodes == session.sprinkling().nodes.size());
-    CHECK(session.body()->problem().nodes.positions == session.sprinkling().nodes.positions);
+    CHECK(body.nodes == session.model().sprinkling.nodes.size());
+    CHECK(session.model().body->problem().nodes.positions == session.model().sprinkling.nodes.positions);
     if (body.update == SystemUpdate::rebuilt) {
       ++rebuilt;
       CHECK((body.update_reason == "the fine zone had nothing of the way ahead" ||
@@ -68,13 +67,13 @@ TEST_CASE("An increment of a tear that is updated gives fields and intensities o
     CHECK(body.update_reason.empty());
     CHECK(body.kept_nodes > 0.95 * body.nodes);
     ++updated;
-    solvers::Field expected = session.field();
+    solvers::Field expected = session.model().field;
     expected.coefficients = from_scratch(session);
-    CHECK((session.field().coefficients - expected.coefficients).norm() < 1e-8 * expected.coefficients.norm());
+    CHECK((session.model().field.coefficients - expected.coefficients).norm() < 1e-8 * expected.coefficients.norm());
     const auto tough = [](const Vector3&) { return 1.0; };
     const double fine = session.zone().spacing.fine;
-    const auto followed = solvers::front_states(*session.body(), session.field(), tough, fine);
-    const auto anew = solvers::front_states(*session.body(), expected, tough, fine);
+    const auto followed = solvers::front_states(*session.model().body, session.model().field, tough, fine);
+    const auto anew = solvers::front_states(*session.model().body, expected, tough, fine);
     REQUIRE(followed.size() == anew.size());
     REQUIRE_FALSE(followed.empty());
     for (std::size_t k = 0; k < anew.size(); ++k)
@@ -90,7 +89,7 @@ TEST_CASE("A tear whose systems are updated goes the way of one that rebuilds th
     // node more or less is exchanged, and rounding may decide that.
     Session session(scenario_of(replaced(long_bar(0.15, 0.3, growing_notch("galerkin") + "most_increments = 3\n"),
                                          "fine_spacing = 0.0027", "fine_spacing = 0.002")));
-    session.set_updating(updating);
+    session.set_options({.updating = updating});
     return *session.step(session.steps().front()).tear;
   };
   const TearReport updated = torn(true), rebuilt = torn(false);
@@ -117,7 +116,7 @@ TEST_CASE("A refused increment of a tear leaves a body that has followed the one
   const std::string right_end = "[[fixed]]\nregion = \"half_space\"\npoint = [0.0549, 0, 0]\nnormal = [-1, 0, 0]\n";
   Session session(scenario_of(replaced(
       long_bar(0, 0.002, shallow_notch + "pressure = 300\n[cut]\nunheld = \"refuse\"\n[tearing]\n"), right_end, "")));
-  session.set_tear_gradually(true);
+  session.set_options({.tear_gradually = true});
   int updated = 0;
   bool last_updated = false;
   StepResult result;
@@ -125,10 +124,10 @@ TEST_CASE("A refused increment of a tear leaves a body that has followed the one
   std::vector<Vector3> nodes;
   double area = 0;
   for (int step = 0; step < 40; ++step) {
-    if (session.body() != nullptr) {
-      coefficients = session.field().coefficients;
-      nodes = session.sprinkling().nodes.positions;
-      area = session.incision()->area();
+    if (session.model().body != nullptr) {
+      coefficients = session.model().field.coefficients;
+      nodes = session.model().sprinkling.nodes.positions;
+      area = session.model().incision->area();
     }
     result = session.step(session.steps().front());
     if (result.tear->increments.size() < 2)
@@ -139,13 +138,13 @@ TEST_CASE("A refused increment of a tear leaves a body that has followed the one
   INFO(result.tear->reason);
   CHECK(updated >= 2);
   REQUIRE(result.tear->reason.starts_with("refused: "));
-  CHECK(session.sprinkling().nodes.positions == nodes);
-  CHECK((session.field().coefficients - coefficients).norm() < 1e-9 * coefficients.norm());
-  CHECK(session.incision()->area() == area);
+  CHECK(session.model().sprinkling.nodes.positions == nodes);
+  CHECK((session.model().field.coefficients - coefficients).norm() < 1e-9 * coefficients.norm());
+  CHECK(session.model().incision->area() == area);
   CHECK(session.wound()->pieces.size() == 1);
   const StepResult again = session.step(session.steps().front());
   CHECK(again.tear->reason == result.tear->reason);
-  CHECK((session.field().coefficients - coefficients).norm() < 1e-9 * coefficients.norm());
+  CHECK((session.model().field.coefficients - coefficients).norm() < 1e-9 * coefficients.norm());
 }
 
 TEST_CASE("A blade starts a cut that tears on, and the body follows the tear by updates") {
@@ -186,7 +185,7 @@ TEST_CASE("Where an increment takes away the last node of a fixed region all nod
     SystemUpdate update = SystemUpdate::none;
   };
   const auto nodes_of = [](const Session& session) {
-    const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+    const solvers::NodeCloud& nodes = session.model().sprinkling.nodes;
     std::vector<Vector3> carrying;
     for (int i = 0; i < nodes.size(); ++i)
       if (std::abs(session.organ().domain->signed_distance(nodes.positions[i])) < 1e-4)
@@ -195,7 +194,7 @@ TEST_CASE("Where an increment takes away the last node of a fixed region all nod
   };
   std::vector<Step> steps;
   Session free(scenario_of(bar));
-  free.set_tear_gradually(true);
+  free.set_options({.tear_gradually = true});
   steps.push_back({nodes_of(free)});
   for (int step = 0; step < 8; ++step) {
     const SystemUpdate update = increment_of(free.step(free.steps().front())).body.update;
@@ -214,7 +213,7 @@ TEST_CASE("Where an increment takes away the last node of a fixed region all nod
   for (const double radius : {0.0003, 0.0006, 0.001, 0.0015, 0.002})
     for (const Step& step : steps)
       for (const Vector3& x : step.carrying) {
-        const double away = (free.incision()->closest(x, 1)->point - x).norm();
+        const double away = (free.model().incision->closest(x, 1)->point - x).norm();
         if (away > farthest && emptied(x, radius)) {
           farthest = away;
           region = fmt::format("[[fixed]]\nregion = \"sphere\"\ncentre = [{}, {}, {}]\nradius = {}\naxes = [\"z\"]\n",
@@ -223,7 +222,7 @@ TEST_CASE("Where an increment takes away the last node of a fixed region all nod
       }
   REQUIRE_FALSE(region.empty());
   Session held(scenario_of(replaced(bar, "[nodes]", region + "[nodes]")));
-  held.set_tear_gradually(true);
+  held.set_options({.tear_gradually = true});
   int renewed = 0;
   for (int step = 0; step < 8; ++step) {
     const BodyUpdate body = increment_of(held.step(held.steps().front())).body;

@@ -63,8 +63,8 @@ void require_sound(const Session& session) {
   for (const topology::WoundPiece& piece : wound.pieces)
     volume += piece.volume;
   CHECK(volume == Approx(topology::volume(session.organ().domain->surface())).epsilon(1e-9));
-  if (session.body() != nullptr) {
-    CHECK(session.field().coefficients.allFinite());
+  if (session.model().body != nullptr) {
+    CHECK(session.model().field.coefficients.allFinite());
   }
 }
 
@@ -77,14 +77,14 @@ TEST_CASE("A grasper that pulls tears a cut on along a weak plane, and the accou
   CHECK(steps.front().tear->area == 0);
   const TearReport& last = *steps.back().tear;
   CHECK(last.area > 2e-5);
-  CHECK(session.incision()->area() == Approx(0.02 * 0.016 + last.area).epsilon(1e-3));
+  CHECK(session.model().incision->area() == Approx(0.02 * 0.016 + last.area).epsilon(1e-3));
   CHECK_FALSE(last.severed);
   CHECK(last.ledger.tool > 0);
   CHECK(last.ledger.surface == Approx(0.4 * last.area).epsilon(0.05)); // it stays in the weak plane
   CHECK(last.ledger.dissipation >= 0);
   CHECK(balance(last.ledger) < 0.05); // measured 0.02
   CHECK(last.increments.back().release <= 1.05 * last.increments.back().toughness);
-  for (const topology::FrontSegment& segment : session.incision()->front())
+  for (const topology::FrontSegment& segment : session.model().incision->front())
     CHECK(std::abs(segment.from.z() - 0.0181) < 0.001);
   CHECK(steps.back().force.z() < 0); // the organ pulls the tool down
   require_sound(session);
@@ -187,9 +187,9 @@ TEST_CASE("Two half cuts that run towards each other part a strip between them")
   INFO(result.tear->reason);
   CHECK(result.tear->severed);
   CHECK(result.cut->pieces == 2);
-  CHECK(session.incision()->sheets().size() == 2);
-  CHECK(session.incision()->front_length() < 1e-6);
-  CHECK(session.incision()->area() == Approx(0.016 * 0.01).epsilon(0.05)); // the whole section, once
+  CHECK(session.model().incision->sheets().size() == 2);
+  CHECK(session.model().incision->front_length() < 1e-6);
+  CHECK(session.model().incision->area() == Approx(0.016 * 0.01).epsilon(0.05)); // the whole section, once
   require_sound(session);
 }
 
@@ -226,11 +226,11 @@ poisson_ratio = 0.45
 )" + held_below("0.005") + node_spacings("0.006", "0.02") +
                               rectangle_precut("[-0.02, 0, 0.047]", "[0, 0, 1]", "[1, 0, 0]", "0.12", "0.04")));
   session.step(session.steps().front());
-  const solvers::NodeCloud& nodes = session.sprinkling().nodes;
+  const solvers::NodeCloud& nodes = session.model().sprinkling.nodes;
   solvers::ShapeFunctions shape;
   double steepest = 0; // gradient times spacing
   for (int i = 0; i < nodes.size(); ++i) {
-    session.body()->shape_at(nodes.positions[i], shape);
+    session.model().body->shape_at(nodes.positions[i], shape);
     for (int k = 0; k < shape.size(); ++k)
       steepest = std::max(steepest, shape.gradient(k).norm() * nodes.spacings[i]);
   }
@@ -261,12 +261,12 @@ TEST_CASE("A tear starts without a cut where the averaged stress reaches the str
       scenario_of(stretched_bar(0.15, 0.02, "[tearing]\nstrength = 1000\nlength = 0.003\nmost_increments = 1\n")));
   const StepResult result = weak.step(weak.steps().front());
   CHECK(result.tear->seeded);
-  REQUIRE(weak.incision() != nullptr);
-  CHECK(std::abs(topology::triangle_normal(weak.incision()->sheets().front(), 0).x()) > 0.9);
+  REQUIRE(weak.model().incision != nullptr);
+  CHECK(std::abs(topology::triangle_normal(weak.model().incision->sheets().front(), 0).x()) > 0.9);
   require_sound(weak);
   Session strong(scenario_of(stretched_bar(0.15, 0.02, "[tearing]\nstrength = 4000\nlength = 0.003\n")));
   CHECK_FALSE(strong.step(strong.steps().front()).tear->seeded);
-  CHECK(strong.incision() == nullptr);
+  CHECK(strong.model().incision == nullptr);
 }
 
 TEST_CASE("Scenarios that cannot tear or grasp are refused with the reason") {
@@ -308,10 +308,10 @@ TEST_CASE("A hand closes and opens the grasper whatever the scenario's times") {
   Session session(scenario_of(
       replaced(replaced(peel, "toughness = 1.0", "toughness = 100.0"), "toughness = 0.4", "toughness = 100.0")));
   const std::vector<StepSample>& steps = session.steps();
-  session.set_grip(false);
+  session.set_options({.grip = false});
   CHECK(session.step(steps[0]).force.norm() == 0);
   CHECK_FALSE(session.grasps());
-  session.set_grip(true);
+  session.set_options({.grip = true});
   StepSample away = steps[1];
   away.tool->point.z() = 0.04;
   CHECK(session.step(away).force.norm() == 0);

@@ -147,7 +147,7 @@ Outcome draw(unsigned seed, bool resists) {
     event.pose_tick = tick;
     const double share = std::min(1.0, static_cast<double>(tick) / WavyStroke::ticks);
     event.degradation = stroke.level + static_cast<int>(std::lround((stroke.levels - stroke.level) * share));
-    event.swaps = session.recondensing() && stroke.between(0, 1) < 0.5;
+    event.swaps = session.pending().under_way && stroke.between(0, 1) < 0.5;
     const SolveRecord record = solve_recording(simulation, device, event, snapshot);
     out.solves += 1;
     CAPTURE(tick, event.degradation, record.reason);
@@ -203,9 +203,10 @@ Outcome draw(unsigned seed, bool resists) {
     out.area = told;
     out.opening = open.largest;
   }
-  if (session.incision() != nullptr)
-    out.crumbs = static_cast<int>(topology::cut_surface(domain.surface(), session.incision()->sheets()).pieces.size() -
-                                  session.wound()->pieces.size());
+  if (session.model().incision != nullptr)
+    out.crumbs =
+        static_cast<int>(topology::cut_surface(domain.surface(), session.model().incision->sheets()).pieces.size() -
+                         session.wound()->pieces.size());
   return out;
 }
 

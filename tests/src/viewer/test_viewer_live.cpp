@@ -316,9 +316,9 @@ TEST_CASE("The picture is the field at every vertex, evaluated anew only near th
     follower.deform(session, vertices);
     double worst = 0;
     for (std::size_t v = 0; v < vertices.size(); ++v)
-      worst = std::max(
-          worst, (vertices[v].cast<double>() - wound.surface.vertices[v] - session.at(wound.evaluation[v]).displacement)
-                     .norm());
+      worst = std::max(worst, (vertices[v].cast<double>() - wound.surface.vertices[v] -
+                               session.model().at(wound.evaluation[v]).displacement)
+                                  .norm());
     CHECK(worst < 1e-7);
   }
   CHECK(snapshot.nodes > 0);

@@ -1,7 +1,7 @@
-// The tears of a session: fronts that are given more energy than new cut takes move, increment by increment, until they
-// are not, or nothing is left to tear. The tool stands still meanwhile.
+#include "src/session/tear_propagation.hpp"
+
 #include "src/base/stage_timer.hpp"
-#include "src/session/session.hpp"
+#include "src/tissue/cut_checks.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/base/interruption.hpp"
 
@@ -106,23 +106,28 @@ Energies energies(const BodyModel& model) {
   return energies;
 }
 
+TearPropagation::TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact, AsideBodies& aside,
+                                 BodyUpdater& updater, const TearFronts& fronts, ResistedBlade* blade)
+    : state_(state), grasping_(grasping), contact_(contact), aside_(aside), updater_(updater), fronts_(fronts),
+      blade_(blade) {}
+
 // What the step has done so far. A blade's cut takes of what the loads release what its surface needs; the rest of
 // that, and what a grasper does that lets go, belongs to nobody.
-void Session::book_loading(const StepSample& sample, const Loading& loading) {
-  const Energies now = energies(model_);
-  const Vector3 force = model_.state->tool.tool_force;
-  if (!tears_) {
-    tears_ = TearAccount{};
+void TearPropagation::book_loading(const StepSample& sample, const Loading& loading) {
+  const Energies now = energies(state_.model);
+  const Vector3 force = state_.model.state->tool.tool_force;
+  if (!account_) {
+    account_ = TearAccount{};
   } else {
-    EnergyLedger& ledger = tears_->ledger;
+    EnergyLedger& ledger = account_->ledger;
     double work = 0;
-    if (sample.tool && tears_->pose)
-      work = -0.5 * (tears_->force + force).dot(sample.tool->point - tears_->pose->point);
-    const double loads = now.loads - tears_->last.loads, elastic = now.elastic() - tears_->last.elastic();
+    if (sample.tool && account_->pose)
+      work = -0.5 * (account_->force + force).dot(sample.tool->point - account_->pose->point);
+    const double loads = now.loads - account_->last.loads, elastic = now.elastic() - account_->last.elastic();
     ledger.tool += work;
     ledger.loads += loads;
     ledger.elastic += elastic;
-    const double friction = model_.state->tool.friction_work;
+    const double friction = state_.model.state->tool.friction_work;
     ledger.dissipation += friction;
     const double released = std::max(0.0, work + loads - elastic - friction);
     if (loading.cut_surface > 0)
@@ -130,25 +135,26 @@ void Session::book_loading(const StepSample& sample, const Loading& loading) {
     if (loading.releases || loading.cut_surface > 0)
       ledger.dissipation += std::max(0.0, released - loading.cut_surface);
   }
-  tears_->last = now;
-  tears_->force = force;
-  tears_->pose = sample.tool;
-  tears_->time = sample.time;
+  account_->last = now;
+  account_->force = force;
+  account_->pose = sample.tool;
+  account_->time = sample.time;
 }
 
 // Whether the tool has brought the load of this step since the last account, so that the load at which a front moves
 // can be looked for. A loop in real time wants the force where the tool is.
-bool Session::follows_load(const StepSample& sample, const Loading& loading) const {
-  return !tear_gradually_ && !loading.releases && loading.cut_surface == 0 && tears_ && tears_->pose && sample.tool &&
-         (grasps() || model_.state->tool.active_nodes > 0) && sample.tool->point != tears_->pose->point;
+bool TearPropagation::follows_load(const StepSample& sample, const Loading& loading) const {
+  return !state_.options.tear_gradually && !loading.releases && loading.cut_surface == 0 && account_ &&
+         account_->pose && sample.tool && (grasping_.holds() || state_.model.state->tool.active_nodes > 0) &&
+         sample.tool->point != account_->pose->point;
 }
 
 // Cuts as `grow` does and solves the body with it; where that cannot be, all is as before and the report says why.
-bool Session::take_tear(const StepSample& sample, const std::function<void()>& grow, TearReport& report,
-                        BodyUpdate& update) {
+bool TearPropagation::take(const StepSample& sample, const std::function<void()>& grow, TearReport& report,
+                           BodyUpdate& update) {
   const auto refuse = [&](const char* why) {
     report.reason = fmt::format("refused: {}", why);
-    warn("tear refused", fmt::format("a tear was refused at t = {:g} s: {}", sample.time, why));
+    state_.log.warn("tear refused", fmt::format("a tear was refused at t = {:g} s: {}", sample.time, why));
     return false;
   };
   try {
@@ -159,57 +165,59 @@ bool Session::take_tear(const StepSample& sample, const std::function<void()>& g
   } catch (const NumericalError& error) {
     return refuse(error.what());
   }
-  const auto segments = zone_.spacing.segments;
-  const auto led = led_segments_;
-  const auto grasp = grasp_;
-  const solvers::Discretisation* const body = model_.body.get();
-  const auto before = model_.incision;
+  FineZoneTracker::Mark zone = state_.zone.mark();
+  std::optional<Grasp> lost;
+  const solvers::Discretisation* const body = state_.model.body.get();
   try {
-    BodyModel next;
-    next.touched_from = facing();
-    next.incision = incisions_->incision();
-    CutGrowth growth{.way_ahead = [&] { return way_of_front(before.get(), *next.incision); }};
-    if (!grasps())
-      require_clear_of_tool(*next.incision, model_, scenario_.contact.condition);
-    check_pieces(sample.time);
-    {
-      const StageTimer timer(update.seconds.level_sets);
-      incisions_->update_fields();
-    }
-    lead_zone(*next.incision, growth);
-    if (grasps() && grasped_piece_is_free()) {
-      grasp_.reset();
-      growth.renewed = "the piece in the grasper has come off";
-      warn("grip", fmt::format("t = {:g} s: the piece in the grasper has come off", sample.time));
-    }
-    drop_following();
-    build_cut(growth, next, update);
-    {
-      const StageTimer timer(update.seconds.solve);
-      solve(sample, next);
-    }
-    profile_.topology += update.seconds.topology;
-    profile_.level_sets += update.seconds.level_sets;
-    model_ = std::move(next);
-    lost_grip_ = lost_grip_ || (grasp && !grasp_);
+    build(sample, state_.model.incision, lost, update);
     return true;
   } catch (const InputError& error) {
     refuse(error.what());
   } catch (const NumericalError& error) {
     refuse(error.what());
   }
-  zone_.spacing.segments = segments;
-  led_segments_ = led;
-  grasp_ = grasp;
+  state_.zone.go_back(std::move(zone));
+  if (lost)
+    grasping_.take_back(std::move(*lost));
   try {
-    if (take_back_cut(body))
-      solve(sample, model_);
+    if (updater_.take_back_cut(body))
+      contact_.solve(sample, state_.model);
   } catch (const std::runtime_error&) {
-    if (blade_force_ != nullptr)
-      blade_force_->lift(); // it knows nothing of what has been torn in this step
+    if (blade_ != nullptr)
+      blade_->forget_place(); // it knows nothing of what has been torn in this step
     throw;
   }
   return false;
+}
+
+// The body with what has been torn since the incision `before`, solved. `lost`: what a grasper held, should that have
+// come off.
+void TearPropagation::build(const StepSample& sample, std::shared_ptr<const topology::Incision> before,
+                            std::optional<Grasp>& lost, BodyUpdate& update) {
+  BodyModel next = updater_.next();
+  CutGrowth growth{.way_ahead = [&] { return way_of_front(before.get(), *next.incision, state_.zone.fine()); }};
+  if (!grasping_.holds())
+    require_clear_of_tool(*next.incision, state_.model, state_.scenario.contact.condition);
+  state_.check_pieces(sample.time);
+  {
+    const StageTimer timer(update.seconds.level_sets);
+    state_.incisions->update_fields();
+  }
+  updater_.lead_zone(*next.incision, growth);
+  if (grasping_.holds() && grasping_.piece_is_free(state_.incisions->wound())) {
+    lost = grasping_.lose();
+    growth.renewed = "the piece in the grasper has come off";
+    state_.log.warn("grip", fmt::format("t = {:g} s: the piece in the grasper has come off", sample.time));
+  }
+  aside_.drop_following();
+  updater_.build_cut(growth, next, update);
+  {
+    const StageTimer timer(update.seconds.solve);
+    contact_.solve(sample, next);
+  }
+  state_.profile.topology += update.seconds.topology;
+  state_.profile.level_sets += update.seconds.level_sets;
+  state_.model = std::move(next);
 }
 
 namespace {
@@ -256,22 +264,22 @@ double moving_drive_of(const std::vector<solvers::FrontState>& states, double lo
 
 // The increments of one step's tear. `states_` is what the fronts feel with the tool at `share_` of its way in the
 // step.
-class Session::TearLoop {
+class TearPropagation::Loop {
  public:
-  TearLoop(Session& session, const StepSample& sample, const Loading& loading, StepResult& result)
-      : session_(session), sample_(sample), loading_(loading), result_(result), report_(result.tear.emplace()),
-        fine_(session.zone_.spacing.fine), stride_(session.scenario_.tearing.step * fine_),
-        pieces_(session.wound()->pieces.size()), proposed_(session.mark_.has_value()) {}
+  Loop(TearPropagation& tears, const StepSample& sample, const Loading& loading, StepResult& result)
+      : tears_(tears), state_(tears.state_), sample_(sample), loading_(loading), result_(result),
+        report_(result.tear.emplace()), fine_(state_.zone.fine()), stride_(state_.scenario.tearing.step * fine_),
+        pieces_(state_.wound()->pieces.size()), proposed_(tears.blade_ != nullptr && tears.blade_->has_proposal()) {}
 
   void run() {
     begin();
     add_row();
     start_ = states_ ? drive_of(*states_) : 0;
     if (goes_on_) {
-      start_ = session_.tears_->start;
-      kept_ = session_.tears_->kept;
+      start_ = account().start;
+      kept_ = account().kept;
     } else {
-      session_.tears_->told = false;
+      account().told = false;
     }
     for (int number = 1; increment(number); ++number)
       ;
@@ -290,10 +298,10 @@ class Session::TearLoop {
     std::vector<solvers::FrontState> moving;
   };
 
-  [[nodiscard]] TearAccount& account() { return *session_.tears_; }
+  [[nodiscard]] TearAccount& account() { return *tears_.account_; }
   void find_states() {
     const StageTimer timer(intensity_seconds_);
-    states_ = session_.known_states();
+    states_ = tears_.fronts_.known_states(state_.model);
   }
   [[nodiscard]] StepSample loaded_sample() const { return loaded(from_, since_, sample_, share_); }
 
@@ -307,8 +315,8 @@ class Session::TearLoop {
   void load_to(double to) {
     share_ = to;
     const StepSample part = loaded_sample();
-    session_.solve(part, session_.model_);
-    session_.book_loading(part, share_ < 1 ? Loading{} : loading_);
+    tears_.contact_.solve(part, state_.model);
+    tears_.book_loading(part, share_ < 1 ? Loading{} : loading_);
     find_states();
   }
 
@@ -316,7 +324,7 @@ class Session::TearLoop {
   // at its end; the solution is at either.
   void load_until(double target, const States& full) {
     const double part = states_ && full && states_->size() == full->size()
-                            ? solvers::onset_share(session_.scenario_.material, *states_, *full, target)
+                            ? solvers::onset_share(state_.scenario.material, *states_, *full, target)
                             : 1;
     load_to(share_ + (1 - share_) * part);
   }
@@ -324,37 +332,37 @@ class Session::TearLoop {
   void begin() {
     find_states();
     // A tear that makes one increment a step goes on in the next where nothing has changed but the tear.
-    const std::optional<TearAccount>& tears = session_.tears_;
+    const std::optional<TearAccount>& tears = tears_.account_;
     goes_on_ =
-        session_.tear_gradually_ && tears && tears->grows && !loading_.releases && loading_.cut_surface == 0 &&
+        state_.options.tear_gradually && tears && tears->grows && !loading_.releases && loading_.cut_surface == 0 &&
         sample_.tool.has_value() == tears->pose.has_value() &&
         (!sample_.tool || (sample_.tool->point == tears->pose->point && sample_.tool->axis == tears->pose->axis));
     // The tool's way in this step, and how much of it the body has been loaded by.
     const bool follows =
-        states_ && !states_->empty() && drive_of(*states_) >= in_balance && session_.follows_load(sample_, loading_);
+        states_ && !states_->empty() && drive_of(*states_) >= in_balance && tears_.follows_load(sample_, loading_);
     if (!follows) {
-      session_.book_loading(sample_, loading_);
+      tears_.book_loading(sample_, loading_);
       return;
     }
     from_ = *tears->pose;
     since_ = tears->time;
     share_ = 0;
     const States full = states_;
-    session_.solve(loaded_sample(), session_.model_);
+    tears_.contact_.solve(loaded_sample(), state_.model);
     find_states();
     load_until(1, full);
   }
 
   void add_row() {
     report_.increments.push_back(
-        increment_of(states_.value_or(std::vector<solvers::FrontState>{}), session_.incision()));
+        increment_of(states_.value_or(std::vector<solvers::FrontState>{}), state_.model.incision.get()));
     TearIncrement& row = report_.increments.back();
     row.time = loaded_sample().time;
-    row.force = session_.model_.state->tool.tool_force.norm();
+    row.force = state_.model.state->tool.tool_force.norm();
     row.ledger = account().ledger;
-    row.body.nodes = session_.model_.sprinkling.nodes.size();
+    row.body.nodes = state_.model.sprinkling.nodes.size();
     row.intensity_seconds = intensity_seconds_;
-    session_.profile_.intensities += std::exchange(intensity_seconds_, 0);
+    state_.profile.intensities += std::exchange(intensity_seconds_, 0);
   }
 
   // The tool goes on where what moves is no more in balance. Returns the largest G / G_c at the end of the step.
@@ -364,7 +372,7 @@ class Session::TearLoop {
     const double moving_drive = states_ ? moving_drive_of(*states_, way_of(drive), fine_) : 0;
     if (share_ < 1 && moving_drive < std::max(in_balance, std::exp(0.5 * account().decay * way_of(drive)))) {
       const States now = states_;
-      session_.solve(sample_, session_.model_);
+      tears_.contact_.solve(sample_, state_.model);
       find_states();
       const States full = states_;
       ahead = full ? drive_of(*full) : 0;
@@ -384,28 +392,29 @@ class Session::TearLoop {
 
   // Empty: the tear ends here, and the report says why.
   std::optional<Growth> next_growth(int number, double ahead) {
-    const TearSettings& settings = session_.scenario_.tearing;
+    const TearSettings& settings = state_.scenario.tearing;
     const double drive = states_ ? drive_of(*states_) : 0;
     const bool moves = drive >= in_balance || (share_ < 1 && states_ && !states_->empty());
     Growth growth;
-    growth.gives_way = !states_ && session_.model_.incision->front_length() < bridge * fine_;
-    if (!growth.gives_way && !moves && !(growth.seed = session_.seed_of_tear())) {
+    growth.gives_way = !states_ && state_.model.incision->front_length() < bridge * fine_;
+    if (!growth.gives_way && !moves && !(growth.seed = tears_.fronts_.seed(state_.model))) {
       report_.reason = !states_           ? "the front is too near to the surface for its intensities"
                        : states_->empty() ? "there is no front"
                                           : "less is released than a tear takes";
       return std::nullopt;
     }
-    if (number > (session_.tear_gradually_ ? 1 : settings.most_increments)) {
+    if (number > (state_.options.tear_gradually ? 1 : settings.most_increments)) {
       report_.reason = "as many increments as are allowed in one step";
       return std::nullopt;
     }
     if (settings.most_area > 0 && account().area >= settings.most_area) {
       report_.reason = "as much is torn as is allowed";
-      session_.warn("torn", fmt::format("t = {:g} s: {:.3g} m2 are torn, as many as tearing.most_area allows",
-                                        sample_.time, account().area));
+      state_.log.warn("torn", fmt::format("t = {:g} s: {:.3g} m2 are torn, as many as tearing.most_area allows",
+                                          sample_.time, account().area));
       return std::nullopt;
     }
-    session_.drop_blade_proposal();
+    if (tears_.blade_ != nullptr)
+      tears_.blade_->drop_proposal();
     growth.longest = growth.gives_way ? bridge_step * fine_ : way_of(ahead);
     if (!growth.gives_way && !growth.seed)
       growth.moving = share_ < 1 ? acting(*states_, drive) : *states_;
@@ -419,17 +428,17 @@ class Session::TearLoop {
 
   void lay_sheets(Growth& growth) {
     if (growth.seed) {
-      if (session_.model_.incision != nullptr)
-        growth.sheets.sheets = session_.model_.incision->sheets();
+      if (state_.model.incision != nullptr)
+        growth.sheets.sheets = state_.model.incision->sheets();
       growth.sheets.sheets.push_back(*growth.seed);
       growth.sheets.triangles = static_cast<int>(growth.seed->triangles.size());
       return;
     }
     if (!growth.gives_way)
-      growth.sheets = session_.join_tears(growth.moving);
+      growth.sheets = tears_.fronts_.join(state_.model, growth.moving);
     growth.joins = growth.sheets.triangles > 0;
     if (!growth.joins)
-      growth.sheets = session_.grow_tear(growth.moving, growth.longest);
+      growth.sheets = tears_.fronts_.grow(state_.model, growth.moving, growth.longest);
   }
 
   // False: the tear has come to its end.
@@ -438,19 +447,19 @@ class Session::TearLoop {
     const std::optional<Growth> growth = next_growth(number, follow_load());
     if (!growth)
       return false;
-    const auto before = session_.model_.incision;
+    const auto before = state_.model.incision;
     const double area_before = before == nullptr ? 0 : before->area();
-    const double toughness =
-        before == nullptr ? session_.toughness_(growth->seed->vertices.front())
-                          : mean_toughness(growth->sheets, *before, *session_.organ_.domain, session_.toughness_);
+    const double toughness = before == nullptr
+                                 ? state_.toughness(growth->seed->vertices.front())
+                                 : mean_toughness(growth->sheets, *before, *state_.organ.domain, state_.toughness);
     const auto grow = [&] {
-      growth->seed ? session_.incisions_->seed(*growth->seed) : session_.incisions_->tear(growth->sheets.sheets);
+      growth->seed ? state_.incisions->seed(*growth->seed) : state_.incisions->tear(growth->sheets.sheets);
     };
     BodyUpdate update;
-    if (!session_.take_tear(loaded_sample(), grow, report_, update))
+    if (!tears_.take(loaded_sample(), grow, report_, update))
       return false;
     report_.seeded = report_.seeded || growth->seed.has_value();
-    book(*growth, session_.model_.incision->area() - area_before, toughness);
+    book(*growth, state_.model.incision->area() - area_before, toughness);
     add_row();
     TearIncrement& row = report_.increments.back();
     row.number = number;
@@ -465,7 +474,7 @@ class Session::TearLoop {
   void book(const Growth& growth, double torn, double toughness) {
     const States was_states = states_;
     find_states();
-    const Energies now = energies(session_.model_);
+    const Energies now = energies(state_.model);
     const double free = account().last.potential() - now.potential(), surface = toughness * torn;
     double surplus = free - surface; // of a front that is gone, or comes about, by the energies alone
     if (!growth.seed && !growth.gives_way && !growth.joins && states_ && !states_->empty()) {
@@ -483,7 +492,7 @@ class Session::TearLoop {
     ledger.surface += surface;
     ledger.dissipation += std::max(0.0, surplus);
     account().last = now;
-    account().force = session_.model_.state->tool.tool_force;
+    account().force = state_.model.state->tool.tool_force;
     account().area += torn;
     result_.cut->triangles += growth.sheets.triangles;
   }
@@ -492,9 +501,9 @@ class Session::TearLoop {
     if (kept_ >= kept_to_tell && !report_.unstable) {
       report_.unstable = true;
       if (!std::exchange(account().told, true))
-        session_.say_(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample_.time));
+        state_.log.say(fmt::format("t = {:g} s: the tear is unstable, it runs on by itself", sample_.time));
     }
-    if (session_.incisions_->wound().pieces.size() > pieces_)
+    if (state_.incisions->wound().pieces.size() > pieces_)
       report_.severed = true;
   }
 
@@ -504,15 +513,16 @@ class Session::TearLoop {
     account().grows = report_.increments.size() > 1;
     account().start = start_;
     account().kept = kept_;
-    if (session_.blade_force_ != nullptr && (report_.increments.size() > 1 || (proposed_ && !session_.mark_)))
-      session_.blade_force_->meet_again(session_.model_);
+    if (tears_.blade_ != nullptr && (report_.increments.size() > 1 || (proposed_ && !tears_.blade_->has_proposal())))
+      tears_.blade_->meet_again();
     report_.area = account().area;
     report_.ledger = account().ledger;
     if (report_.severed)
-      session_.say_(fmt::format("t = {:g} s: the tear has parted the organ", sample_.time));
+      state_.log.say(fmt::format("t = {:g} s: the tear has parted the organ", sample_.time));
   }
 
-  Session& session_;
+  TearPropagation& tears_;
+  SessionState& state_;
   const StepSample& sample_;
   const Loading& loading_;
   StepResult& result_;
@@ -529,8 +539,8 @@ class Session::TearLoop {
   int kept_ = 0;
 };
 
-void Session::tear(const StepSample& sample, const Loading& loading, StepResult& result) {
-  TearLoop(*this, sample, loading, result).run();
+void TearPropagation::tear(const StepSample& sample, const Loading& loading, StepResult& result) {
+  Loop(*this, sample, loading, result).run();
 }
 
 } // namespace spherecut::app

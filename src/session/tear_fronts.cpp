@@ -1,6 +1,6 @@
-// Fronts of a session's cut: their states, and how its sheets go on from them.
+#include "src/session/tear_fronts.hpp"
+
 #include "solvers/fracture/tear_seed.hpp"
-#include "src/session/session.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/incision/cut_sheets.hpp"
 #include "topology/incision/front_joining.hpp"
@@ -51,28 +51,36 @@ Vector3 up_to_next_sheet(const topology::Incision& incision, const topology::Fro
 
 } // namespace
 
-// Along all fronts but where they have met another sheet.
-std::vector<solvers::FrontState> Session::front_states() const {
-  if (model_.incision == nullptr || model_.incision->front().empty())
+std::vector<solvers::FrontState> TearFronts::states(const BodyModel& model) const {
+  if (model.incision == nullptr || model.incision->front().empty())
     return {};
   const double fine = zone_.spacing.fine;
   std::vector<Vector3> closed;
-  if (model_.state)
-    for (std::size_t p = 0; p < std::min(model_.pairs.size(), model_.state->lips.closed.size()); ++p)
-      if (model_.state->lips.closed[p] != 0)
-        closed.push_back(model_.sprinkling.nodes.positions[model_.pairs[p].plus]);
-  std::vector<solvers::FrontState> states =
-      solvers::front_states(*model_.body, model_.field, toughness_, fine, closed, &model_.front_rules);
-  std::erase_if(states, [&](const solvers::FrontState& state) {
-    return !state.intensities.allFinite() || has_met(*model_.incision, state.frame, fine);
+  if (model.state)
+    for (std::size_t p = 0; p < std::min(model.pairs.size(), model.state->lips.closed.size()); ++p)
+      if (model.state->lips.closed[p] != 0)
+        closed.push_back(model.sprinkling.nodes.positions[model.pairs[p].plus]);
+  std::vector<solvers::FrontState> found =
+      solvers::front_states(*model.body, model.field, toughness_, fine, closed, &model.front_rules);
+  std::erase_if(found, [&](const solvers::FrontState& state) {
+    return !state.intensities.allFinite() || has_met(*model.incision, state.frame, fine);
   });
-  return solvers::directed(solvers::averaged(scenario_.material, states, averaged_over * fine),
+  return solvers::directed(solvers::averaged(scenario_.material, found, averaged_over * fine),
                            scenario_.tearing.direction, toughness_, probe * fine);
 }
 
-topology::FrontGrowth Session::grow_tear(const std::vector<solvers::FrontState>& states, double longest) const {
+std::optional<std::vector<solvers::FrontState>> TearFronts::known_states(const BodyModel& model) const {
+  try {
+    return states(model);
+  } catch (const NumericalError&) {
+    return std::nullopt;
+  }
+}
+
+topology::FrontGrowth TearFronts::grow(const BodyModel& model, const std::vector<solvers::FrontState>& states,
+                                       double longest) const {
   const double fine = zone_.spacing.fine;
-  const topology::Incision& incision = *model_.incision;
+  const topology::Incision& incision = *model.incision;
   const auto motion = states.empty()
                           ? std::function<Vector3(const topology::FrontFrame&)>(
                                 [&](const topology::FrontFrame& frame) -> Vector3 { return longest * frame.ahead; })
@@ -90,55 +98,59 @@ topology::FrontGrowth Session::grow_tear(const std::vector<solvers::FrontState>&
       sheet_edge(zone_));
 }
 
-// The states along all fronts; empty: they are too near to the surface for intensities all along.
-std::optional<std::vector<solvers::FrontState>> Session::known_states() const {
-  try {
-    return front_states();
-  } catch (const NumericalError&) {
-    return std::nullopt;
-  }
-}
-
-// Two fronts that have come so near to each other that the ligament between them is not resolved part it, once one of
-// them moves. No triangles: there are no such fronts.
-topology::FrontGrowth Session::join_tears(const std::vector<solvers::FrontState>& states) const {
+topology::FrontGrowth TearFronts::join(const BodyModel& model, const std::vector<solvers::FrontState>& states) const {
   const double reach = ligament * zone_.spacing.fine;
-  const std::vector<topology::FacingFronts> facing = topology::facing_fronts(*model_.incision, reach);
+  const std::vector<topology::FacingFronts> facing = topology::facing_fronts(*model.incision, reach);
   const bool moves = std::any_of(facing.begin(), facing.end(), [&](const topology::FacingFronts& pair) {
     return std::any_of(states.begin(), states.end(), [&](const solvers::FrontState& state) {
       return state.release >= state.toughness && (state.frame.point - pair.middle).norm() < joined_reach * reach;
     });
   });
-  return moves ? topology::join_fronts(*model_.incision, reach) : topology::FrontGrowth{};
+  return moves ? topology::join_fronts(*model.incision, reach) : topology::FrontGrowth{};
 }
 
-// A crack across the largest stress, where that reaches the strength off every cut, held region and tool.
-std::optional<topology::SurfaceMesh> Session::seed_of_tear() const {
+std::optional<topology::SurfaceMesh> TearFronts::seed(const BodyModel& model) const {
   const TearSettings& settings = scenario_.tearing;
   if (settings.strength == 0)
     return std::nullopt;
-  const solvers::NodeCloud& nodes = model_.sprinkling.nodes;
-  const auto toughness = toughness_;
+  const solvers::NodeCloud& nodes = model.sprinkling.nodes;
   const double length = settings.length > 0
                             ? settings.length
                             : solvers::averaging_length(scenario_.material, scenario_.toughness, settings.strength);
   std::vector<Vector3> held;
-  for (const solvers::Prescribed& entry : model_.body->problem().prescribed)
+  for (const solvers::Prescribed& entry : model.body->problem().prescribed)
     held.push_back(nodes.positions[entry.node]);
-  held.insert(held.end(), model_.patch.rest.begin(), model_.patch.rest.end());
+  held.insert(held.end(), model.patch.rest.begin(), model.patch.rest.end());
   const solvers::WeakPlace weakest =
-      solvers::weakest_place(*model_.body, model_.field, length, settings.strength, [&](int i) {
+      solvers::weakest_place(*model.body, model.field, length, settings.strength, [&](int i) {
         const Vector3& x = nodes.positions[i];
         return nodes.kinds[i] != solvers::NodeKind::lip &&
-               (model_.incision == nullptr || !model_.incision->closest(x, length)) &&
+               (model.incision == nullptr || !model.incision->closest(x, length)) &&
                std::none_of(held.begin(), held.end(), [&](const Vector3& y) { return (y - x).norm() < length; });
       });
   if (weakest.node < 0)
     return std::nullopt;
   const Vector3& place = nodes.positions[weakest.node];
-  const double radius = std::max(solvers::seed_radius(scenario_.material, toughness(place), settings.strength),
+  const double radius = std::max(solvers::seed_radius(scenario_.material, toughness_(place), settings.strength),
                                  smallest_seed * zone_.spacing.fine);
   return topology::make_disc_sheet(place, weakest.stress.direction, radius, std::min(sheet_edge(zone_), radius / 2));
+}
+
+double TearFronts::released(const BodyModel& model, const topology::Incision& after) const {
+  if (!scenario_.tearing.enabled || model.incision == nullptr)
+    return 0;
+  const std::optional<std::vector<solvers::FrontState>> states = known_states(model);
+  if (!states || states->empty())
+    return 0;
+  const double reach = 2 * zone_.spacing.fine;
+  double release = 0, weights = 0;
+  for (const solvers::FrontState& state : *states)
+    if (const auto front = after.front_frame(state.frame.point, reach);
+        !front || front->distance > 1e-3 * zone_.spacing.fine) { // it has moved
+      release += state.release;
+      weights += 1;
+    }
+  return weights > 0 ? release / weights * std::max(0.0, after.area() - model.incision->area()) : 0;
 }
 
 } // namespace spherecut::app

@@ -1,9 +1,5 @@
-#include "src/session/cut_report.hpp"
+#include "src/tissue/cut_report.hpp"
 
-#include "topology/base/errors.hpp"
-#include "topology/wound/splinters.hpp"
-
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <fmt/format.h>
@@ -74,6 +70,16 @@ void CutReport::add(const CutReport& later) {
   seconds.solve += later.seconds.solve;
 }
 
+void refuse_cut(double time, const char* why, CutReport& report, SessionLog& log) {
+  report.triangles = 0;
+  report.refused = true;
+  report.reason = why;
+  report.update = SystemUpdate::none;
+  report.update_reason.clear();
+  report.nodes = report.kept_nodes = 0;
+  log.warn("refused", fmt::format("a cut was refused at t = {:g} s: {}", time, why));
+}
+
 namespace {
 
 /// Mean over a triangle of a displacement that is known at its corners, some of them on the front of the cut: from
@@ -137,117 +143,6 @@ Opening opening_of(const topology::Wound& wound, const BodyModel& model) {
     if (const Vector3& normal = into_plus[pair.plus]; !normal.isZero(0))
       opening.largest = std::max(opening.largest, normal.normalized().dot(moved(pair.plus) - moved(pair.minus)));
   return opening;
-}
-
-namespace {
-
-// Area, m2, and centre of area times it, of every piece.
-struct PieceArea {
-  double area = 0;
-  Vector3 moment = Vector3::Zero();
-};
-
-std::vector<PieceArea> piece_areas(const topology::Wound& wound) {
-  std::vector<PieceArea> areas(wound.pieces.size());
-  for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
-    const Triangle& triangle = wound.surface.triangles[t];
-    PieceArea& of = areas[static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)))];
-    const double part = area_vector(wound.surface, triangle).norm();
-    of.area += part;
-    for (const int vertex : triangle)
-      of.moment += part / 3 * wound.surface.vertices[vertex];
-  }
-  return areas;
-}
-
-// m; the diameter of a ball of the same volume over area. 0 for what has come to nothing.
-double size_of(const topology::WoundPiece& piece, const PieceArea& of) {
-  return of.area > 0 ? 6 * piece.volume / of.area : 0;
-}
-
-} // namespace
-
-void refine_small_pieces(const topology::Wound& wound, solvers::SpacingField& spacing) {
-  if (wound.pieces.size() < 2)
-    return;
-  const std::vector<PieceArea> areas = piece_areas(wound);
-  for (std::size_t piece = 0; piece < wound.pieces.size(); ++piece) {
-    if (areas[piece].area <= 0)
-      continue;
-    const Vector3 middle = areas[piece].moment / areas[piece].area;
-    const double size = size_of(wound.pieces[piece], areas[piece]);
-    if (size >= spacing(middle) || size < spacing.fine)
-      continue;
-    Matrix3 spread = Matrix3::Zero();
-    std::vector<Vector3> corners;
-    for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t)
-      if (wound.piece_of(static_cast<int>(t)) == static_cast<int>(piece))
-        for (const int vertex : wound.surface.triangles[t]) {
-          corners.push_back(wound.surface.vertices[vertex] - middle);
-          spread += corners.back() * corners.back().transpose();
-        }
-    const Vector3 axis = Eigen::SelfAdjointEigenSolver<Matrix3>(spread).eigenvectors().col(2);
-    double lower = 0, upper = 0;
-    for (const Vector3& corner : corners) {
-      lower = std::min(lower, axis.dot(corner));
-      upper = std::max(upper, axis.dot(corner));
-    }
-    spacing.segments.push_back({middle + lower * axis, middle + upper * axis});
-  }
-}
-
-void require_pieces(const topology::Wound& wound, const solvers::SpacingField& spacing) {
-  if (wound.pieces.size() < 2)
-    return;
-  const std::vector<topology::PieceShape> shapes = topology::piece_shapes(wound);
-  for (std::size_t piece = 0; piece < shapes.size(); ++piece) {
-    const auto& [size, middle] = shapes[piece];
-    if (const double h = spacing(middle); size < h)
-      throw InputError(
-          fmt::format("the cut leaves a piece of {:.3g} m3 at [{:.4g}, {:.4g}, {:.4g}] m that is smaller "
-                      "than the node spacing there: {:.3g} m across; allowed: at least {:.3g} m. Finer nodes "
-                      "(cut.front_spacing, nodes.fine_spacing, nodes.count) or a cut elsewhere do",
-                      wound.pieces[piece].volume, middle.x(), middle.y(), middle.z(), size, h));
-  }
-}
-
-std::vector<int> unheld_pieces(const topology::Wound& wound, const std::vector<FixedRegion>& fixed) {
-  std::vector<char> held(wound.pieces.size(), 0);
-  for (std::size_t t = 0; t < wound.surface.triangles.size(); ++t) {
-    char& mark = held[static_cast<std::size_t>(wound.piece_of(static_cast<int>(t)))];
-    if (mark != 0 || wound.part[t] != topology::WoundPart::organ)
-      continue;
-    const Triangle& triangle = wound.surface.triangles[t];
-    const std::vector<Vector3>& vertices = wound.surface.vertices;
-    const Vector3 middle = (vertices[triangle[0]] + vertices[triangle[1]] + vertices[triangle[2]]) / 3;
-    mark = std::any_of(fixed.begin(), fixed.end(), [&](const FixedRegion& region) { return region.holds(middle); });
-  }
-  std::vector<int> unheld;
-  for (std::size_t piece = 0; piece < held.size(); ++piece)
-    if (held[piece] == 0)
-      unheld.push_back(static_cast<int>(piece));
-  return unheld;
-}
-
-void require_clear_of_tool(const topology::Incision& incision, const BodyModel& before,
-                           solvers::ContactCondition condition) {
-  if (!before.state || before.state->tool.active_nodes == 0)
-    return;
-  if (condition == solvers::ContactCondition::bonded)
-    throw InputError(
-        "the tool sticks to the tissue (contact.condition = bonded), and a cut would forget where; allowed: "
-        "a frictionless tool, or cutting while the tool is away");
-  for (std::size_t c = 0; c < before.patch.nodes.size(); ++c) {
-    if (before.state->tool.active[c] == 0)
-      continue;
-    const Vector3& x = before.patch.rest[c];
-    const double reach = before.patch.spacings[c];
-    if (incision.closest(x, reach) && !(before.incision != nullptr && before.incision->closest(x, reach)))
-      throw InputError(
-          fmt::format("the blade cuts where the tool is pressing: within {:.3g} m of the contact at [{:.4g}, "
-                      "{:.4g}, {:.4g}] m; allowed: a node spacing away, or lift the tool first",
-                      reach, x.x(), x.y(), x.z()));
-  }
 }
 
 } // namespace spherecut::app

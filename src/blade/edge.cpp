@@ -1,5 +1,5 @@
 // Where the edge of a blade meets the body: contacts, lips beside it, drag of its flanks, how far it pushes.
-#include "src/blade/meeting.hpp"
+#include "src/blade/edge.hpp"
 
 #include "src/scenario/schedule.hpp"
 #include "topology/base/errors.hpp"
@@ -11,9 +11,12 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double depth_factor = 2; // of its depth in the body: how far a piece of the edge may push
-constexpr double ahead = 0.1;      // of the half width: less material than that before a piece of the edge is none
-constexpr int entry_steps = 12;    // halvings towards the place where the edge entered
+constexpr double least_width = 0.75; // of the node spacing: half width of the edge's contact
+constexpr double open_reach = 0.3;   // node spacings from a sheet: a place there lies in the cut
+constexpr int way_parts = 32;        // of a motion that is looked at for tissue
+constexpr double depth_factor = 2;   // of its depth in the body: how far a piece of the edge may push
+constexpr double ahead = 0.1;        // of the half width: less material than that before a piece of the edge is none
+constexpr int entry_steps = 12;      // halvings towards the place where the edge entered
 constexpr double opening_tolerance = 1e-6; // m
 constexpr double same_contact = 1e-4;      // of the node spacing, and of one: what has not moved
 constexpr double in_sheet = 0.1;           // node spacings from a sheet: a place there is in it
@@ -34,8 +37,7 @@ VectorX openings(const BodyModel& body, const solvers::Field& field) {
   return open;
 }
 
-} // namespace
-
+/// Negative inside the body as it is; outside where there is no telling.
 double signed_distance(const topology::Domain& domain, const topology::RestMap& to_rest, const Vector3& x) {
   try {
     return domain.signed_distance(to_rest(x));
@@ -44,13 +46,58 @@ double signed_distance(const topology::Domain& domain, const topology::RestMap& 
   }
 }
 
+} // namespace
+
+BladeEdge::BladeEdge(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain, double spacing,
+                     MapOf map_of, std::function<double(const Vector3&)> toughness)
+    : settings_(*scenario.blade), toughness_(std::move(toughness)), spacing_(spacing),
+      half_width_(solvers::edge_half_width(scenario.material, settings_.edge_radius, scenario.toughness)),
+      lips_(scenario.cut.lips), domain_(std::move(domain)), map_of_(std::move(map_of)) {
+  finer_ = half_width_ < least_width * spacing;
+  half_width_ = std::max(half_width_, least_width * spacing);
+  for (std::size_t i = 1; i < settings_.edge.size(); ++i) {
+    const Vector3 side = settings_.edge[i] - settings_.edge[i - 1];
+    const int parts = std::max(1, static_cast<int>(std::ceil(side.norm() / spacing)));
+    for (int k = 0; k < parts; ++k)
+      pieces_.push_back({settings_.edge[i - 1] + (k + 0.5) / parts * side, side.normalized(), side.norm() / parts});
+  }
+}
+
+bool BladeEdge::inside(const topology::BladePose& pose, const BodyModel& body) const {
+  const topology::RestMap to_rest = map_of_(body);
+  return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) {
+    return signed_distance(*domain_, to_rest, placed(pose, piece.point)) < 0;
+  });
+}
+
+bool BladeEdge::is_in_open_cut(const topology::BladePose& pose, const BodyModel& body) const {
+  if (body.incision == nullptr)
+    return false;
+  const topology::RestMap to_rest = map_of_(body);
+  bool any = false;
+  for (const Piece& piece : pieces_) {
+    Vector3 rest;
+    try {
+      rest = to_rest(placed(pose, piece.point));
+    } catch (const NumericalError&) {
+      return false;
+    }
+    if (domain_->signed_distance(rest) >= 0)
+      continue;
+    any = true;
+    if (!body.incision->closest(rest, open_reach * spacing_) || body.incision->front_frame(rest, spacing_))
+      return false;
+  }
+  return any;
+}
+
 solvers::Field without_lips(const BodyModel& body) {
   const bool tool = body.state && !body.patch.nodes.empty();
   return tool ? solvers::deform(*body.body, body.patch, body.state->tool) : body.base;
 }
 
 // Whether material that is now at x was at rest on a sheet.
-bool BladeForce::lies_in(const topology::Incision& cut, const topology::RestMap& to_rest, const Vector3& x) const {
+bool BladeEdge::lies_in(const topology::Incision& cut, const topology::RestMap& to_rest, const Vector3& x) const {
   try {
     const auto on = cut.closest(to_rest(x), in_sheet * spacing_);
     return on && !on->on_border;
@@ -60,53 +107,54 @@ bool BladeForce::lies_in(const topology::Incision& cut, const topology::RestMap&
 }
 
 // The edge piece stands against the front, or against the surface where it came in after the front was left behind.
-void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_rest, std::size_t front, int piece,
-                             Meeting& meeting, std::vector<solvers::EdgeContact>& contacts) const {
-  const EdgePiece& part = edge_[static_cast<std::size_t>(piece)];
+void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_rest, const BladePoses& poses,
+                            std::size_t front, int piece, EdgeMeeting& meeting,
+                            std::vector<solvers::EdgeContact>& contacts) const {
+  const Piece& part = pieces_[static_cast<std::size_t>(piece)];
   const auto outside = [&](const topology::BladePose& pose) {
     return signed_distance(*domain_, to_rest, placed(pose, part.point)) >= 0;
   };
-  std::size_t leg = front; // from way_[leg] to the next
-  topology::BladePose met = way_[front];
+  std::size_t leg = front; // from poses[leg] to the next
+  topology::BladePose met = poses[front];
   bool on_surface = outside(met);
   // Where on a leg, from a share of it on, something that is true of the pose ends: just before and just after.
   const auto end_of = [&](std::size_t at, double before, const auto& holds) {
     double after = 1;
     for (int k = 0; k < entry_steps; ++k) {
       const double middle = 0.5 * (before + after);
-      (holds(pose_between(way_[at], way_[at + 1], middle)) ? before : after) = middle;
+      (holds(pose_between(poses[at], poses[at + 1], middle)) ? before : after) = middle;
     }
     return std::pair{before, after};
   };
   if (on_surface) {
-    while (leg + 1 < way_.size() && outside(way_[leg + 1]))
+    while (leg + 1 < poses.size() && outside(poses[leg + 1]))
       ++leg;
-    if (leg + 1 >= way_.size())
+    if (leg + 1 >= poses.size())
       return;
     const double in = end_of(leg, 0, outside).second;
-    met = pose_between(way_[leg], way_[leg + 1], in);
+    met = pose_between(poses[leg], poses[leg + 1], in);
     // Where it comes back into a cut it meets nothing before it has gone through that.
     const auto is_cut = [&](const topology::BladePose& pose) {
       return lies_in(*body.incision, to_rest, placed(pose, part.point));
     };
     if (body.incision != nullptr && is_cut(met)) {
       double begin = in;
-      while (leg + 1 < way_.size() && is_cut(way_[leg + 1])) {
+      while (leg + 1 < poses.size() && is_cut(poses[leg + 1])) {
         ++leg;
         begin = 0;
       }
-      if (leg + 1 >= way_.size())
+      if (leg + 1 >= poses.size())
         return;
-      met = pose_between(way_[leg], way_[leg + 1], end_of(leg, begin, is_cut).first);
+      met = pose_between(poses[leg], poses[leg + 1], end_of(leg, begin, is_cut).first);
       on_surface = false;
     }
   }
   // Its way from there: to where it is clear of its start and, past a turn, of the cut that is there already, on whose
   // faces it does not push when it goes back.
-  const Vector3 along = met.orientation * part.along, start = placed(way_[leg], part.point);
+  const Vector3 along = met.orientation * part.along, start = placed(poses[leg], part.point);
   Vector3 across = Vector3::Zero(), looked_at = start;
-  for (std::size_t next = leg + 1; next < way_.size(); ++next) {
-    const Vector3 x = placed(way_[next], part.point);
+  for (std::size_t next = leg + 1; next < poses.size(); ++next) {
+    const Vector3 x = placed(poses[next], part.point);
     const Vector3 way = x - start - (x - start).dot(along) * along;
     if (across.norm() < least_motion * spacing_)
       across = way;
@@ -139,16 +187,16 @@ void BladeForce::add_contact(const BodyModel& body, const topology::RestMap& to_
   meeting.surface.push_back(on_surface ? 1 : 0);
 }
 
-// What is as it was in the `last` meeting need not be solved for again.
-BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front, const Meeting& last) const {
-  Meeting meeting;
+EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std::size_t front,
+                            const EdgeMeeting& last) const {
+  EdgeMeeting meeting;
   meeting.area = body.incision != nullptr ? body.incision->area() : 0;
-  if (front + 1 >= way_.size())
+  if (front + 1 >= poses.size())
     return meeting;
   const topology::RestMap to_rest = map_of_(body);
   std::vector<solvers::EdgeContact> contacts;
-  for (int piece = 0; piece < std::ssize(edge_); ++piece)
-    add_contact(body, to_rest, front, piece, meeting, contacts);
+  for (int piece = 0; piece < std::ssize(pieces_); ++piece)
+    add_contact(body, to_rest, poses, front, piece, meeting, contacts);
   if (contacts.empty())
     return meeting;
   const solvers::BladePatch* known = last.is_with(body) ? &last.patch : nullptr;
@@ -167,7 +215,7 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front, c
   Vector3 course = Vector3::Zero();
   for (const solvers::EdgeContact& contact : contacts)
     course += contact.length * contact.push;
-  meeting.drawn_back = (way_.back().position - way_[way_.size() - 2].position).dot(course) < 0;
+  meeting.drawn_back = (poses.back().position - poses[poses.size() - 2].position).dot(course) < 0;
   const solvers::ForcePattern flanks = drag(body, contacts, meeting.drawn_back ? Vector3(-course) : course);
   const solvers::Field base = without_lips(body);
   std::vector<solvers::LipPair> pairs;
@@ -183,7 +231,7 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front, c
     known = &meeting.patch;
     if (lips_ == solvers::LipCondition::open || body.pairs.empty())
       break;
-    const solvers::BladeState state = solvers::push_blade(meeting.patch, advances(meeting, body, way_.back()));
+    const solvers::BladeState state = solvers::push_blade(meeting.patch, advances(meeting, body, poses.back()));
     const VectorX open = openings(body, solvers::deform(meeting.patch, state, base));
     const std::size_t before = pairs.size();
     for (std::size_t p = 0; p < body.pairs.size(); ++p)
@@ -198,8 +246,8 @@ BladeForce::Meeting BladeForce::meet(const BodyModel& body, std::size_t front, c
 }
 
 // Faces of the cut near the edge, behind it, against a motion along `way`.
-solvers::ForcePattern BladeForce::drag(const BodyModel& body, const std::vector<solvers::EdgeContact>& contacts,
-                                       const Vector3& way) const {
+solvers::ForcePattern BladeEdge::drag(const BodyModel& body, const std::vector<solvers::EdgeContact>& contacts,
+                                      const Vector3& way) const {
   if (settings_.friction == 0 || settings_.flank == 0 || body.incision == nullptr || way.norm() == 0)
     return {};
   std::vector<solvers::FlankPoint> flanks;
@@ -217,12 +265,12 @@ solvers::ForcePattern BladeForce::drag(const BodyModel& body, const std::vector<
                         : solvers::drag_pattern(flanks, settings_.friction, way.normalized(), spacing_);
 }
 
-// Of each piece of the edge that meets something, past its contact's rest position, m.
-VectorX BladeForce::motions(const Meeting& meeting, const topology::BladePose& pose) const {
+VectorX BladeEdge::motions(const EdgeMeeting& meeting, const topology::BladePose& pose) const {
   VectorX result(std::ssize(meeting.pieces));
   for (Eigen::Index c = 0; c < result.size(); ++c) {
     const solvers::EdgeContact& contact = meeting.patch.contacts[static_cast<std::size_t>(c)];
-    const Vector3 x = placed(pose, edge_[static_cast<std::size_t>(meeting.pieces[static_cast<std::size_t>(c)])].point);
+    const Vector3 x =
+        placed(pose, pieces_[static_cast<std::size_t>(meeting.pieces[static_cast<std::size_t>(c)])].point);
     result[c] = contact.push.dot(x - contact.point);
   }
   return result;
@@ -231,8 +279,8 @@ VectorX BladeForce::motions(const Meeting& meeting, const topology::BladePose& p
 // How far a piece of the edge at x may push before tissue slips off it, m. A piece that goes out of the body sideways,
 // or back through the cut, has less and less of it; one that goes out straight ahead has the tissue there before it
 // still, and pushes that out.
-double BladeForce::reach(const Meeting& meeting, Eigen::Index contact, const BodyModel& body,
-                         const topology::RestMap& to_rest, const Vector3& x) const {
+double BladeEdge::reach(const EdgeMeeting& meeting, Eigen::Index contact, const BodyModel& body,
+                        const topology::RestMap& to_rest, const Vector3& x) const {
   const solvers::EdgeContact& there = meeting.patch.contacts[static_cast<std::size_t>(contact)];
   double depth = -signed_distance(*domain_, to_rest, x); // m
   bool is_cut_ahead = false;
@@ -244,45 +292,83 @@ double BladeForce::reach(const Meeting& meeting, Eigen::Index contact, const Bod
   return meeting.patch.base[contact] + depth_factor * std::max(0.0, depth);
 }
 
-VectorX BladeForce::advances(const Meeting& meeting, const BodyModel& body, const topology::BladePose& pose) const {
+VectorX BladeEdge::advances(const EdgeMeeting& meeting, const BodyModel& body, const topology::BladePose& pose) const {
   const topology::RestMap to_rest = map_of_(body);
   VectorX result = motions(meeting, pose);
   for (Eigen::Index c = 0; c < result.size(); ++c) {
     const int piece = meeting.pieces[static_cast<std::size_t>(c)];
-    result[c] = std::min(result[c],
-                         reach(meeting, c, body, to_rest, placed(pose, edge_[static_cast<std::size_t>(piece)].point)));
+    result[c] = std::min(
+        result[c], reach(meeting, c, body, to_rest, placed(pose, pieces_[static_cast<std::size_t>(piece)].point)));
   }
   return result;
 }
 
-bool BladeForce::meets(const topology::BladePose& pose, const BodyModel& body) const {
-  if (inside(pose, body))
-    return true;
-  if (!state_)
-    return false;
+bool BladeEdge::pushes(const EdgeMeeting& meeting, const BodyModel& body, const topology::BladePose& pose) const {
   const topology::RestMap to_rest = map_of_(body);
-  const VectorX motion = motions(meeting_, pose);
+  const VectorX motion = motions(meeting, pose);
   for (Eigen::Index c = 0; c < motion.size(); ++c) {
-    const int piece = meeting_.pieces[static_cast<std::size_t>(c)];
-    const Vector3 x = placed(pose, edge_[static_cast<std::size_t>(piece)].point);
-    if (motion[c] > meeting_.patch.base[c] && motion[c] < reach(meeting_, c, body, to_rest, x))
+    const int piece = meeting.pieces[static_cast<std::size_t>(c)];
+    const Vector3 x = placed(pose, pieces_[static_cast<std::size_t>(piece)].point);
+    if (motion[c] > meeting.patch.base[c] && motion[c] < reach(meeting, c, body, to_rest, x))
       return true;
   }
   return false;
 }
 
-// Whether a cut by `cut` m from the front on leaves less than a node spacing of tissue, which the nodes cannot tell of,
-// before an edge that will have gone through all of it.
-bool BladeForce::leaves_bridge(const BodyModel& now, std::size_t last, double cut) const {
-  const topology::RestMap to_rest = map_of_(now);
-  for (std::size_t c = 0; c < meeting_.pieces.size(); ++c) {
-    const solvers::EdgeContact& contact = meeting_.patch.contacts[c];
-    const Vector3 end = placed(way_[last], edge_[static_cast<std::size_t>(meeting_.pieces[c])].point);
-    if (signed_distance(*domain_, to_rest, end) < 0 || domain_->signed_distance(end) < 0 ||
+bool BladeEdge::leaves_bridge(const EdgeMeeting& meeting, const BodyModel& body, const topology::BladePose& end,
+                              double cut) const {
+  const topology::RestMap to_rest = map_of_(body);
+  for (std::size_t c = 0; c < meeting.pieces.size(); ++c) {
+    const solvers::EdgeContact& contact = meeting.patch.contacts[c];
+    const Vector3 x = place(end, meeting.pieces[c]);
+    if (signed_distance(*domain_, to_rest, x) < 0 || domain_->signed_distance(x) < 0 ||
         domain_->signed_distance(contact.point + (cut + spacing_) * contact.push) < 0)
       return false;
   }
   return true;
+}
+
+// Ahead of its contact where it pressed; else, in a motion that came from outside, whatever lies between.
+double BladeEdge::passed_uncut(const EdgeMeeting& meeting, const BodyModel& body, const topology::BladePose& from,
+                               const topology::BladePose& to) const {
+  const topology::RestMap to_rest = map_of_(body);
+  double most = 0;
+  const auto length_inside = [&](int parts, double part, const auto& place) {
+    int inside = 0;
+    for (int k = 0; k < parts; ++k)
+      inside += domain_->signed_distance(place((k + 0.5) / parts)) < 0 ? 1 : 0;
+    most = std::max(most, inside * part);
+  };
+  for (int piece = 0; piece < std::ssize(pieces_); ++piece) {
+    const Vector3& point = pieces_[static_cast<std::size_t>(piece)].point;
+    const Vector3 start = placed(from, point), end = placed(to, point), motion = end - start;
+    const auto met = std::find(meeting.pieces.begin(), meeting.pieces.end(), piece);
+    if (met != meeting.pieces.end()) {
+      const solvers::EdgeContact& contact =
+          meeting.patch.contacts[static_cast<std::size_t>(met - meeting.pieces.begin())];
+      const double gone = contact.push.dot(end - contact.point);
+      if (gone > 0 && contact.push.dot(motion) > 0.5 * motion.norm())
+        length_inside(way_parts, gone / way_parts,
+                      [&](double share) { return Vector3(contact.point + share * gone * contact.push); });
+    } else if (signed_distance(*domain_, to_rest, start) >= 0) {
+      length_inside(way_parts, motion.norm() / way_parts, [&](double share) {
+        const Vector3 x = start + share * motion;
+        const bool is_cut = body.incision != nullptr && body.incision->closest(x, open_reach * spacing_);
+        return is_cut ? end : x;
+      });
+    }
+  }
+  return most > least_increment * spacing_ ? most : 0;
+}
+
+// The same everywhere without layers.
+double BladeEdge::toughness(const EdgeMeeting& meeting) const {
+  double sum = 0, length = 0;
+  for (const solvers::EdgeContact& contact : meeting.patch.contacts) {
+    sum += contact.length * toughness_(contact.point + 0.5 * half_width_ * contact.push);
+    length += contact.length;
+  }
+  return length > 0 ? sum / length : 0;
 }
 
 } // namespace spherecut::app

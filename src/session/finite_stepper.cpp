@@ -1,0 +1,54 @@
+#include "src/session/finite_stepper.hpp"
+
+#include "src/tissue/finite_body.hpp"
+#include "topology/base/errors.hpp"
+#include "topology/base/interruption.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace spherecut::app {
+
+void FiniteStepper::step(const StepSample& sample, bool was_cut, StepResult& result) {
+  const bool begins =
+      has_loads(state_.scenario) || (state_.touch && result.contact.depth > 0) || state_.model.incision != nullptr;
+  if (state_.model.finite == nullptr && !begins) {
+    free_pose_ = sample.tool;
+    free_time_ = sample.time;
+    return;
+  }
+  interruption_point();
+  try {
+    if (state_.model.finite == nullptr) {
+      make_finite(state_, state_.model);
+      if (state_.touch && free_pose_ &&
+          !has_loads(state_.scenario)) // from there a step goes, should it have to be halved
+        solve_finite(free_time_, free_pose_, state_.model, state_.profile);
+    }
+    if (!was_cut)
+      solve_finite(sample.time, sample.tool, state_.model, state_.profile);
+  } catch (const NumericalError& error) {
+    throw NumericalError(fmt::format("t = {:g} s: {}. The rows up to then are kept. What a law cannot bear does that, "
+                                     "or steps too long for it (tool.step), or nodes too coarse for the tool "
+                                     "(nodes.fine_spacing)",
+                                     sample.time, error.what()));
+  }
+  report_.tell_finite(result);
+}
+
+std::vector<Vector3> places_of_contact(const SessionState& state) {
+  std::vector<Vector3> places{state.zone.centre()->point};
+  const double pitch = state.scenario.contact.follow_fraction * state.zone.spacing().radius;
+  for (const StepSample& sample : state.steps) {
+    if (!sample.tool)
+      continue;
+    const topology::SurfaceContact contact = state.query.first_touch(state.scenario.tool->shape, *sample.tool);
+    const Vector3 place = state.zone.centre_of(contact, *sample.tool).point;
+    if (contact.depth > 0 && std::none_of(places.begin(), places.end(),
+                                          [&](const Vector3& known) { return (known - place).norm() <= pitch; }))
+      places.push_back(place);
+  }
+  return places;
+}
+
+} // namespace spherecut::app

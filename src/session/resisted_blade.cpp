@@ -1,0 +1,283 @@
+#include "src/session/resisted_blade.hpp"
+
+#include "src/base/stage_timer.hpp"
+#include "src/tissue/cut_checks.hpp"
+#include "topology/base/errors.hpp"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <stdexcept>
+#include <utility>
+
+namespace spherecut::app {
+namespace {
+
+BladeEdge edge_of(const SessionState& state) {
+  const auto map_of = [&state](const BodyModel& model) {
+    return [&state, &model](const Vector3& x) {
+      return rest_position(x, model, *state.organ.domain, state.zone.spacing());
+    };
+  };
+  return {state.scenario, state.organ.domain, state.zone.fine(), map_of, toughness_field(state.scenario)};
+}
+
+} // namespace
+
+ResistedBlade::ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact, AsideBodies& aside,
+                             BodyUpdater& updater, WindowRenewal& renewal, const TearFronts& fronts)
+    : state_(state), blade_(blade), contact_(contact), aside_(aside), updater_(updater), renewal_(renewal),
+      fronts_(fronts), force_(state.scenario, edge_of(state)) {
+  if (force_.edge().finer_than_nodes())
+    state_.log.warn(
+        "edge", fmt::format("the contact of the blade's edge is narrower than the nodes; it is taken as {:.3g} m wide: "
+                            "before it cuts, the blade sinks in less than it would",
+                            2 * force_.edge().half_width()));
+}
+
+bool ResistedBlade::enters(const StepSample& sample) const {
+  return sample.blade && force_.edge().inside(*sample.blade, state_.model);
+}
+
+void ResistedBlade::load_body() {
+  solvers::Field bladed = force_.field(state_.model);
+  state_.model.without_blade = std::exchange(state_.model.field, std::move(bladed));
+}
+
+void ResistedBlade::lift() {
+  force_.lift();
+  drop_proposal();
+}
+
+void ResistedBlade::drop_proposal() {
+  aside_.drop_proposing();
+  if (mark_)
+    state_.incisions->go_back(*mark_);
+  forget_mark();
+}
+
+void ResistedBlade::forget_mark() {
+  mark_.reset();
+  state_.shown_wound.reset();
+}
+
+bool ResistedBlade::proposes_aside() const {
+  return cut_policy(state_.scenario, state_.options) == CutPolicy::proposed_aside;
+}
+
+double ResistedBlade::press(const StepSample& sample, CutReport& report) {
+  if (sample.blade)
+    return press_at(sample, report);
+  if (!blade_.last() || !(aside_.proposing() != nullptr || lags_aside()))
+    return 0;
+  StepSample left = sample; // at the end of its path, with a cut still to come
+  left.blade = blade_.last();
+  left.blade->time = sample.time;
+  return press_at(left, report);
+}
+
+// The energy of the surface that the blade makes on its way to the sample's pose, J.
+double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
+  const topology::RestMap to_rest = state_.to_rest();
+  std::vector<topology::BladePose> passed = blade_.passed();
+  const bool placed = !force_.way().empty();
+  const bool out =
+      !force_.edge().inside(*sample.blade, state_.model); // what it pushes ahead of itself there is cut in the step
+  double surface = 0;
+  if (placed) {
+    const bool leaves = !force_.meets(*sample.blade, state_.model);
+    while (leaves && !passed.empty() && !force_.meets(passed.back(), state_.model))
+      passed.pop_back();
+    const bool goes_on = leaves && !passed.empty(); // before it leaves
+    if (goes_on)
+      force_.go_to(passed, state_.model);
+    else
+      force_.pass_by(passed);
+    const double far = most_advances * aside_advance * state_.zone.fine();
+    if (const AsideBodies::Proposing* made = aside_.proposing();
+        made != nullptr &&
+        (aside_.has_arrived() || leaves || out || force_.way().left(force_.edge()) - made->way_left > far))
+      take(sample, report);
+    const bool lags = proposes_aside() && (force_.proposed() || force_.lags());
+    if (goes_on || (leaves && lags)) // what it has come to is cut before
+      surface += cut_on(sample, false, report);
+  }
+  force_.go_to({&*sample.blade, 1}, state_.model);
+  if (!force_.meets(*sample.blade, state_.model)) {
+    leave(sample);
+    state_.incisions->place(*sample.blade, to_rest);
+    return surface;
+  }
+  if (!placed)
+    state_.incisions->place(*sample.blade, to_rest);
+  return surface + cut_on(sample, proposes_aside() && !out, report);
+}
+
+// What it has passed without a cut is told.
+void ResistedBlade::leave(const StepSample& sample) {
+  if (const double uncut = force_.passed_uncut(state_.model); uncut > 0)
+    state_.log.warn("bridge",
+                    fmt::format("by t = {:g} s the blade has left the organ past up to {:.2g} mm of tissue that it has "
+                                "not cut. Nearer than a node spacing ({:.2g} mm) to a surface or a fixed region the "
+                                "nodes do not tell what its edge releases: finer ones (nodes.fine_spacing, "
+                                "cut.front_spacing) cut farther; what it passes within a step it does not meet: a "
+                                "smaller blade.step does",
+                                sample.time, 1e3 * uncut, 1e3 * state_.zone.fine()));
+  force_.leave();
+  drop_proposal();
+}
+
+// A cut is built when it comes near, beside the body, and the body becomes it when it is due. Where it is built beside
+// the steps the blade waits at the force of steady cutting: what it does is then what it would have done, only later.
+// The energy of the surface, J.
+double ResistedBlade::cut_on(const StepSample& sample, bool aside, CutReport& report) {
+  const topology::RestMap to_rest = state_.to_rest();
+  int triangles = report.triangles;
+  double surface = 0;
+  bool waits = false; // what takes a body over leaves the next one to the next step
+  for (;;) {
+    waits = waits || aside_.proposing() != nullptr;
+    if (const std::vector<topology::BladePose> poses =
+            waits ? std::vector<topology::BladePose>{} : force_.wanted(state_.model);
+        !poses.empty()) {
+      if (!mark_) {
+        mark_ = state_.incisions->mark();
+        state_.shown_wound = state_.incisions->wound();
+      }
+      if (aside && force_.proposed()) { // a longer cut in its place
+        force_.withdraw();
+        state_.incisions->go_back(*mark_);
+        continue;
+      }
+      if (aside) {
+        build_aside(poses, sample, report);
+      } else if (std::optional<BodyModel> next = build(poses, sample, report)) {
+        triangles += report.triangles;
+        const double drawn = fronts_.released(state_.model, *next->incision);
+        force_.propose(std::move(*next), poses.size(), drawn);
+      }
+      if (!force_.proposed() && aside_.proposing() == nullptr) { // nothing is cut there
+        forget_mark();
+        force_.pass(poses.size(), state_.model);
+        continue;
+      }
+    }
+    if ((waits || aside_.proposing() != nullptr) && !force_.proposed()) {
+      force_.wait(state_.model);
+      break;
+    }
+    if (!force_.advance(state_.model))
+      break;
+    BladeForce::Taken taken = force_.take();
+    surface += taken.surface;
+    state_.model = std::move(taken.body);
+    renewal_.lead(sample, updater_.followed(), to_rest);
+    forget_mark();
+    waits = aside;
+  }
+  report.triangles = triangles;
+  return surface;
+}
+
+// The incision with what the blade cuts through these poses; false: that is nothing, and it is as it was.
+bool ResistedBlade::sweep(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report) {
+  const topology::RestMap to_rest = state_.to_rest();
+  const IncisionBuilder::Mark before = state_.incisions->mark();
+  topology::SweepResult swept;
+  report.triangles = 0;
+  {
+    const StageTimer timer(report.seconds.topology);
+    for (std::size_t k = 0; k + 1 < poses.size(); ++k)
+      state_.incisions->put_off(poses[k]); // a step has many where solves are many
+    swept = state_.incisions->move_to(poses.back(), to_rest);
+    report.triangles = swept.triangles;
+  }
+  if (report.triangles == 0) {
+    report.reason = swept.refused;
+    if (force_.proposed()) // these poses are asked for again, with those after them
+      state_.incisions->go_back(before);
+    return false;
+  }
+  require_clear_of_tool(*state_.incisions->incision(), state_.model, state_.scenario.contact.condition);
+  state_.check_pieces(sample.time);
+  if (blade_.is_hand_led())
+    state_.zone.follow_fronts(*state_.incisions->incision());
+  const StageTimer timer(report.seconds.level_sets);
+  state_.incisions->update_fields();
+  return true;
+}
+
+// The body with the cut that the blade makes through these poses, built and solved; none when it cuts nothing or is
+// refused, and then incision and wound are as they were.
+std::optional<BodyModel> ResistedBlade::build(const std::vector<topology::BladePose>& poses, const StepSample& sample,
+                                              CutReport& report) {
+  const IncisionBuilder::Mark before = state_.incisions->mark();
+  const BodyUpdate last = report; // by an earlier cut of the same step
+  const auto refuse = [&](const char* why) {
+    refuse_cut(sample.time, why, report, state_.log);
+    report.update = last.update;
+    report.update_reason = last.update_reason;
+    report.nodes = last.nodes;
+    report.kept_nodes = last.kept_nodes;
+    state_.incisions->go_back(before);
+    return std::nullopt;
+  };
+  try {
+    if (!sweep(poses, sample, report))
+      return std::nullopt;
+    BodyModel next = updater_.next();
+    state_.rebuild = Rebuild::in_step;
+    const topology::RestMap to_rest = state_.to_rest();
+    updater_.build_cut({.way_ahead = [&] { return renewal_.way_of_blade(sample, to_rest); }, .beside = true}, next,
+                       report);
+    const StageTimer timer(report.seconds.solve);
+    contact_.solve(sample, next);
+    return next;
+  } catch (const InputError& error) {
+    return refuse(error.what());
+  } catch (const NumericalError& error) {
+    return refuse(error.what());
+  }
+}
+
+// The same, built beside the steps.
+void ResistedBlade::build_aside(const std::vector<topology::BladePose>& poses, const StepSample& sample,
+                                CutReport& report) {
+  try {
+    if (!sweep(poses, sample, report))
+      return;
+    const int triangles = std::exchange(report.triangles, 0);
+    aside_.propose({poses.size(), sample.time, force_.way().left(force_.edge()), triangles},
+                   updater_.following_cut(state_.incisions->incision(), "the blade is resisted"));
+    return;
+  } catch (const InputError& error) {
+    refuse_cut(sample.time, error.what(), report, state_.log);
+  } catch (const NumericalError& error) {
+    refuse_cut(sample.time, error.what(), report, state_.log);
+  }
+  state_.incisions->go_back(*mark_);
+}
+
+// It is solved and becomes the blade's; where it could not be made its way is passed without a cut.
+void ResistedBlade::take(const StepSample& sample, CutReport& report) {
+  state_.rebuild = aside_.has_arrived() ? Rebuild::aside : Rebuild::in_step;
+  auto [made, body] = aside_.take_proposing();
+  try {
+    MadeAside aside = body.get();
+    static_cast<BodyUpdate&>(report) = std::move(aside.report);
+    report.update = SystemUpdate::taken_over;
+    report.triangles += made.triangles;
+    state_.profile.sprinkle += report.seconds.sprinkling;
+    state_.profile.discretise += report.seconds.assembly + report.seconds.visibility;
+    state_.profile.condense += report.seconds.solve;
+    const StageTimer timer(report.seconds.solve);
+    contact_.solve(sample, aside.model);
+    force_.propose(std::move(aside.model), made.poses);
+  } catch (const std::runtime_error& error) {
+    refuse_cut(made.time, error.what(), report, state_.log);
+    state_.incisions->go_back(*mark_);
+    forget_mark();
+    force_.pass(made.poses, state_.model);
+  }
+}
+
+} // namespace spherecut::app

@@ -1,0 +1,35 @@
+// Fine nodes go along with the tool: in the step, or on a body made beside the steps.
+#pragma once
+
+#include "src/session/step_result.hpp"
+#include "src/tissue/body_updater.hpp"
+
+namespace spherecut::app {
+
+class ToolFollowing {
+ public:
+  /// These must outlive it.
+  ToolFollowing(SessionState& state, ContactSolver& contact, BodyUpdater& updater, AsideBodies& aside,
+                WindowRenewal& renewal)
+      : state_(state), contact_(contact), updater_(updater), aside_(aside), renewal_(renewal) {}
+
+  /// The fine zone goes to where the contact is, and the body is built and solved there.
+  void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
+  /// The same beside the steps: begins that, or takes it over once the contact has left the zone.
+  void follow_aside(const StepSample& sample, const topology::SurfaceContact& centre);
+  /// The body that has followed the tool takes over, after waiting for it. Throws what making it has thrown; the body
+  /// is then as it was.
+  void take();
+  /// Whether one has since this was asked last.
+  [[nodiscard]] bool has_taken() { return std::exchange(taken_, false); }
+
+ private:
+  SessionState& state_;
+  ContactSolver& contact_;
+  BodyUpdater& updater_;
+  AsideBodies& aside_;
+  WindowRenewal& renewal_;
+  bool taken_ = false;
+};
+
+} // namespace spherecut::app

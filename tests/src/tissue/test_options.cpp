@@ -1,0 +1,70 @@
+// By which policy a body follows a blade, and what a session says.
+#include "src/tissue/log.hpp"
+#include "src/tissue/options.hpp"
+#include "tests/src/blade_text.hpp"
+#include "tests/src/scenario_session.hpp"
+#include "tests/src/scenario_text.hpp"
+
+#include <catch2/catch.hpp>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+
+namespace {
+
+const std::string drawn = blade({"[0, 0, 0.04]", "[0, 0, 0.02]"}, 0.04, "0.5");
+const std::string at_once = replaced(drawn, "step = 0.5", "step = 0.5\nadvance = 0");
+const std::string tough_block = replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 10");
+
+} // namespace
+
+TEST_CASE("A body follows its blade in the step, ahead of it or beside it, as scenario and options say") {
+  const SessionOptions off_line, ahead{.recondensing = true}, beside{.following_aside = true},
+      both{.recondensing = true, .following_aside = true};
+  const auto policies = [&](const std::string& text) {
+    const Scenario scenario = scenario_of(text);
+    return std::vector{cut_policy(scenario, off_line), cut_policy(scenario, ahead), cut_policy(scenario, beside),
+                       cut_policy(scenario, both)};
+  };
+  using enum CutPolicy;
+  CHECK(policies(small_scenario) == std::vector{none, none, none, none});
+  CHECK(policies(cut_block + drawn) == std::vector{in_step, in_step_ahead, aside, aside});
+  CHECK(policies(cut_block + at_once) == std::vector{in_step, in_step_ahead, in_step, in_step_ahead});
+  CHECK(policies(cut_block + drawn + "[cut]\nsight = \"appended\"\n") ==
+        std::vector{in_step, in_step, in_step, in_step});
+  CHECK(policies(tough_block + drawn) == std::vector{proposed, proposed, proposed_aside, proposed_aside});
+  CHECK(policies(tough_block + at_once) == std::vector{proposed, proposed, proposed, proposed});
+  CHECK(policies(tough_block + drawn + "[tearing]\n") == std::vector{proposed, proposed, proposed, proposed});
+}
+
+TEST_CASE("A blade goes half a spacing ahead of a body that is made beside the steps, else as far as it is told") {
+  const Scenario usual = scenario_of(cut_block + drawn), told = scenario_of(cut_block + at_once);
+  CHECK(blade_advance(usual, {}) == 0);
+  CHECK(blade_advance(usual, {.following_aside = true}) == aside_advance);
+  CHECK(blade_advance(told, {.following_aside = true}) == 0);
+}
+
+TEST_CASE("What cuts, resists or loads is read off the scenario") {
+  CHECK_FALSE(has_cuts(scenario_of(small_scenario)));
+  CHECK(has_cuts(scenario_of(cut_block + disc_precut)));
+  CHECK(has_cuts(scenario_of(cut_block + drawn)));
+  CHECK_FALSE(resists(scenario_of(cut_block + drawn)));
+  CHECK(resists(scenario_of(tough_block + drawn)));
+  CHECK_FALSE(resists(scenario_of(tough_block + disc_precut))); // there is no blade
+  CHECK_FALSE(has_loads(scenario_of(small_scenario)));
+  CHECK(has_loads(scenario_of(small_scenario + "[gravity]\nacceleration = [0, 0, -9.81]\n")));
+  CHECK_FALSE(has_grasper(scenario_of(small_scenario)));
+}
+
+TEST_CASE("A session warns once for each key, and says all else as often as it is told") {
+  std::vector<std::string> said;
+  SessionLog log([&](const std::string& text) { said.push_back(text); });
+  log.say("nodes");
+  log.warn("a", "first");
+  log.warn("a", "second");
+  log.warn("b", "third");
+  log.say("nodes");
+  CHECK(said == std::vector<std::string>{"nodes", "warning: first", "warning: third", "nodes"});
+  CHECK(log.warnings() == std::vector<std::string>{"first", "third"});
+}
