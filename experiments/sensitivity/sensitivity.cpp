@@ -103,6 +103,9 @@ double intensity_error(const Numbers& numbers, double poisson_ratio, int seed) {
       });
 }
 
+/// On which side of a number a body takes longer: less error there is no reason to go there, and is not judged.
+enum class Dear { neither, half, twice };
+
 struct Row {
   const char* name;
   Method method;
@@ -110,8 +113,10 @@ struct Row {
   Measure measure;
   const char* measured;
   double& (*number)(Numbers&);
-  double bound = 1.5; // of the error at the number over the least at half and twice it
+  Dear dear = Dear::neither;
 };
+
+constexpr double worst_over_best = 1.5;
 
 // One line a number. Captureless, so that a row is plain data.
 const std::vector<Row>& rows() {
@@ -119,27 +124,30 @@ const std::vector<Row>& rows() {
   constexpr Method galerkin = Method::galerkin, collocation = Method::collocation;
   static const std::vector<Row> all = {
       {"sphere_radius", galerkin, 0.3, smooth_error, "smooth field",
-       [](N& n) -> double& { return n.tuning.sphere_radius; }},
+       [](N& n) -> double& { return n.tuning.sphere_radius; }, Dear::twice},
       {"sphere_radius_cut", galerkin, 0.3, opening_error, "opening",
-       [](N& n) -> double& { return n.tuning.sphere_radius_cut; }},
+       [](N& n) -> double& { return n.tuning.sphere_radius_cut; }, Dear::twice},
       {"sphere_radius_soft", galerkin, 0.49, smooth_error, "smooth field",
-       [](N& n) -> double& { return n.tuning.sphere_radius_soft; }},
-      {"cell_size", galerkin, 0.3, smooth_error, "smooth field", [](N& n) -> double& { return n.how.cell_size; }},
+       [](N& n) -> double& { return n.tuning.sphere_radius_soft; }, Dear::twice},
+      {"cell_size", galerkin, 0.3, smooth_error, "smooth field", [](N& n) -> double& { return n.how.cell_size; },
+       Dear::half},
       {"holding", galerkin, 0.3, smooth_error, "smooth field", [](N& n) -> double& { return n.tuning.holding; }},
-      {"front_reach", galerkin, 0.3, opening_error, "opening", [](N& n) -> double& { return n.tuning.front_reach; }},
+      {"front_reach", galerkin, 0.3, opening_error, "opening", [](N& n) -> double& { return n.tuning.front_reach; },
+       Dear::twice},
       {"front_reach_soft", galerkin, 0.49, opening_error, "opening",
-       [](N& n) -> double& { return n.tuning.front_reach_soft; }},
+       [](N& n) -> double& { return n.tuning.front_reach_soft; }, Dear::twice},
       {"front_blend", galerkin, 0.3, opening_error, "opening", [](N& n) -> double& { return n.tuning.front_blend; }},
       {"tube_inner", galerkin, 0.3, intensity_error, "intensity", [](N& n) -> double& { return n.tube.inner; }},
-      {"tube_outer", galerkin, 0.3, intensity_error, "intensity", [](N& n) -> double& { return n.tube.outer; }},
+      {"tube_outer", galerkin, 0.3, intensity_error, "intensity", [](N& n) -> double& { return n.tube.outer; },
+       Dear::twice},
       {"tube_half_length", galerkin, 0.3, intensity_error, "intensity",
-       [](N& n) -> double& { return n.tube.half_length; }},
+       [](N& n) -> double& { return n.tube.half_length; }, Dear::twice},
       {"collocation_radius", collocation, 0.3, smooth_error, "smooth field",
-       [](N& n) -> double& { return n.how.support_radius; }},
+       [](N& n) -> double& { return n.how.support_radius; }, Dear::twice},
       {"collocation_front_reach", collocation, 0.3, opening_error, "opening",
-       [](N& n) -> double& { return n.tuning.collocation_front_reach; }},
+       [](N& n) -> double& { return n.tuning.collocation_front_reach; }, Dear::twice},
       {"collocation_front_radius", collocation, 0.3, opening_error, "opening",
-       [](N& n) -> double& { return n.tuning.collocation_front_radius; }},
+       [](N& n) -> double& { return n.tuning.collocation_front_radius; }, Dear::twice},
       {"damping", collocation, 0.3, smooth_error, "smooth field", [](N& n) -> double& { return n.tuning.damping; }},
       {"damping_at_front", collocation, 0.3, opening_error, "opening",
        [](N& n) -> double& { return n.tuning.damping_at_front; }},
@@ -197,7 +205,12 @@ std::vector<Check> run_sensitivity(const ExperimentContext& context) {
     context.say(fmt::format("{} = {:g} ({}, nu = {}, {}): {} / {} / {} % at half, at it, at twice", row.name, value,
                             solvers::to_string(row.method), row.poisson_ratio, row.measured, percent(half),
                             percent(own), percent(twice)));
-    checks.push_back({fmt::format("{}_over_best", row.name), own / std::min({half, own, twice}), "<=", row.bound});
+    double best = own;
+    if (row.dear != Dear::half)
+      best = std::min(best, half);
+    if (row.dear != Dear::twice)
+      best = std::min(best, twice);
+    checks.push_back({fmt::format("{}_over_best", row.name), own / best, "<=", worst_over_best});
   }
   table.write(context.out / "sensitivity.csv");
   return checks;

@@ -112,6 +112,21 @@ std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::
   return worst;
 }
 
+std::optional<WidthAt> stiff_gap(const OrganWalls& walls, const solvers::SpacingField& spacing) {
+  constexpr double least_area = 0.5; // of the squared spacing, on both sides together: less is roughness
+  double area = 0;                   // in squared spacings
+  std::optional<WidthAt> narrowest;
+  for (const topology::WidthSample& gap : walls.widths.gaps) {
+    const double h = spacing(gap.point);
+    if (!gap.is_parallel || gap.width < 0.5 * h || gap.width > 2 * h)
+      continue;
+    area += gap.area / (h * h);
+    if (!narrowest || gap.width < narrowest->width)
+      narrowest = WidthAt{gap.width, gap.point};
+  }
+  return area >= least_area ? narrowest : std::nullopt;
+}
+
 std::string bending_error(double nodes_through, solvers::Method method) {
   if (nodes_through < 1)
     return "with less than one spacing through it, it has no stiffness in bending and moves by many times too much";

@@ -48,4 +48,8 @@ struct CoarseWall {
 std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::SpacingField& spacing,
                                         double through = 2);
 
+/// The narrowest gap of half a spacing to two between parallel parts of the surface, where there is enough of such gaps
+/// to matter: beside one `collocation` is 5 to 14 % too stiff (docs/experiments/real_world.md, narrow gaps).
+std::optional<WidthAt> stiff_gap(const OrganWalls& walls, const solvers::SpacingField& spacing);
+
 } // namespace spherecut::app

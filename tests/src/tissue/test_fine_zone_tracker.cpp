@@ -1,8 +1,12 @@
 // Where nodes are fine as tool and cut go on.
 #include "src/tissue/fine_zone_tracker.hpp"
+
+#include "experiments/support/slit_block.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
+#include "topology/organ/organs.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 
 using namespace spherecut;
@@ -68,4 +72,27 @@ TEST_CASE("A zone that is led ahead of a front lasts until the front has left it
   tracker.go_back(before);
   CHECK(tracker.mark().segments == before.segments);
   CHECK(tracker.lead_ahead(*cut.incision()) == "the fine zone had nothing of the way ahead");
+}
+
+TEST_CASE("Gaps up to two spacings are found, and collocation says that it is too stiff beside wide ones") {
+  Scenario scenario = scenario_of(small_scenario);
+  scenario.nodes.count = 0;
+  scenario.nodes.coarse_spacing = scenario.nodes.fine_spacing = 0.005;
+  for (const double slit : {0.001, 0.006, 0.009, 0.011}) {
+    CAPTURE(slit);
+    experiments::SlitBlock block;
+    block.slit = slit;
+    const auto domain = topology::make_organ_domain(block.surface());
+    for (const solvers::Method method : {solvers::Method::galerkin, solvers::Method::collocation}) {
+      scenario.method.method = method;
+      FineZoneTracker tracker(scenario, domain);
+      CHECK(tracker.find_gaps() == (slit < 0.01));
+      SessionLog log([](const std::string&) {});
+      tracker.judge_walls(log);
+      const bool is_told = std::any_of(log.warnings().begin(), log.warnings().end(), [&](const std::string& text) {
+        return text.find("a gap of " + std::string(slit < 0.007 ? "6" : "9") + " mm") == 0;
+      });
+      CHECK(is_told == (method == solvers::Method::collocation && slit > 0.0025 && slit < 0.01));
+    }
+  }
 }
