@@ -1,6 +1,5 @@
 // Problem:   the numbers that measurements have fixed, each at half and at twice its value: a smooth field in a cube of
-// 729
-//            nodes, and a block of about 350 nodes with a straight crack in mode I and II.
+//            729 nodes, and a block of about 350 nodes with a straight crack in mode I and II.
 // Reference: the manufactured field; the field at the front of a crack [Williams 1957].
 // Command:   spherecut experiment run sensitivity --out DIR
 #include "experiments/registered.hpp"
@@ -13,7 +12,6 @@
 #include "src/output/figure.hpp"
 #include "topology/base/errors.hpp"
 
-#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
@@ -193,6 +191,12 @@ std::vector<Check> run_sensitivity(const ExperimentContext& context) {
   std::vector<Check> checks;
   app::Table table({"number", "method", "poisson_ratio", "value", "error_of", "at_half_percent", "at_it_percent",
                     "at_twice_percent"});
+  app::Figure figure{"Error at half, at and at twice each number, in the order of the table",
+                     "number",
+                     "error over that at the number",
+                     false,
+                     true,
+                     {{"half", {}, {}, app::SeriesStyle::points}, {"twice", {}, {}, app::SeriesStyle::points}}};
   for (const Row& row : rows()) {
     if (context.quick && checks.size() >= 4)
       break;
@@ -205,6 +209,11 @@ std::vector<Check> run_sensitivity(const ExperimentContext& context) {
     context.say(fmt::format("{} = {:g} ({}, nu = {}, {}): {} / {} / {} % at half, at it, at twice", row.name, value,
                             solvers::to_string(row.method), row.poisson_ratio, row.measured, percent(half),
                             percent(own), percent(twice)));
+    for (const auto& [series, error] : {std::pair(0, half), std::pair(1, twice)})
+      if (std::isfinite(error)) {
+        figure.series[series].x.push_back(static_cast<double>(checks.size()) + 1);
+        figure.series[series].y.push_back(error / own);
+      }
     double best = own;
     if (row.dear != Dear::half)
       best = std::min(best, half);
@@ -213,6 +222,7 @@ std::vector<Check> run_sensitivity(const ExperimentContext& context) {
     checks.push_back({fmt::format("{}_over_best", row.name), own / best, "<=", worst_over_best});
   }
   table.write(context.out / "sensitivity.csv");
+  app::write_png(figure, context.out / "sensitivity.png");
   return checks;
 }
 

@@ -113,6 +113,10 @@ TEST_CASE("Quick spherical cap crack: K_I and K_II along the front") {
   require_quick_run_passes("precut_lens");
 }
 
+TEST_CASE("Quick sensitivity: half and twice a tuned number") {
+  require_quick_run_passes("sensitivity");
+}
+
 TEST_CASE("Quick kinked slit: opening") {
   require_quick_run_passes("precut_kinked");
 }
