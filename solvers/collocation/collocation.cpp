@@ -15,10 +15,7 @@
 
 namespace spherecut::solvers {
 
-namespace {
-
-
-} // namespace
+namespace {} // namespace
 
 double collocation_support_radius(const DiscretisationOptions& options) {
   return options.support_radius > 0 ? options.support_radius : default_collocation_radius;

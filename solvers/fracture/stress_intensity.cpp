@@ -349,7 +349,8 @@ std::optional<Sample> InteractionRule::around(const Section& section, int c) con
   const double r = section.r;
   const auto [fade_r, dq_r] = fade(r);
   const auto [q_s, dq_s] = bump(section.s);
-  const double theta = std::numbers::pi * ((2 * (c / 2) + 1 + gauss_.place[c % 2]) / cells_around() - 1);
+  const int cell = c / 2;
+  const double theta = std::numbers::pi * ((2 * cell + 1 + gauss_.place[c % 2]) / cells_around() - 1);
   const double ahead = r * std::cos(theta);
   double above = r * std::sin(theta);
   const Tube::Place place = tube_.at(ahead, above, section.s);
