@@ -26,7 +26,7 @@ class Mutant:
 
 MUTANTS = [
     Mutant("shape functions: slope of the weight", "solvers/shapes/kernel_lanes.inl",
-           "12 * t2 * q", "12.1 * t2 * q", "test_solvers", "^solvers:.*([Ss]hape|gradient)"),
+           "12 * t2 * q, t};", "12.1 * t2 * q, t};", "test_solvers", "^solvers:.*([Ss]hape|gradient)"),
     Mutant("galerkin: stiffness of a pair of nodes", "solvers/galerkin/stiffness_tiles.hpp",
            "+= mu * g.trace()", "+= lambda * g.trace()", "test_solvers", "^solvers:.*(patch|smooth|[Gg]alerkin)"),
     Mutant("collocation: flux through a face", "solvers/collocation/balance_rows.cpp",
