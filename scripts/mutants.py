@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 """Spot checks of the tests: changes one place of a kernel at a time and tells whether some test notices.
 
-    scripts/mutants.py build/release [NUMBER ...]
-
 Every mutant is put into the source, its test program is built and its tests run until one fails; then the source is put
 back. A mutant that no test notices is told, and the exit status is 1. Takes a minute or two each.
 """
+import argparse
 import dataclasses
 import pathlib
 import subprocess
@@ -33,11 +32,13 @@ MUTANTS = [
            "lambda_area = -lambda_ * area", "lambda_area = -0.9 * lambda_ * area", "test_solvers",
            "^solvers:.*(patch|linear|[Cc]ollocation)"),
     Mutant("neo-Hookean law: energy", "solvers/elasticity/neo_hookean.inl",
-           "0.5 * shear * (shape * trace - 3.0)", "0.6 * shear * (shape * trace - 3.0)", "test_elasticity", "^solvers:.*([Ll]aw|energy)"),
+           "0.5 * shear * (shape * trace - 3.0)", "0.6 * shear * (shape * trace - 3.0)", "test_elasticity",
+           "^solvers:.*([Ll]aw|energy)"),
     Mutant("interaction integral: curvature of the front", "solvers/fracture/stress_intensity.cpp",
            "+ 2 * c * here(2, 0)", "+ c * here(2, 0)", "test_solvers", "^solvers:.*([Ii]ntensit|integral)"),
     Mutant("sight lines: edge of a triangle", "topology/incision/incision.cpp",
-           "u + v <= 1 + slack", "u + v <= 0.999 + slack", "test_topology", "^topology:.*([Ss]ight|block|[Ii]ncision|sheet)"),
+           "u + v <= 1 + slack", "u + v <= 0.999 + slack", "test_topology",
+           "^topology:.*([Ss]ight|block|[Ii]ncision|sheet)"),
     Mutant("condensed contact: side of a candidate", "solvers/algebra/linear_complementarity.cpp",
            "open[k] < -tolerance", "open[k] < -tolerance - 1e-6", "test_solvers",
            "^solvers:.*([Cc]omplement|[Cc]ontact|press)"),
@@ -63,8 +64,15 @@ def survives(mutant, build):
 
 
 def main():
-    build, chosen = sys.argv[1], [int(number) for number in sys.argv[2:]] or range(1, len(MUTANTS) + 1)
-    mutants = [MUTANTS[number - 1] for number in chosen]
+    numbers = range(1, len(MUTANTS) + 1)
+    parser = argparse.ArgumentParser(description="Changes one place of a kernel at a time; does some test notice?")
+    parser.add_argument("build", help="a configured build folder, such as build/release")
+    parser.add_argument("number", nargs="*", type=int, choices=numbers, help="of the mutants in this file; all of them")
+    arguments = parser.parse_args()
+    build = arguments.build
+    if not (pathlib.Path(build) / "CMakeCache.txt").is_file():
+        parser.error(f"{build} is not a configured build folder")
+    mutants = [MUTANTS[number - 1] for number in arguments.number or numbers]
     survivors = [mutant for mutant in mutants if survives(mutant, build)]
     for program in sorted({mutant.program for mutant in mutants}):
         subprocess.run(["cmake", "--build", build, "--target", program], check=True, stdout=subprocess.DEVNULL)
