@@ -67,9 +67,12 @@ def main():
     numbers = range(1, len(MUTANTS) + 1)
     parser = argparse.ArgumentParser(description="Changes one place of a kernel at a time; does some test notice?")
     parser.add_argument("build", help="a configured build folder, such as build/release")
-    parser.add_argument("number", nargs="*", type=int, choices=numbers, help="of the mutants in this file; all of them")
+    parser.add_argument("number", nargs="*", type=int, help="of the mutants in this file; all of them")
     arguments = parser.parse_args()
     build = arguments.build
+    for number in arguments.number:
+        if number not in numbers:
+            parser.error(f"there is no mutant {number}; allowed: 1 to {len(MUTANTS)}")
     if not (pathlib.Path(build) / "CMakeCache.txt").is_file():
         parser.error(f"{build} is not a configured build folder")
     mutants = [MUTANTS[number - 1] for number in arguments.number or numbers]
