@@ -1,6 +1,7 @@
 #include "src/model/organ_walls.hpp"
 
 #include "src/model/wall_bending.hpp"
+#include "topology/incision/gap_walls.hpp"
 
 #include <algorithm>
 #include <array>
@@ -113,18 +114,17 @@ std::optional<CoarseWall> coarsest_wall(const OrganWalls& walls, const solvers::
 }
 
 std::optional<WidthAt> stiff_gap(const OrganWalls& walls, const solvers::SpacingField& spacing) {
-  constexpr double least_area = 0.5; // of the squared spacing, on both sides together: less is roughness
-  double area = 0;                   // in squared spacings
+  double area = 0; // in squared spacings
   std::optional<WidthAt> narrowest;
   for (const topology::WidthSample& gap : walls.widths.gaps) {
     const double h = spacing(gap.point);
-    if (!gap.is_parallel || gap.width < 0.5 * h || gap.width > 2 * h)
+    if (!gap.is_parallel || gap.width < 0.5 * h || gap.width > topology::widest_gap * h)
       continue;
     area += gap.area / (h * h);
     if (!narrowest || gap.width < narrowest->width)
       narrowest = WidthAt{gap.width, gap.point};
   }
-  return area >= least_area ? narrowest : std::nullopt;
+  return area >= topology::least_gap_area ? narrowest : std::nullopt;
 }
 
 std::string bending_error(double nodes_through, solvers::Method method) {

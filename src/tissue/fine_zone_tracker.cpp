@@ -18,7 +18,6 @@ namespace spherecut::app {
 namespace {
 
 constexpr double least_nodes_through = 1; // spacings through a wall, below which nothing is computed
-constexpr double widest_gap = 2;          // spacings: spheres do not reach over wider ones (gap_walls.hpp)
 // In fine spacings:
 constexpr double contact_crowded_by_sheet = 0.3; // nearer to a sheet no node of a contact is put
 constexpr double zone_ahead = 1;                 // so far ahead of a front that may tear nodes are fine beforehand
@@ -30,7 +29,7 @@ constexpr double moved_near = 1;                 // a front this near to what is
 // Where neither the coarsest spacing nor a number of nodes is given, the derived one follows the walls.
 FineZoneTracker::FineZoneTracker(const Scenario& scenario, std::shared_ptr<const topology::Domain> domain)
     : scenario_(scenario), domain_(std::move(domain)), zone_(fine_zone(scenario, *domain_)),
-      walls_(measure_walls(*domain_, zone_.spacing.coarse / 3, widest_gap * zone_.spacing.coarse)) {
+      walls_(measure_walls(*domain_, zone_.spacing.coarse / 3, topology::widest_gap * zone_.spacing.coarse)) {
   if (scenario_.nodes.coarse_spacing <= 0 && scenario_.nodes.count <= 0)
     follow_walls(walls_, *domain_, wall_budget, zone_.spacing);
 }

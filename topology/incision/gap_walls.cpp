@@ -16,9 +16,7 @@ namespace spherecut::topology {
 
 namespace {
 
-constexpr double widest_gap = 2;      // spacings: wider ones part the spheres by themselves, or nearly so
 constexpr double out_of_gap = 3;      // spacings: spheres that have grown reach no farther
-constexpr double least_area = 0.5;    // of the squared spacing: what is smaller is roughness
 constexpr double longest_edge = 0.5;  // of a wall, in spacings
 constexpr double into_bottom = 1e-3;  // spacings
 constexpr double blunt = 0.6;         // spacings: the bottom of a wider gap is no front of a crack
@@ -351,7 +349,7 @@ std::shared_ptr<const Incision> gap_walls(const std::shared_ptr<const Domain>& d
   std::vector<SurfaceMesh> walls;
   std::vector<Vector3> taken; // middles of the walls that there are
   for (const auto& [size, p] : sizes) {
-    if (relative[p] < least_area)
+    if (relative[p] < least_gap_area)
       continue;
     GapWall wall(triangles_of(sides, [&, patch = p](int t) { return patch_of[t] == patch; }), rays, spacing);
     if (wall.empty())

@@ -7,6 +7,11 @@
 
 namespace spherecut::topology {
 
+/// Spacings: wider gaps part the spheres by themselves, or nearly so.
+inline constexpr double widest_gap = 2;
+/// Of the squared spacing: a smaller patch is roughness.
+inline constexpr double least_gap_area = 0.5;
+
 /// Sheets in the middle of the body's narrow gaps, as walls of an incision without cuts. A gap is narrow where a ray
 /// out of the surface meets the surface again within two spacings and the two sides face each other within 25 degrees;
 /// patches of less than half a squared spacing are roughness and count for nothing. A sheet stands half way between the
