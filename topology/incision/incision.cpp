@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <iterator>
 #include <mutex>
+#include <span>
 #include <utility>
 
 namespace spherecut::topology {
@@ -106,6 +107,69 @@ struct Blockers {
   }
 };
 
+/// A way from one eye over a place of the front to the other one.
+struct WayOver {
+  double length = 0, share = 0; // m; place on the segment, 0 to 1
+  int segment = -1;
+  Vector3 over = Vector3::Zero(); // m
+};
+
+/// The shorter ways, no more than fit, and of those beside one another that come in succession the shortest alone.
+/// Their memory is a thread's own.
+class ShortestWays {
+ public:
+  static constexpr std::size_t most = 64;
+  /// Ways no farther apart than `beside` m are beside one another.
+  void clear(double beside) {
+    squared_beside_ = beside * beside;
+    count_ = 0;
+    has_last_ = false;
+  }
+  void add(const WayOver& way) {
+    if (has_last_ && are_beside(way, last_)) {
+      if (is_shorter(way, last_))
+        last_ = way;
+      return;
+    }
+    keep_last();
+    last_ = way;
+    has_last_ = true;
+  }
+  /// A way of that length, m, or longer is not wanted.
+  [[nodiscard]] double limit(double otherwise) const { return count_ == most ? ways_.front().length : otherwise; }
+  /// The shortest first. The next call is clear().
+  std::span<WayOver> in_order() {
+    keep_last();
+    std::sort_heap(ways_.begin(), end(), is_shorter);
+    return {ways_.data(), count_};
+  }
+  [[nodiscard]] bool are_beside(const WayOver& a, const WayOver& b) const {
+    return (a.over - b.over).squaredNorm() <= squared_beside_;
+  }
+
+ private:
+  static bool is_shorter(const WayOver& a, const WayOver& b) {
+    return a.length != b.length ? a.length < b.length : a.segment < b.segment;
+  }
+  std::array<WayOver, most + 1>::iterator end() { return ways_.begin() + static_cast<std::ptrdiff_t>(count_); }
+  void keep_last() {
+    if (!has_last_)
+      return;
+    has_last_ = false;
+    ways_[count_++] = last_;
+    std::push_heap(ways_.begin(), end(), is_shorter);
+    if (count_ > most) {
+      std::pop_heap(ways_.begin(), end(), is_shorter);
+      --count_;
+    }
+  }
+  std::array<WayOver, most + 1> ways_; // a heap, the longest first
+  WayOver last_;                       // not in the heap yet
+  bool has_last_ = false;
+  std::size_t count_ = 0;
+  double squared_beside_ = 0; // m2
+};
+
 /// What a thread has found out about the eyes that it looked from last.
 class EyeMemory {
  public:
@@ -114,6 +178,7 @@ class EyeMemory {
     std::uint64_t incision = 0;
     Blockers before, before_lifted;
   };
+  ShortestWays ways; // of the detour that is looked for
   /// Of an eye on an incision by its number; empty where the eye is new.
   Entry& of(const Vector3& at, std::uint64_t incision) {
     std::uint64_t hash = incision;
@@ -462,33 +527,40 @@ bool Incision::hides_blocked(const Eye& x, const Eye& y) const {
   return data_->is_known_to_block(x.lifted, y.lifted, known) || data_->blocks_anew(x.lifted, y.lifted, known);
 }
 
-std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach, int first) const {
-  const Data& data = *data_;
+/// Ways between two eyes over the front, no longer than `reach` m.
+struct Incision::DetourSearch {
   // A cut made in small steps is rough: from a point on its face the front hides behind bumps much lower than the
   // sheet is wide. Lifted off the face it looks at a place a little ahead of the front, where both sides meet; by so
   // little that no leg leaves the ellipsoid of the ways up to `reach` by more than the eyes are lifted.
-  constexpr double most_ahead = 0.15;
+  static constexpr double most_ahead = 0.15;
   // A line to the front ends a thousandth of the way before it, where the border itself is.
-  constexpr double pulled_in = 1e-3;
-  // Of two eyes at one place in the memory the second has lists of its own.
-  EyeMemory::Entry& of_x = eye_memory_of_this_thread().of(x.at, data.number);
-  EyeMemory::Entry& of_y = eye_memory_of_this_thread().of(y.at, data.number);
-  EyeMemory::Entry own_x;
-  EyeMemory::Entry& known_x = &of_x == &of_y ? own_x : of_x;
+  static constexpr double pulled_in = 1e-3;
+  // Of `reach`. A way so near to one that is blocked is not looked at: a sphere that is large beside the segments of
+  // the front has hundreds of them.
+  static constexpr double beside = 0.03;
+
   struct Line {
     const Eye& eye;
     EyeMemory::Entry& known;
     Vector3 to, lifted_to;
     bool is_blocked, is_lifted_blocked; // by a known triangle
   };
-  const auto line_from = [&](const Eye& eye, EyeMemory::Entry& known, const Vector3& over, const Vector3& ahead) {
+
+  DetourSearch(const Data& of, const Eye& from, const Eye& to, double longest)
+      : data(of), x(from), y(to), reach(longest), at_x(single(x.at - data.front_tree.origin())),
+        at_y(single(y.at - data.front_tree.origin())), of_x(eye_memory_of_this_thread().of(x.at, data.number)),
+        of_y(eye_memory_of_this_thread().of(y.at, data.number)) {}
+
+  [[nodiscard]] Line line_from(const Eye& eye, EyeMemory::Entry& known, const Vector3& over,
+                               const Vector3& ahead) const {
     Line line{eye, known, over + pulled_in * (eye.at - over), over + ahead, false, true};
     line.is_blocked = data.is_known_to_block(eye.at, line.to, known.before);
     if (line.is_blocked && eye.on_face())
       line.is_lifted_blocked = data.is_known_to_block(eye.lifted, line.lifted_to, known.before_lifted);
     return line;
-  };
-  const auto is_free = [&](const Line& way) {
+  }
+
+  [[nodiscard]] bool is_free(const Line& way) const {
     if (!way.is_blocked && !data.blocks_anew(way.eye.at, way.to, way.known.before))
       return true;
     if (!way.eye.on_face())
@@ -497,62 +569,93 @@ std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach,
       return !way.is_lifted_blocked && !data.blocks_anew(way.eye.lifted, way.lifted_to, way.known.before_lifted);
     return !data.is_known_to_block(way.eye.lifted, way.lifted_to, way.known.before_lifted) &&
            !data.blocks_anew(way.eye.lifted, way.lifted_to, way.known.before_lifted);
-  };
-  const auto is_clear = [&](int segment, double share, const Vector3& over, double way) {
-    const FrontPiece& piece = data.pieces[segment];
-    const Vector3 ahead =
-        std::min(most_ahead * reach, 0.5 * (reach - way)) * ((1 - share) * piece.from.ahead + share * piece.to.ahead);
-    const Line from_x = line_from(x, known_x, over, ahead);
+  }
+
+  bool is_clear(const WayOver& way) {
+    // Of two eyes at one place in the memory the second has lists of its own.
+    EyeMemory::Entry& known_x = &of_x == &of_y ? own_x : of_x;
+    const FrontPiece& piece = data.pieces[way.segment];
+    const Vector3 ahead = std::min(most_ahead * reach, 0.5 * (reach - way.length)) *
+                          ((1 - way.share) * piece.from.ahead + way.share * piece.to.ahead);
+    const Line from_x = line_from(x, known_x, way.over, ahead);
     if (from_x.is_blocked && from_x.is_lifted_blocked)
       return false;
-    const Line from_y = line_from(y, of_y, over, ahead);
+    const Line from_y = line_from(y, of_y, way.over, ahead);
     return !(from_y.is_blocked && from_y.is_lifted_blocked) && is_free(from_x) && is_free(from_y);
-  };
-  const Eigen::Vector3f at_x = single(x.at - data.front_tree.origin()), at_y = single(y.at - data.front_tree.origin());
-  const auto bound = [&](const BoxTree::Boxes& boxes) -> BoxTree::Four {
-    return boxes.squared_distance(at_x).sqrt() + boxes.squared_distance(at_y).sqrt();
-  };
-  const auto shortest = [&](const auto& accept) {
-    Detour detour;
-    bool found = false;
-    const auto look_at = [&](int segment, double best) {
-      const auto& [from, to, sheet] = data.front[segment];
-      // Unfolded about the segment's line x and y lie on either side of it; the way crosses it on a straight line.
-      const auto& [direction, length] = data.front_lines[segment];
-      const Vector3 to_x = x.at - from, to_y = y.at - from;
-      const double along_x = direction.dot(to_x), along_y = direction.dot(to_y);
-      const double off_x = (to_x - along_x * direction).norm(), off_y = (to_y - along_y * direction).norm();
-      // No way over the whole line is shorter than that.
-      const double sum = off_x + off_y, shift = along_x - along_y;
-      if ((sum * sum + shift * shift) * (1 - 1e-12) > best * best)
-        return best;
-      const double crossing = off_x + off_y > 0 ? (along_x * off_y + along_y * off_x) / (off_x + off_y) : along_x;
-      const double share = std::clamp(crossing / length, 0.0, 1.0);
-      const Vector3 over = from + share * (to - from);
-      const double way = (x.at - over).norm() + (over - y.at).norm();
-      if (way >= best || !accept(segment, share, over, way))
-        return best;
-      detour.over = over;
-      found = true;
-      return way;
-    };
-    const double beyond = std::nextafter(reach, std::numeric_limits<double>::infinity());
-    detour.length =
-        data.front_tree.least(first >= 0 ? look_at(first, beyond) : beyond, bound,
-                              [&](int place, double best) { return look_at(data.front_tree.order()[place], best); });
-    return found ? std::optional(detour) : std::nullopt;
-  };
+  }
+
+  /// The shortest way over a segment, where it is shorter than `most` m.
+  [[nodiscard]] std::optional<WayOver> way_over(int segment, double most) const {
+    const auto& [from, to, sheet] = data.front[segment];
+    // Unfolded about the segment's line x and y lie on either side of it; the way crosses it on a straight line.
+    const auto& [direction, length] = data.front_lines[segment];
+    const Vector3 to_x = x.at - from, to_y = y.at - from;
+    const double along_x = direction.dot(to_x), along_y = direction.dot(to_y);
+    const double off_x = (to_x - along_x * direction).norm(), off_y = (to_y - along_y * direction).norm();
+    // No way over the whole line is shorter than that.
+    const double sum = off_x + off_y, shift = along_x - along_y;
+    if ((sum * sum + shift * shift) * (1 - 1e-12) > most * most)
+      return std::nullopt;
+    const double crossing = off_x + off_y > 0 ? (along_x * off_y + along_y * off_x) / (off_x + off_y) : along_x;
+    const double share = std::clamp(crossing / length, 0.0, 1.0);
+    const Vector3 over = from + share * (to - from);
+    const double way = (x.at - over).norm() + (over - y.at).norm();
+    return way < most ? std::optional(WayOver{way, share, segment, over}) : std::nullopt;
+  }
+
+  /// Calls visit(segment, most) for segments over which a way may be shorter than `most` m, which it returns for the
+  /// next ones.
+  template <class Visit>
+  void for_segments(double most, const Visit& visit) const {
+    static_cast<void>(data.front_tree.least(
+        most,
+        [&](const BoxTree::Boxes& boxes) -> BoxTree::Four {
+          return boxes.squared_distance(at_x).sqrt() + boxes.squared_distance(at_y).sqrt();
+        },
+        [&](int place, double best) { return visit(data.front_tree.order()[place], best); }));
+  }
+
+  const Data& data;
+  const Eye &x, &y;
+  double reach;
+  Eigen::Vector3f at_x, at_y;
+  EyeMemory::Entry &of_x, &of_y;
+  EyeMemory::Entry own_x{};
+};
+
+std::optional<Detour> Incision::detour(const Eye& x, const Eye& y, double reach, int first) const {
+  DetourSearch search(*data_, x, y, reach);
+  const double beyond = std::nextafter(reach, std::numeric_limits<double>::infinity());
   // Mostly the shortest way of all is clear: then no other need be looked at.
-  int segment = -1;
-  double share = 0;
-  auto any = shortest([&](int s, double at, const Vector3& /*over*/, double /*way*/) {
-    segment = s;
-    share = at;
-    return true;
+  std::optional<WayOver> any;
+  const auto keep_shortest = [&](int segment, double best) {
+    const std::optional<WayOver> way = search.way_over(segment, best);
+    any = way ? way : any;
+    return way ? way->length : best;
+  };
+  search.for_segments(first >= 0 ? keep_shortest(first, beyond) : beyond, keep_shortest);
+  if (!any)
+    return std::nullopt;
+  if (search.is_clear(*any))
+    return Detour{any->length, any->over};
+  ShortestWays& ways = eye_memory_of_this_thread().ways;
+  ways.clear(DetourSearch::beside * reach);
+  search.for_segments(beyond, [&](int segment, double best) {
+    if (const std::optional<WayOver> way = search.way_over(segment, best))
+      ways.add(*way);
+    return ways.limit(best);
   });
-  if (!any || is_clear(segment, share, any->over, any->length))
-    return any;
-  return shortest(is_clear);
+  const std::span<WayOver> in_order = ways.in_order();
+  std::size_t blocked = 0; // these come first
+  for (const WayOver& way : in_order) {
+    if (std::any_of(in_order.begin(), in_order.begin() + static_cast<std::ptrdiff_t>(blocked),
+                    [&](const WayOver& other) { return ways.are_beside(way, other); }))
+      continue;
+    if (search.is_clear(way))
+      return Detour{way.length, way.over};
+    in_order[blocked++] = way;
+  }
+  return std::nullopt;
 }
 
 } // namespace spherecut::topology

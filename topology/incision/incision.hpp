@@ -117,11 +117,14 @@ class Incision {
 
   /// Shortest detour around the front no longer than `reach` m, both of whose legs are clear; nullopt when there is
   /// none. Meant for x and y that do not see each other. The search is short when it begins at the `first` segment of
-  /// the front and that lies near the way; of ways as short the one over it counts.
+  /// the front and that lies near the way; of ways as short the one over it counts. Where the shortest way is blocked,
+  /// the next ones are looked at, 64 at most, each 0.03 of `reach` away from those that were blocked: a clear way up to
+  /// that much shorter may be passed over.
   [[nodiscard]] std::optional<Detour> detour(const Eye& x, const Eye& y, double reach, int first = -1) const;
 
  private:
   struct Data;
+  struct DetourSearch;
   std::unique_ptr<const Data> data_;
 };
 

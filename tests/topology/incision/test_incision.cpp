@@ -1,4 +1,5 @@
 #include "topology/incision/incision.hpp"
+#include "topology/incision/sight_work.hpp"
 
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/sheets.hpp"
@@ -437,6 +438,29 @@ TEST_CASE("A detour whose legs another sheet blocks is not taken", "[incision]")
   REQUIRE(detour);
   CHECK(detour->length > open.detour(x, y, 1)->length + 0.1);
   CHECK_FALSE(walled.blocks(x, x + 0.999 * (detour->over - x)));
+}
+
+TEST_CASE("However fine the front is, a detour far from the shortest way is found with bounded work", "[incision]") {
+  const Vector3 x(0.55, 0.5, 0.55), y(0.55, 0.5, 0.45);
+  const SurfaceMesh wall = rectangle(Vector3(0.58, 0.1, 0.505), Vector3(0, 0.8, 0), Vector3(0, 0, 0.2), 3, 3);
+  const auto walled = [&](int cells) {
+    return Incision({rectangle(Vector3(0.2, 0.2, 0.5), Vector3(0.4, 0, 0), Vector3(0, 0.6, 0), cells, cells), wall},
+                    unit_box());
+  };
+  const auto coarse = walled(6).detour(x, y, 2);
+  REQUIRE(coarse);
+  for (const int cells : {30, 150}) {
+    CAPTURE(cells);
+    const Incision fine = walled(cells);
+    const std::uint64_t before = sight_lines_walked();
+    const auto detour = fine.detour(x, y, 2);
+    CHECK(sight_lines_walked() - before <= 2 * 65);
+    REQUIRE(detour);
+    CHECK(detour->length >= coarse->length - 1e-9);         // all are as short or longer than the shortest clear one
+    CHECK(detour->length <= coarse->length + 2 * 0.03 * 2); // by what the places that are looked at lie apart
+    CHECK_FALSE(fine.blocks(x, x + 0.999 * (detour->over - x)));
+    CHECK_FALSE(fine.blocks(y, y + 0.999 * (detour->over - y)));
+  }
 }
 
 TEST_CASE("Queries do not allocate after a thread's first", "[incision]") {
