@@ -15,10 +15,10 @@ namespace spherecut::app {
 namespace {
 
 // In units of the fine spacing:
-constexpr double tear_smoothing = 1; // length along the front over which motions are averaged
-constexpr double tear_slope = 2;     // by which they differ for each unit of G / G_c, at most
-constexpr double bridge = 4;         // a front shorter than this, too near to the surface for intensities, gives way
-constexpr double bridge_step = 3;    // by this in one increment
+constexpr double smoothing = 1;   // length along the front over which motions are averaged
+constexpr double slope = 2;       // by which they differ for each unit of G / G_c, at most
+constexpr double bridge = 4;      // a front shorter than this, too near to the surface for intensities, gives way
+constexpr double bridge_step = 3; // by this in one increment
 // Of the longest step:
 constexpr double first_step = 0.5, least_step = 0.2; // while the decay of G is not known; where it is
 constexpr double told = 0.5;        // increments at least so long tell the decay, and whether growth is unstable
@@ -244,7 +244,7 @@ std::vector<solvers::FrontState> acting(std::vector<solvers::FrontState> states,
 /// How far each of the places moves, m.
 std::vector<double> advances(const std::vector<solvers::FrontState>& places,
                              const std::vector<solvers::FrontState>& moving, double longest, double fine) {
-  const auto motion = solvers::tear_motion(moving, longest, tear_smoothing * fine, tear_slope * fine);
+  const auto motion = solvers::tear_motion(moving, longest, smoothing * fine, slope * fine);
   std::vector<double> result;
   result.reserve(places.size());
   for (const solvers::FrontState& place : places)

@@ -7,10 +7,10 @@
 namespace spherecut::app {
 namespace {
 
-constexpr int aside_niceness = 5; // above that of the steps: where they share a core the steps go first
+constexpr int niceness = 5; // above that of the steps: where they share a core the steps go first
 
 void yield_to_steps() {
-  static_cast<void>(setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + aside_niceness)); // this thread's
+  static_cast<void>(setpriority(PRIO_PROCESS, 0, getpriority(PRIO_PROCESS, 0) + niceness)); // this thread's
 }
 
 bool is_ready(const std::future<MadeAside>& made) {

@@ -20,7 +20,7 @@ namespace {
 // making the window takes in place of the latter: 0.46, 0.95 and 1.7 s where it holds a quarter (1600 nodes), 0.35,
 // 0.34 and 0.55 s at 0.54 (590 nodes), 1.25, 1.4 and 2.9 s at two thirds (1380 nodes). A window serves
 // as many updates as fit into its zone: one of a spacing, three of a half, six of a quarter.
-constexpr double largest_tear_share = 0.5;
+constexpr double largest_share = 0.5;
 constexpr const char* spacing_changed = "the spacing has changed";
 
 } // namespace
@@ -84,7 +84,7 @@ void BodyUpdater::lead_zone(const topology::Incision& incision, CutGrowth& growt
       return "";
     if (way.triangles.empty())
       return "no front that has moved goes on";
-    if (solvers::window_share(model_.body->problem(), scenario_.method, way) > largest_tear_share)
+    if (solvers::window_share(model_.body->problem(), scenario_.method, way) > largest_share)
       return too_much_of_body;
     return can_follow(scenario_, model_, way) ? "" : "too many nodes for a window by this method";
   };

@@ -11,7 +11,7 @@
 namespace spherecut::app {
 namespace {
 
-constexpr int solver_niceness = 5; // the viewer that draws beside the solver goes before it
+constexpr int niceness = 5; // the viewer that draws beside the solver goes before it
 
 } // namespace
 
@@ -61,7 +61,7 @@ void LiveSession::run() {
   options.keep = false;
   options.solve_at_rest = false;
   options.follow_aside = true;
-  options.niceness = solver_niceness;
+  options.niceness = niceness;
   // Between solves the tangent force is that of the body all the same; more of them than pictures are of no use, and
   // the viewer may need the processor.
   if (scenario_.haptics.model == ForceModelKind::tangent)

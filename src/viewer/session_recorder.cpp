@@ -8,7 +8,7 @@
 namespace spherecut::app {
 namespace {
 
-constexpr std::uint64_t recording_flush_ticks = 256;     // between two writes of a recording
+constexpr std::uint64_t flush_ticks = 256;               // between two writes of a recording
 constexpr std::uint64_t most_recorded_ticks = 3'600'000; // an hour: then it ends
 
 } // namespace
@@ -41,7 +41,7 @@ void SessionRecorder::add(const TickRecord& record) {
   const bool full = record.device.tick >= most_recorded_ticks;
   try {
     writer_->add(record);
-    if (record.device.tick % recording_flush_ticks == recording_flush_ticks - 1)
+    if (record.device.tick % flush_ticks == flush_ticks - 1)
       writer_->flush();
   } catch (const InputError& error) {
     failures_.add(fmt::format("the recording has ended: {}", error.what()));
