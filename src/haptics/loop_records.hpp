@@ -43,7 +43,7 @@ struct SolveRecord {
   bool failed = false;
   std::string reason; // of the failure
   bool resprinkled = false;
-  double force_jump = 0; // by that, as a share of the force; 0 where it was made beside the steps
+  double force_jump = 0; // by that, as a share of the force; 0 where it was made in the background
   int cut_triangles = 0, nodes = 0, candidates = 0, active = 0;
   std::uint64_t topology = 0;               // of cut surface and nodes, as ContactSnapshot::topology
   double asymmetry = 0;                     // of the compliance

@@ -20,7 +20,7 @@ class DegradationRule {
   explicit DegradationRule(double budget) : budget_(budget) {}
   [[nodiscard]] int level() const { return level_; }
   void rebuilt(double seconds);
-  /// What a solve of so many seconds did: a body that was made beside the solves counts as within a third of the budget
+  /// What a solve of so many seconds did: a body that was made in the background counts as within a third of the budget
   /// where it came early, else as within it.
   void solved(Rebuild rebuild, double seconds);
 

@@ -123,7 +123,7 @@ bool BladeCutting::cut(const StepSample& sample, bool places, CutReport& report)
   return false;
 }
 
-// The body with what has been cut, in the step or beside the steps. True: it is there and solved.
+// The body with what has been cut, in the step or in the background. True: it is there and solved.
 bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_rest,
                          std::optional<topology::Wound> wound_before, CutReport& report) {
   BodyModel next = updater_.next();

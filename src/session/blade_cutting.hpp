@@ -17,7 +17,7 @@ class BladeCutting {
   /// and wound as they were. True: a body with a new cut has been solved.
   bool move(const StepSample& sample, CutReport& report);
 
-  /// The cut that is made beside the steps takes over, after waiting for it; the next step tells of it. Where its body
+  /// The cut that is made in the background takes over, after waiting for it; the next step tells of it. Where its body
   /// could not be made the cut is refused: false.
   bool take();
   /// The same in a step, which solves that body.

@@ -239,7 +239,7 @@ std::optional<BodyModel> ResistedBlade::build(const std::vector<topology::BladeP
   }
 }
 
-// The same, built beside the steps.
+// The same, built in the background.
 void ResistedBlade::build_aside(const std::vector<topology::BladePose>& poses, const StepSample& sample,
                                 CutReport& report) {
   try {

@@ -34,7 +34,7 @@ class ResistedBlade {
   [[nodiscard]] bool has_proposal() const { return mark_.has_value(); }
   /// The cut has grown otherwise: the blade meets the body as it is now, and nothing is proposed.
   void meet_again() { force_.meet_again(state_.model); }
-  /// Whether it is left so far behind its pose that there is a cut to come, which is made beside the steps.
+  /// Whether it is left so far behind its pose that there is a cut to come, which is made in the background.
   [[nodiscard]] bool lags_aside() const { return proposes_aside() && force_.lags(); }
 
  private:

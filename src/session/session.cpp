@@ -269,7 +269,7 @@ void Session::prepare(const StepSample& sample) {
   if (of.state.touch && !of.state.scenario.tool->grasp && model.patch.nodes.empty())
     of.contact.condense(of.contact.candidates(model), model);
   if (of.policy() != CutPolicy::in_step_ahead || of.state.scenario.blade->advance.value_or(1) > 0)
-    return; // in the loop it may be made beside the steps
+    return; // in the loop it may be made in the background
   StepSample meeting = sample;
   if (!meeting.blade)
     if (const auto first = std::find_if(steps().begin(), steps().end(), [](const StepSample& s) { return !!s.blade; });

@@ -1,4 +1,4 @@
-// Fine nodes go along with the tool: in the step, or on a body made beside the steps.
+// Fine nodes go along with the tool: in the step, or on a body made in the background.
 #pragma once
 
 #include "src/session/step_result.hpp"
@@ -15,7 +15,7 @@ class ToolFollowing {
 
   /// The fine zone goes to where the contact is, and the body is built and solved there.
   void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
-  /// The same beside the steps: begins that, or takes it over once the contact has left the zone.
+  /// The same in the background: begins that, or takes it over once the contact has left the zone.
   void follow_aside(const StepSample& sample, const topology::SurfaceContact& centre);
   /// The body that has followed the tool takes over, after waiting for it. Throws what making it has thrown; the body
   /// is then as it was.

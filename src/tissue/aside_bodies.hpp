@@ -1,4 +1,4 @@
-// Bodies made beside the steps, on threads of their own: the body as it is goes on meanwhile.
+// Bodies made in the background, on threads of their own: the body as it is goes on meanwhile.
 #pragma once
 
 #include "src/tissue/cut_report.hpp"
@@ -9,7 +9,7 @@
 
 namespace spherecut::app {
 
-/// A body that was made beside the steps, and how.
+/// A body that was made in the background, and how.
 struct MadeAside {
   BodyModel model;
   BodyUpdate report;

@@ -1,6 +1,6 @@
 // The ways in which the body of a session comes about: built, following its cut by an update, built anew behind it,
 // taken back. Of a cut, a blade's or a tear's, nodes beside what is new are exchanged and the system is updated where
-// it is touched; where that cannot be, or does not pay, it is built anew. What is made beside the steps is described
+// it is touched; where that cannot be, or does not pay, it is built anew. What is made in the background is described
 // here too (AsideBodies), and a body that has been condensed anew there (WindowRenewal) takes over here.
 #pragma once
 
@@ -27,7 +27,7 @@ class BodyUpdater {
   [[nodiscard]] BodyModel next() const;
   /// Nodes of a model: fresh ones, or those of `previous` that still fit and new ones.
   void sprinkle(const solvers::NodeCloud* previous, BodyModel& model) const;
-  /// Assembles and condenses the body on the model's nodes. What is under way beside the steps is dropped.
+  /// Assembles and condenses the body on the model's nodes. What is under way in the background is dropped.
   void build(BodyModel& model);
   /// Assembles it alone, for a way of the cut ahead (no triangles: none) and for these candidates.
   void assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near);

@@ -20,7 +20,7 @@ struct SessionProfile {
 enum class Rebuild : std::uint8_t {
   none,
   in_step,     // it did that, or waited for it
-  aside,       // it took over what had been made beside the steps
+  aside,       // it took over what had been made in the background
   aside_early, // before the blade had gone a third of the way on which it need not wait
 };
 
