@@ -34,7 +34,8 @@ struct SolveEvent {
   std::uint64_t arrival_tick = never; // tick that first used it; never: overtaken by a newer one, failed, or too late
   int degradation = 0;
   bool swaps = false; // it takes over the body that has been made or condensed anew in the background
-  bool aside = false; // what follows the tool or a cut that is put off is made there (SessionOptions::following_aside)
+  /// What follows the tool or a cut that is put off is made there (SessionOptions::following_in_background).
+  bool in_background = false;
 };
 
 /// One solve, and what it did.

@@ -53,8 +53,8 @@ class HapticSimulation {
   [[nodiscard]] bool recondensed() const { return session_.pending().there; }
   void swap_body() { session_.swap_body(); }
   [[nodiscard]] bool has_put_off() const { return session_.pending().put_off; }
-  /// SessionOptions::following_aside.
-  void set_following_aside(bool on);
+  /// SessionOptions::following_in_background.
+  void set_following_in_background(bool on);
 
   /// Result of the last solve.
   [[nodiscard]] const StepResult& result() const { return result_; }

@@ -106,10 +106,11 @@ Energies energies(const BodyModel& model) {
   return energies;
 }
 
-TearPropagation::TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact, AsideBodies& aside,
-                                 BodyUpdater& updater, const TearFronts& fronts, ResistedBlade* blade)
-    : state_(state), grasping_(grasping), contact_(contact), aside_(aside), updater_(updater), fronts_(fronts),
-      blade_(blade) {}
+TearPropagation::TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact,
+                                 BackgroundBodies& background, BodyUpdater& updater, const TearFronts& fronts,
+                                 ResistedBlade* blade)
+    : state_(state), grasping_(grasping), contact_(contact), background_(background), updater_(updater),
+      fronts_(fronts), blade_(blade) {}
 
 // What the step has done so far. A blade's cut takes of what the loads release what its surface needs; the rest of
 // that, and what a grasper does that lets go, belongs to nobody.
@@ -209,7 +210,7 @@ void TearPropagation::build(const StepSample& sample, std::shared_ptr<const topo
     growth.renewed = "the piece in the grasper has come off";
     state_.log.warn("grip", fmt::format("t = {:g} s: the piece in the grasper has come off", sample.time));
   }
-  aside_.drop_following();
+  background_.drop_following();
   updater_.build_cut(growth, next, update);
   {
     const StageTimer timer(update.seconds.solve);

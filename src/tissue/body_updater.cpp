@@ -25,10 +25,10 @@ constexpr const char* spacing_changed = "the spacing has changed";
 
 } // namespace
 
-BodyUpdater::BodyUpdater(SessionState& state, ContactSolver& contact, const Grasping& grasping, AsideBodies& aside,
-                         WindowRenewal& renewal)
+BodyUpdater::BodyUpdater(SessionState& state, ContactSolver& contact, const Grasping& grasping,
+                         BackgroundBodies& background, WindowRenewal& renewal)
     : state_(state), scenario_(state.scenario), organ_(state.organ), model_(state.model), contact_(contact),
-      grasping_(grasping), aside_(aside), renewal_(renewal) {}
+      grasping_(grasping), background_(background), renewal_(renewal) {}
 
 BodyModel BodyUpdater::next() const {
   BodyModel next;
@@ -62,7 +62,7 @@ void BodyUpdater::build(BodyModel& model) {
 void BodyUpdater::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near) {
   const StageTimer timer(state_.profile.discretise);
   renewal_.drop();
-  aside_.drop_following();
+  background_.drop_following();
   app::assemble(scenario_, organ_.domain, model, way_ahead, near);
   const solvers::SprinkleReport& report = model.sprinkling.report;
   state_.log.say(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",
@@ -237,13 +237,13 @@ bool BodyUpdater::take_renewed() {
   return true;
 }
 
-AsideBodies::Make BodyUpdater::following_tool(const topology::SurfaceContact& centre) const {
+BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContact& centre) const {
   FineZoneTracker there = state_.zone;
   there.move_to(centre);
   return [&scenario = scenario_, domain = organ_.domain,
           how = there.sprinkle_options(model_.incision, grasping_.kept_nodes()), previous = model_.sprinkling.nodes,
           coarseness = state_.zone.coarseness(), centre, reach = state_.zone.zone().candidate_radius] {
-    MadeAside made;
+    BackgroundBody made;
     BodyModel& model = made.model;
     model.incision = how.incision;
     model.sprinkling = resprinkle_held(scenario, *domain, how, previous);
@@ -258,15 +258,15 @@ AsideBodies::Make BodyUpdater::following_tool(const topology::SurfaceContact& ce
 }
 
 // Rebuilt: no window pays that serves one increment.
-AsideBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const topology::Incision>& incision,
-                                             const char* reason) const {
+BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const topology::Incision>& incision,
+                                                  const char* reason) const {
   const std::string renewed = spacing_stays() ? state_.hindrance() : spacing_changed;
   const FineZoneTracker& zone = state_.zone;
   return [&scenario = scenario_, domain = organ_.domain, how = zone.sprinkle_options(incision, grasping_.kept_nodes()),
           incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, reason,
           coarseness = zone.coarseness(), centre = contact_.is_in_reach() ? zone.centre() : std::nullopt,
           reach = zone.zone().candidate_radius, facing = zone.facing()] {
-    MadeAside made;
+    BackgroundBody made;
     BodyModel& model = made.model;
     BodyUpdate& update = made.report;
     model.incision = how.incision;

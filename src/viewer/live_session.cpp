@@ -60,7 +60,7 @@ void LiveSession::run() {
   RealtimeOptions options;
   options.keep = false;
   options.solve_at_rest = false;
-  options.follow_aside = true;
+  options.follow_in_background = true;
   options.niceness = niceness;
   // Between solves the tangent force is that of the body all the same; more of them than pictures are of no use, and
   // the viewer may need the processor.

@@ -140,7 +140,7 @@ Scribbled scribble(unsigned seed, int each) {
   Scribbled out;
   ScribblingHand hand(seed);
   const std::vector<HandPoint> way = hand.scribbles(each);
-  const bool aside = seed % 2 == 0;
+  const bool in_background = seed % 2 == 0;
   HapticSimulation simulation(scenario_of(scribbled_block));
   const Session& session = simulation.session();
   const double whole = topology::volume(session.organ().domain->surface());
@@ -160,7 +160,7 @@ Scribbled scribble(unsigned seed, int each) {
   pose(0);
   simulation.prepare(device);
   SolveEvent event;
-  event.aside = aside;
+  event.in_background = in_background;
   ContactSnapshot snapshot;
   std::size_t next = 0;
   double area = 0;
