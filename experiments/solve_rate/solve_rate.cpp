@@ -217,7 +217,7 @@ Rate rate_by_the_clock(const Motion& motion, int steps, std::uint64_t period) {
   app::HapticSimulation simulation(motion.scenario);
   app::ScriptedPath device(motion.path, 1000);
   begin(simulation, device);
-  simulation.set_following_aside(true);
+  simulation.set_following_in_background(true);
   Rate rate;
   const std::uint64_t end = step_ticks * static_cast<std::uint64_t>(steps);
   const auto start = Clock::now();

@@ -473,7 +473,7 @@ void bind_session_steps(py::class_<RunningSession, std::shared_ptr<RunningSessio
            "On: steps leave out what only output needs: node_values(), the residual, the opening volume.")
       .def("set_recondensing", switch_of(&app::SessionOptions::recondensing), "on"_a,
            "On: a body that follows its cut is condensed anew beside the steps, on a thread of its own.")
-      .def("set_following_aside", switch_of(&app::SessionOptions::following_aside), "on"_a,
+      .def("set_following_aside", switch_of(&app::SessionOptions::following_in_background), "on"_a,
            "On: nodes that follow the tool, or a cut that was put off, are made beside the steps.")
       .def("set_tear_gradually", switch_of(&app::SessionOptions::tear_gradually), "on"_a,
            "On: a tear makes one increment a step at most.")

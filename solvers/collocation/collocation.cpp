@@ -15,8 +15,6 @@
 
 namespace spherecut::solvers {
 
-namespace {} // namespace
-
 double collocation_support_radius(const DiscretisationOptions& options) {
   return options.support_radius > 0 ? options.support_radius : default_collocation_radius;
 }

@@ -2,6 +2,7 @@
 
 #include "solvers/body/elastic_body.hpp"
 #include "solvers/fracture/inset_integral.hpp"
+#include "solvers/fracture/local_values.hpp"
 #include "solvers/shapes/functions.hpp"
 #include "topology/base/errors.hpp"
 
@@ -15,19 +16,6 @@ namespace spherecut::solvers {
 using topology::FrontFrame;
 
 namespace {
-
-double plane_strain_modulus(const Material& material) {
-  return material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
-}
-
-double spacing_at(const Discretisation& body, const Vector3& x) {
-  const NodeCloud& nodes = body.problem().nodes;
-  int best = 0;
-  for (int i = 1; i < nodes.size(); ++i)
-    if ((nodes.positions[i] - x).squaredNorm() < (nodes.positions[best] - x).squaredNorm())
-      best = i;
-  return nodes.spacings[best];
-}
 
 const topology::Incision& incision_of(const Discretisation& body) {
   if (body.problem().incision == nullptr)
@@ -87,7 +75,7 @@ std::vector<FrontFrame> front_samples(const topology::Incision& incision, double
 Intensities displacement_correlation(const Discretisation& body, const Field& field, const FrontFrame& front,
                                      const CorrelationOptions& options) {
   const topology::Incision& incision = incision_of(body);
-  const double h = spacing_at(body, front.point);
+  const double h = spacing_at(body.problem().nodes, front.point);
   Eigen::Matrix2d normal_matrix = Eigen::Matrix2d::Zero();
   Eigen::Matrix<double, 2, 3> right = Eigen::Matrix<double, 2, 3>::Zero();
   for (int k = 0; k < options.samples; ++k) {
@@ -201,7 +189,7 @@ class InteractionRule {
   InteractionRule(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
                   double inset_spacings)
       : incision_(incision_of(body)), problem_(body.problem()), front_(front), options_(options),
-        h_(spacing_at(body, front.point)), tube_(front, curvature_of(incision_, front, h_)),
+        h_(spacing_at(body.problem().nodes, front.point)), tube_(front, curvature_of(incision_, front, h_)),
         inset_(inset_spacings * h_) {
     size_tube();
     for (const auto& [s, ds] : along_front())

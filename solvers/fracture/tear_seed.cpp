@@ -1,5 +1,6 @@
 #include "solvers/fracture/tear_seed.hpp"
 
+#include "solvers/fracture/local_values.hpp"
 #include "topology/base/errors.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -13,10 +14,6 @@ namespace spherecut::solvers {
 namespace {
 
 constexpr double worth_a_look = 0.5; // of the strength: stress at a node below which its ball is not looked at
-
-double plane_modulus(const Material& material) {
-  return material.young_modulus / (1 - material.poisson_ratio * material.poisson_ratio);
-}
 
 /// Corners of an icosahedron and the middles of its faces, unit vectors.
 const std::vector<Vector3>& corners() {
@@ -54,11 +51,11 @@ PrincipalStress principal(const Matrix3& stress) {
 } // namespace
 
 double averaging_length(const Material& material, double toughness, double strength) {
-  return 2 * plane_modulus(material) * toughness / (std::numbers::pi * strength * strength);
+  return 2 * plane_strain_modulus(material) * toughness / (std::numbers::pi * strength * strength);
 }
 
 double seed_radius(const Material& material, double toughness, double strength) {
-  return 3 * std::numbers::pi * plane_modulus(material) * toughness / (8 * strength * strength);
+  return 3 * std::numbers::pi * plane_strain_modulus(material) * toughness / (8 * strength * strength);
 }
 
 PrincipalStress averaged_stress(const Discretisation& body, const Field& field, const Vector3& x, double radius) {

@@ -1,6 +1,7 @@
 #include "solvers/fracture/tearing.hpp"
 
 #include "solvers/fracture/inset_integral.hpp"
+#include "solvers/fracture/local_values.hpp"
 #include "topology/base/errors.hpp"
 
 #include <algorithm>
@@ -29,16 +30,6 @@ double driving_release_rate(const Material& material, const Intensities& k) {
 
 namespace {
 
-double spacing_near(const Problem& problem, const Vector3& x) {
-  double spacing = 0, nearest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < problem.nodes.size(); ++i)
-    if (const double d = (problem.nodes.positions[i] - x).squaredNorm(); d < nearest) {
-      nearest = d;
-      spacing = problem.nodes.spacings[i];
-    }
-  return spacing;
-}
-
 constexpr double deepest_inset = 1; // of the tube's shift from the surface, in units of the spacing
 constexpr double least_inset = 0.5; // nearer to the surface nodes do not resolve the field
 constexpr int along_inset = 8;      // points along the front where the shift varies fast
@@ -55,7 +46,7 @@ std::optional<IntensityRule> rule_at(const Discretisation& body, bool with_press
     }
   }
   const Problem& problem = body.problem();
-  const double depth = -problem.domain->signed_distance(frame.point) / spacing_near(problem, frame.point);
+  const double depth = -problem.domain->signed_distance(frame.point) / spacing_at(problem.nodes, frame.point);
   if (depth < least_inset)
     return std::nullopt;
   try {
@@ -70,7 +61,7 @@ std::optional<IntensityRule> rule_at(const Discretisation& body, bool with_press
 bool presses_behind(const Problem& problem, const FrontFrame& frame, const std::vector<Vector3>& closed) {
   if (closed.empty())
     return false;
-  const double reach = InteractionOptions{}.outer * spacing_near(problem, frame.point);
+  const double reach = InteractionOptions{}.outer * spacing_at(problem.nodes, frame.point);
   return std::any_of(closed.begin(), closed.end(), [&](const Vector3& x) {
     const Vector3 d = x - frame.point;
     return d.norm() < reach && d.dot(frame.ahead) < 0;
@@ -129,7 +120,7 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
         distance = d;
         state.intensities = states[k].intensities;
       }
-    state.by_integral = distance <= 3 * spacing_near(problem, state.frame.point);
+    state.by_integral = distance <= 3 * spacing_at(problem.nodes, state.frame.point);
     if (!state.by_integral) {
       try {
         state.intensities = displacement_correlation(body, field, state.frame);

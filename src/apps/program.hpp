@@ -46,7 +46,7 @@ std::string about_threads(const std::string& by_default);
 int pass_on(const std::string& name, char** arguments);
 
 /// What libraries below would wait for for ever, or end the program by: told before there is anything to lose. Bodies
-/// that are made beside the steps of a loop have threads of their own.
+/// that are made in the background of a loop have threads of their own.
 void require_resources(bool is_real_time);
 
 } // namespace spherecut::program

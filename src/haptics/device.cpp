@@ -8,7 +8,7 @@
 namespace spherecut::app {
 namespace {
 
-constexpr int hand_substeps = 10; // of the hand's motion in a tick
+constexpr int substeps = 10; // of the hand's motion in a tick
 
 void check_path(const std::vector<PathPose>& path, double rate) {
   if (path.empty())
@@ -121,9 +121,9 @@ DeviceState SimulatedHand::read(std::uint64_t tick) noexcept {
     position_ = leg_at(path_, settings_.rides_path ? now : path_.front().time, leg_).position();
     started_ = true;
   } else {
-    const double step = 1 / (rate_ * hand_substeps);
+    const double step = 1 / (rate_ * substeps);
     const Vector3 force = forces_[static_cast<std::size_t>(settings_.delay)];
-    for (int i = 0; i < hand_substeps; ++i) {
+    for (int i = 0; i < substeps; ++i) {
       Vector3 target = path_.front().position;
       Vector3 target_velocity = Vector3::Zero();
       if (settings_.rides_path) {

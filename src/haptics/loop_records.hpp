@@ -34,7 +34,8 @@ struct SolveEvent {
   std::uint64_t arrival_tick = never; // tick that first used it; never: overtaken by a newer one, failed, or too late
   int degradation = 0;
   bool swaps = false; // it takes over the body that has been made or condensed anew in the background
-  bool aside = false; // what follows the tool or a cut that is put off is made there (SessionOptions::following_aside)
+  /// What follows the tool or a cut that is put off is made there (SessionOptions::following_in_background).
+  bool in_background = false;
 };
 
 /// One solve, and what it did.
@@ -43,7 +44,7 @@ struct SolveRecord {
   bool failed = false;
   std::string reason; // of the failure
   bool resprinkled = false;
-  double force_jump = 0; // by that, as a share of the force; 0 where it was made beside the steps
+  double force_jump = 0; // by that, as a share of the force; 0 where it was made in the background
   int cut_triangles = 0, nodes = 0, candidates = 0, active = 0;
   std::uint64_t topology = 0;               // of cut surface and nodes, as ContactSnapshot::topology
   double asymmetry = 0;                     // of the compliance

@@ -122,7 +122,7 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
   const auto interval = options.most_solves > 0 ? static_cast<long long>(second / options.most_solves) : 0; // ns
   long long next = 0;                                                                                       // solve
   const Session& session = simulation.session();
-  const bool aside = options.follow_aside || session.scenario().blade;
+  const bool in_background = options.follow_in_background || session.scenario().blade;
   while (!shared.done.load(std::memory_order_acquire)) {
     if (!shared.poses.fetch()) {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
@@ -145,7 +145,8 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
     }
     next = began + (session.pending().under_way ? std::max(interval, second / solves_beside) : interval);
     solved = state;
-    const SolveEvent event{++sequence, state.tick, SolveEvent::never, rule.level(), simulation.recondensed(), aside};
+    const SolveEvent event{++sequence,   state.tick, SolveEvent::never, rule.level(), simulation.recondensed(),
+                           in_background};
     ContactSnapshot& snapshot = shared.snapshots.back();
     const SolveRecord record = solve_recording(simulation, state, event, snapshot);
     lost += shared.solves.push(record) ? 0 : 1;

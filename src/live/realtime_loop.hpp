@@ -31,9 +31,10 @@ struct RealtimeOptions {
   std::function<void(const ViewerFrame&)> view = [](const ViewerFrame&) {};     // on the viewer's thread
   std::function<void(const TickRecord&)> on_tick = [](const TickRecord&) {};    // on the viewer's thread, in order
   std::function<void(const SolveRecord&)> on_solve = [](const SolveRecord&) {}; // likewise, before ticks that use it
-  bool keep = true;           // ticks and solves for the returned records; false: on_tick and on_solve alone see them
-  bool solve_at_rest = true;  // false: none is begun while device and tears stay as they were in the last
-  bool follow_aside = false;  // nodes that follow the tool are made beside the solves, as what follows a blade is
+  bool keep = true;          // ticks and solves for the returned records; false: on_tick and on_solve alone see them
+  bool solve_at_rest = true; // false: none is begun while device and tears stay as they were in the last
+  /// Nodes that follow the tool are made in the background, as what follows a blade is.
+  bool follow_in_background = false;
   int niceness = 0;           // of the simulation thread and those that it makes: who else runs here goes before them
   double most_solves = 0;     // begun a second; 0: as many as there is time for
   ViewerFeed* feed = nullptr; // in place of one of the loop's own; then `view` is not called

@@ -29,7 +29,7 @@ constexpr std::uintmax_t largest_recording = 2'000'000'000; // bytes; an hour ha
 constexpr double longest_period = 1e6;                      // ticks
 constexpr double farthest = 1e6;                            // m, of a coordinate
 constexpr std::uint32_t connected = 1;
-constexpr std::uint32_t failed = 1, resprinkled = 2, swapped = 4, aside = 8;
+constexpr std::uint32_t failed = 1, resprinkled = 2, swapped = 4, in_background = 8;
 
 std::uint64_t checksum(std::string_view bytes) { // FNV-1a
   std::uint64_t value = 0xcbf29ce484222325U;
@@ -176,7 +176,7 @@ SolveRecord solve_of(Reader& in, std::uint32_t version, const std::vector<SolveR
   solve.failed = (flags & failed) != 0;
   solve.resprinkled = (flags & resprinkled) != 0;
   solve.event.swaps = (flags & swapped) != 0;
-  solve.event.aside = (flags & aside) != 0;
+  solve.event.in_background = (flags & in_background) != 0;
   solve.cut_triangles = in.get<std::int32_t>();
   solve.nodes = in.get<std::int32_t>();
   solve.topology = in.get<std::uint64_t>();
@@ -282,7 +282,7 @@ void RecordingWriter::add(const SolveRecord& solve) {
   put(solves_, solve.event.pose_tick);
   put(solves_, static_cast<std::int32_t>(solve.event.degradation));
   put(solves_, (solve.failed ? failed : 0U) | (solve.resprinkled ? resprinkled : 0U) |
-                   (solve.event.swaps ? swapped : 0U) | (solve.event.aside ? aside : 0U));
+                   (solve.event.swaps ? swapped : 0U) | (solve.event.in_background ? in_background : 0U));
   put(solves_, static_cast<std::int32_t>(solve.cut_triangles));
   put(solves_, static_cast<std::int32_t>(solve.nodes));
   put(solves_, solve.topology);

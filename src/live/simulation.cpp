@@ -59,9 +59,9 @@ void DegradationRule::rebuilt(double seconds) {
 void DegradationRule::solved(Rebuild rebuild, double seconds) {
   if (rebuild == Rebuild::in_step)
     rebuilt(seconds);
-  else if (rebuild == Rebuild::aside_early)
+  else if (rebuild == Rebuild::in_background_early)
     rebuilt(0);
-  else if (rebuild == Rebuild::aside)
+  else if (rebuild == Rebuild::in_background)
     rebuilt(budget_ / 2);
 }
 
@@ -117,9 +117,9 @@ std::optional<topology::ToolPose> HapticSimulation::parked_tool() const {
   return pose;
 }
 
-void HapticSimulation::set_following_aside(bool on) {
+void HapticSimulation::set_following_in_background(bool on) {
   SessionOptions options = session_.options();
-  options.following_aside = on;
+  options.following_in_background = on;
   session_.set_options(options);
 }
 
@@ -221,7 +221,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     return record;
   };
   try {
-    simulation.set_following_aside(event.aside);
+    simulation.set_following_in_background(event.in_background);
     if (event.swaps)
       simulation.swap_body();
     simulation.solve(device, event.degradation, snapshot);

@@ -20,7 +20,7 @@ class DegradationRule {
   explicit DegradationRule(double budget) : budget_(budget) {}
   [[nodiscard]] int level() const { return level_; }
   void rebuilt(double seconds);
-  /// What a solve of so many seconds did: a body that was made beside the solves counts as within a third of the budget
+  /// What a solve of so many seconds did: a body that was made in the background counts as within a third of the budget
   /// where it came early, else as within it.
   void solved(Rebuild rebuild, double seconds);
 
@@ -53,8 +53,8 @@ class HapticSimulation {
   [[nodiscard]] bool recondensed() const { return session_.pending().there; }
   void swap_body() { session_.swap_body(); }
   [[nodiscard]] bool has_put_off() const { return session_.pending().put_off; }
-  /// SessionOptions::following_aside.
-  void set_following_aside(bool on);
+  /// SessionOptions::following_in_background.
+  void set_following_in_background(bool on);
 
   /// Result of the last solve.
   [[nodiscard]] const StepResult& result() const { return result_; }

@@ -11,16 +11,16 @@
 namespace spherecut::app {
 
 BladeCutting::BladeCutting(SessionState& state, BladeTrack& blade, ContactSolver& contact, const Grasping& grasping,
-                           AsideBodies& aside, BodyUpdater& updater, WindowRenewal& renewal)
-    : state_(state), blade_(blade), contact_(contact), grasping_(grasping), aside_(aside), updater_(updater),
+                           BackgroundBodies& background, BodyUpdater& updater, WindowRenewal& renewal)
+    : state_(state), blade_(blade), contact_(contact), grasping_(grasping), background_(background), updater_(updater),
       renewal_(renewal) {}
 
 bool BladeCutting::ends(const StepSample& sample) const {
   return !state_.options.going_on && sample.time == state_.steps.back().time;
 }
 
-bool BladeCutting::makes_aside(const StepSample& sample) const {
-  return cut_policy(state_.scenario, state_.options) == CutPolicy::aside && state_.model.state && !ends(sample);
+bool BladeCutting::makes_in_background(const StepSample& sample) const {
+  return cut_policy(state_.scenario, state_.options) == CutPolicy::in_background && state_.model.state && !ends(sample);
 }
 
 double BladeCutting::advance() const {
@@ -30,7 +30,7 @@ double BladeCutting::advance() const {
 bool BladeCutting::move(const StepSample& sample, CutReport& report) {
   bool solved = false;
   const auto wait = [&] {
-    if (!aside_.follows_cut())
+    if (!background_.follows_cut())
       return;
     wait_for(sample, report);
     solved = true;
@@ -44,7 +44,7 @@ bool BladeCutting::move(const StepSample& sample, CutReport& report) {
     report.add(made);
   };
   if (!sample.blade || blade_.is_lifted()) {
-    if (aside_.follows_cut() && !sample.blade && !ends(sample)) // nothing needs the blade until its body is there
+    if (background_.follows_cut() && !sample.blade && !ends(sample)) // nothing needs the blade until its body is there
       return false;
     wait();
     if (blade_.put_off() > 0) { // a lifted blade is placed anew in the step after this one
@@ -70,16 +70,16 @@ bool BladeCutting::is_put_off(const StepSample& sample) {
     state_.incisions->put_off(pose);
   if (ends(sample))
     return false;
-  const bool is_aside = cut_policy(state_.scenario, state_.options) == CutPolicy::aside;
-  const bool leaves_off = is_aside && blade_.rests() && blade_.put_off() > 0;
-  if (is_aside && !leaves_off && !blade_.moved_at(sample.time)) // it is where it was
+  const bool is_in_background = cut_policy(state_.scenario, state_.options) == CutPolicy::in_background;
+  const bool leaves_off = is_in_background && blade_.rests() && blade_.put_off() > 0;
+  if (is_in_background && !leaves_off && !blade_.moved_at(sample.time)) // it is where it was
     return true;
   if (advance() <= 0)
     return false;
   blade_.put_off(blade_.way_to(*sample.blade));
   const bool is_outside = state_.incisions->is_outside(*sample.blade, state_.to_rest_if_moved());
-  const bool waits = aside_.follows_cut() ? is_outside || blade_.put_off() < most_advances * advance()
-                                          : !is_outside && !leaves_off && blade_.put_off() < advance();
+  const bool waits = background_.follows_cut() ? is_outside || blade_.put_off() < most_advances * advance()
+                                               : !is_outside && !leaves_off && blade_.put_off() < advance();
   if (waits)
     state_.incisions->put_off(*sample.blade);
   return waits;
@@ -99,7 +99,8 @@ bool BladeCutting::cut(const StepSample& sample, bool places, CutReport& report)
       if (places)
         state_.incisions->place(*sample.blade, to_rest);
       else
-        swept = state_.incisions->move_to(*sample.blade, to_rest, makes_aside(sample) ? &wound_before : nullptr);
+        swept =
+            state_.incisions->move_to(*sample.blade, to_rest, makes_in_background(sample) ? &wound_before : nullptr);
     } catch (const InputError& error) {
       refuse_cut(sample.time, error.what(), report, state_.log);
     } catch (const NumericalError& error) {
@@ -123,7 +124,7 @@ bool BladeCutting::cut(const StepSample& sample, bool places, CutReport& report)
   return false;
 }
 
-// The body with what has been cut, in the step or beside the steps. True: it is there and solved.
+// The body with what has been cut, in the step or in the background. True: it is there and solved.
 bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_rest,
                          std::optional<topology::Wound> wound_before, CutReport& report) {
   BodyModel next = updater_.next();
@@ -136,10 +137,11 @@ bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_r
     const StageTimer timer(report.seconds.level_sets);
     state_.incisions->update_fields();
   }
-  const bool aside = makes_aside(sample);
-  if (aside) {
+  const bool in_background = makes_in_background(sample);
+  if (in_background) {
     const int triangles = std::exchange(report.triangles, 0);
-    aside_.follow({std::nullopt, sample.time, triangles}, updater_.following_cut(next.incision, "the cut was put off"));
+    background_.follow({std::nullopt, sample.time, triangles},
+                       updater_.following_cut(next.incision, "the cut was put off"));
     state_.shown_wound = std::move(wound_before);
   } else {
     state_.rebuild = Rebuild::in_step;
@@ -149,7 +151,7 @@ bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_r
   }
   state_.profile.topology += report.seconds.topology;
   state_.profile.level_sets += report.seconds.level_sets;
-  if (aside)
+  if (in_background)
     return false;
   state_.model = std::move(next);
   renewal_.lead(sample, updater_.followed(), to_rest);
@@ -157,15 +159,16 @@ bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_r
 }
 
 bool BladeCutting::take() {
-  auto [following, body] = aside_.take_following();
+  auto [following, body] = background_.take_following();
   state_.shown_wound.reset();
   CutReport& report = taken_.emplace();
   try {
-    MadeAside made = body.get();
+    BackgroundBody made = body.get();
     static_cast<BodyUpdate&>(report) = std::move(made.report);
     report.update = SystemUpdate::taken_over;
     report.triangles = following.triangles;
-    state_.rebuild = blade_.put_off() < advance() * most_advances / 3 ? Rebuild::aside_early : Rebuild::aside;
+    state_.rebuild =
+        blade_.put_off() < advance() * most_advances / 3 ? Rebuild::in_background_early : Rebuild::in_background;
     state_.profile.sprinkle += report.seconds.sprinkling;
     state_.profile.discretise += report.seconds.assembly + report.seconds.visibility;
     state_.profile.condense += report.seconds.solve;

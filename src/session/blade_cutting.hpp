@@ -10,14 +10,14 @@ class BladeCutting {
  public:
   /// These must outlive it.
   BladeCutting(SessionState& state, BladeTrack& blade, ContactSolver& contact, const Grasping& grasping,
-               AsideBodies& aside, BodyUpdater& updater, WindowRenewal& renewal);
+               BackgroundBodies& background, BodyUpdater& updater, WindowRenewal& renewal);
 
   /// Moves the blade, or keeps its motion for later: until it has gone blade.advance, the body need not follow. What is
   /// left is cut when the blade leaves the body, is lifted or gone, or the run ends. A refusal leaves body, incision
   /// and wound as they were. True: a body with a new cut has been solved.
   bool move(const StepSample& sample, CutReport& report);
 
-  /// The cut that is made beside the steps takes over, after waiting for it; the next step tells of it. Where its body
+  /// The cut that is made in the background takes over, after waiting for it; the next step tells of it. Where its body
   /// could not be made the cut is refused: false.
   bool take();
   /// The same in a step, which solves that body.
@@ -31,14 +31,14 @@ class BladeCutting {
              CutReport& report);
   [[nodiscard]] bool is_put_off(const StepSample& sample);
   [[nodiscard]] bool ends(const StepSample& sample) const;
-  [[nodiscard]] bool makes_aside(const StepSample& sample) const;
+  [[nodiscard]] bool makes_in_background(const StepSample& sample) const;
   [[nodiscard]] double advance() const; // m
 
   SessionState& state_;
   BladeTrack& blade_;
   ContactSolver& contact_;
   const Grasping& grasping_;
-  AsideBodies& aside_;
+  BackgroundBodies& background_;
   BodyUpdater& updater_;
   WindowRenewal& renewal_;
   std::optional<CutReport> taken_; // of the cut whose body has taken over since the last step, or which was refused

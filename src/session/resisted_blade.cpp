@@ -23,9 +23,10 @@ BladeEdge edge_of(const SessionState& state) {
 
 } // namespace
 
-ResistedBlade::ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact, AsideBodies& aside,
-                             BodyUpdater& updater, WindowRenewal& renewal, const TearFronts& fronts)
-    : state_(state), blade_(blade), contact_(contact), aside_(aside), updater_(updater), renewal_(renewal),
+ResistedBlade::ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact,
+                             BackgroundBodies& background, BodyUpdater& updater, WindowRenewal& renewal,
+                             const TearFronts& fronts)
+    : state_(state), blade_(blade), contact_(contact), background_(background), updater_(updater), renewal_(renewal),
       fronts_(fronts), force_(state.scenario, edge_of(state)) {
   if (force_.edge().finer_than_nodes())
     state_.log.warn(
@@ -49,7 +50,7 @@ void ResistedBlade::lift() {
 }
 
 void ResistedBlade::drop_proposal() {
-  aside_.drop_proposing();
+  background_.drop_proposing();
   if (mark_)
     state_.incisions->go_back(*mark_);
   forget_mark();
@@ -60,14 +61,14 @@ void ResistedBlade::forget_mark() {
   state_.shown_wound.reset();
 }
 
-bool ResistedBlade::proposes_aside() const {
-  return cut_policy(state_.scenario, state_.options) == CutPolicy::proposed_aside;
+bool ResistedBlade::proposes_in_background() const {
+  return cut_policy(state_.scenario, state_.options) == CutPolicy::proposed_in_background;
 }
 
 double ResistedBlade::press(const StepSample& sample, CutReport& report) {
   if (sample.blade)
     return press_at(sample, report);
-  if (!blade_.last() || !(aside_.proposing() != nullptr || lags_aside()))
+  if (!blade_.last() || !(background_.proposing() != nullptr || lags_in_background()))
     return 0;
   StepSample left = sample; // at the end of its path, with a cut still to come
   left.blade = blade_.last();
@@ -92,12 +93,12 @@ double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
       force_.go_to(passed, state_.model);
     else
       force_.pass_by(passed);
-    const double far = most_advances * aside_advance * state_.zone.fine();
-    if (const AsideBodies::Proposing* made = aside_.proposing();
+    const double far = most_advances * background_advance * state_.zone.fine();
+    if (const BackgroundBodies::Proposing* made = background_.proposing();
         made != nullptr &&
-        (aside_.has_arrived() || leaves || out || force_.way().left(force_.edge()) - made->way_left > far))
+        (background_.has_arrived() || leaves || out || force_.way().left(force_.edge()) - made->way_left > far))
       take(sample, report);
-    const bool lags = proposes_aside() && (force_.proposed() || force_.lags());
+    const bool lags = proposes_in_background() && (force_.proposed() || force_.lags());
     if (goes_on || (leaves && lags)) // what it has come to is cut before
       surface += cut_on(sample, false, report);
   }
@@ -109,7 +110,7 @@ double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
   }
   if (!placed)
     state_.incisions->place(*sample.blade, to_rest);
-  return surface + cut_on(sample, proposes_aside() && !out, report);
+  return surface + cut_on(sample, proposes_in_background() && !out, report);
 }
 
 // What it has passed without a cut is told.
@@ -129,13 +130,13 @@ void ResistedBlade::leave(const StepSample& sample) {
 // A cut is built when it comes near, beside the body, and the body becomes it when it is due. Where it is built beside
 // the steps the blade waits at the force of steady cutting: what it does is then what it would have done, only later.
 // The energy of the surface, J.
-double ResistedBlade::cut_on(const StepSample& sample, bool aside, CutReport& report) {
+double ResistedBlade::cut_on(const StepSample& sample, bool in_background, CutReport& report) {
   const topology::RestMap to_rest = state_.to_rest();
   int triangles = report.triangles;
   double surface = 0;
   bool waits = false; // what takes a body over leaves the next one to the next step
   for (;;) {
-    waits = waits || aside_.proposing() != nullptr;
+    waits = waits || background_.proposing() != nullptr;
     if (const std::vector<topology::BladePose> poses =
             waits ? std::vector<topology::BladePose>{} : force_.wanted(state_.model);
         !poses.empty()) {
@@ -143,25 +144,25 @@ double ResistedBlade::cut_on(const StepSample& sample, bool aside, CutReport& re
         mark_ = state_.incisions->mark();
         state_.shown_wound = state_.incisions->wound();
       }
-      if (aside && force_.proposed()) { // a longer cut in its place
+      if (in_background && force_.proposed()) { // a longer cut in its place
         force_.withdraw();
         state_.incisions->go_back(*mark_);
         continue;
       }
-      if (aside) {
-        build_aside(poses, sample, report);
+      if (in_background) {
+        build_in_background(poses, sample, report);
       } else if (std::optional<BodyModel> next = build(poses, sample, report)) {
         triangles += report.triangles;
         const double drawn = fronts_.released(state_.model, *next->incision);
         force_.propose(std::move(*next), poses.size(), drawn);
       }
-      if (!force_.proposed() && aside_.proposing() == nullptr) { // nothing is cut there
+      if (!force_.proposed() && background_.proposing() == nullptr) { // nothing is cut there
         forget_mark();
         force_.pass(poses.size(), state_.model);
         continue;
       }
     }
-    if ((waits || aside_.proposing() != nullptr) && !force_.proposed()) {
+    if ((waits || background_.proposing() != nullptr) && !force_.proposed()) {
       force_.wait(state_.model);
       break;
     }
@@ -172,7 +173,7 @@ double ResistedBlade::cut_on(const StepSample& sample, bool aside, CutReport& re
     state_.model = std::move(taken.body);
     renewal_.lead(sample, updater_.followed(), to_rest);
     forget_mark();
-    waits = aside;
+    waits = in_background;
   }
   report.triangles = triangles;
   return surface;
@@ -239,15 +240,15 @@ std::optional<BodyModel> ResistedBlade::build(const std::vector<topology::BladeP
   }
 }
 
-// The same, built beside the steps.
-void ResistedBlade::build_aside(const std::vector<topology::BladePose>& poses, const StepSample& sample,
-                                CutReport& report) {
+// The same, built in the background.
+void ResistedBlade::build_in_background(const std::vector<topology::BladePose>& poses, const StepSample& sample,
+                                        CutReport& report) {
   try {
     if (!sweep(poses, sample, report))
       return;
     const int triangles = std::exchange(report.triangles, 0);
-    aside_.propose({poses.size(), sample.time, force_.way().left(force_.edge()), triangles},
-                   updater_.following_cut(state_.incisions->incision(), "the blade is resisted"));
+    background_.propose({poses.size(), sample.time, force_.way().left(force_.edge()), triangles},
+                        updater_.following_cut(state_.incisions->incision(), "the blade is resisted"));
     return;
   } catch (const InputError& error) {
     refuse_cut(sample.time, error.what(), report, state_.log);
@@ -259,19 +260,19 @@ void ResistedBlade::build_aside(const std::vector<topology::BladePose>& poses, c
 
 // It is solved and becomes the blade's; where it could not be made its way is passed without a cut.
 void ResistedBlade::take(const StepSample& sample, CutReport& report) {
-  state_.rebuild = aside_.has_arrived() ? Rebuild::aside : Rebuild::in_step;
-  auto [made, body] = aside_.take_proposing();
+  state_.rebuild = background_.has_arrived() ? Rebuild::in_background : Rebuild::in_step;
+  auto [made, body] = background_.take_proposing();
   try {
-    MadeAside aside = body.get();
-    static_cast<BodyUpdate&>(report) = std::move(aside.report);
+    BackgroundBody background = body.get();
+    static_cast<BodyUpdate&>(report) = std::move(background.report);
     report.update = SystemUpdate::taken_over;
     report.triangles += made.triangles;
     state_.profile.sprinkle += report.seconds.sprinkling;
     state_.profile.discretise += report.seconds.assembly + report.seconds.visibility;
     state_.profile.condense += report.seconds.solve;
     const StageTimer timer(report.seconds.solve);
-    contact_.solve(sample, aside.model);
-    force_.propose(std::move(aside.model), made.poses);
+    contact_.solve(sample, background.model);
+    force_.propose(std::move(background.model), made.poses);
   } catch (const std::runtime_error& error) {
     refuse_cut(made.time, error.what(), report, state_.log);
     state_.incisions->go_back(*mark_);

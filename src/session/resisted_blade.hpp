@@ -12,7 +12,7 @@ namespace spherecut::app {
 class ResistedBlade {
  public:
   /// All of these must outlive it. Throws InputError as BladeEdge.
-  ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact, AsideBodies& aside,
+  ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact, BackgroundBodies& background,
                 BodyUpdater& updater, WindowRenewal& renewal, const TearFronts& fronts);
 
   [[nodiscard]] const BladeForce& force() const { return force_; }
@@ -34,25 +34,25 @@ class ResistedBlade {
   [[nodiscard]] bool has_proposal() const { return mark_.has_value(); }
   /// The cut has grown otherwise: the blade meets the body as it is now, and nothing is proposed.
   void meet_again() { force_.meet_again(state_.model); }
-  /// Whether it is left so far behind its pose that there is a cut to come, which is made beside the steps.
-  [[nodiscard]] bool lags_aside() const { return proposes_aside() && force_.lags(); }
+  /// Whether it is left so far behind its pose that there is a cut to come, which is made in the background.
+  [[nodiscard]] bool lags_in_background() const { return proposes_in_background() && force_.lags(); }
 
  private:
-  [[nodiscard]] bool proposes_aside() const;
+  [[nodiscard]] bool proposes_in_background() const;
   double press_at(const StepSample& sample, CutReport& report);
   void leave(const StepSample& sample);
-  double cut_on(const StepSample& sample, bool aside, CutReport& report);
+  double cut_on(const StepSample& sample, bool in_background, CutReport& report);
   bool sweep(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
   [[nodiscard]] std::optional<BodyModel> build(const std::vector<topology::BladePose>& poses, const StepSample& sample,
                                                CutReport& report);
-  void build_aside(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
+  void build_in_background(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
   void take(const StepSample& sample, CutReport& report);
   void forget_mark();
 
   SessionState& state_;
   const BladeTrack& blade_;
   ContactSolver& contact_;
-  AsideBodies& aside_;
+  BackgroundBodies& background_;
   BodyUpdater& updater_;
   WindowRenewal& renewal_;
   const TearFronts& fronts_;

@@ -36,12 +36,12 @@ struct Session::Parts {
   SessionState state;
   BladeTrack blade{state.scenario};
   Grasping grasping{state.scenario, *state.organ.domain};
-  AsideBodies aside;
-  ContactSolver contact{state, grasping, blade, aside};
+  BackgroundBodies background;
+  ContactSolver contact{state, grasping, blade, background};
   WindowRenewal renewal{state, blade};
-  BodyUpdater updater{state, contact, grasping, aside, renewal};
-  ToolFollowing tool{state, contact, updater, aside, renewal};
-  BladeCutting cutting{state, blade, contact, grasping, aside, updater, renewal};
+  BodyUpdater updater{state, contact, grasping, background, renewal};
+  ToolFollowing tool{state, contact, updater, background, renewal};
+  BladeCutting cutting{state, blade, contact, grasping, background, updater, renewal};
   TearFronts fronts{state.scenario, state.toughness, state.zone.zone()};
   std::unique_ptr<ResistedBlade> resisted; // null: nothing resists the blade
   std::unique_ptr<TearPropagation> tears;  // null: nothing tears
@@ -55,11 +55,11 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
   Parts& of = *parts_;
   set_out(of.state, leader);
   if (resists(of.state.scenario))
-    of.resisted =
-        std::make_unique<ResistedBlade>(of.state, of.blade, of.contact, of.aside, of.updater, of.renewal, of.fronts);
+    of.resisted = std::make_unique<ResistedBlade>(of.state, of.blade, of.contact, of.background, of.updater, of.renewal,
+                                                  of.fronts);
   if (of.state.scenario.tearing.enabled)
-    of.tears = std::make_unique<TearPropagation>(of.state, of.grasping, of.contact, of.aside, of.updater, of.fronts,
-                                                 of.resisted.get());
+    of.tears = std::make_unique<TearPropagation>(of.state, of.grasping, of.contact, of.background, of.updater,
+                                                 of.fronts, of.resisted.get());
   if (!computes())
     return;
   lay_first_nodes(of.state, of.updater);
@@ -156,8 +156,8 @@ bool Session::Parts::begin(const StepSample& sample, std::vector<topology::Blade
   contact.begin_step();
   if (state.model.without_blade)
     state.model.field = *std::exchange(state.model.without_blade, std::nullopt);
-  if (sample.blade && !aside.follows_cut())
-    aside.drop_following();
+  if (sample.blade && !background.follows_cut())
+    background.drop_following();
   const bool released = grasp(sample);
   blade.begin_step(sample, std::move(passed), state.zone.fine());
   return released;
@@ -240,14 +240,15 @@ bool Session::Parts::is_loaded(const StepSample& sample, const StepResult& resul
 // Fine nodes go along with the tool.
 void Session::Parts::follow_tool(const StepSample& sample, StepResult& result) {
   const topology::SurfaceContact centre = state.zone.centre_of(result.contact, result.pose);
-  const bool waits = aside.follows_cut() && !state.zone.is_left_by(centre); // nodes are made at one place at a time
+  const bool waits =
+      background.follows_cut() && !state.zone.is_left_by(centre); // nodes are made at one place at a time
   if (!state.zone.must_follow(centre) || waits)
     return;
-  if (state.options.following_aside && !renewal.is_under_way() && !sample.blade && !aside.follows_cut()) {
-    tool.follow_aside(sample, centre);
+  if (state.options.following_in_background && !renewal.is_under_way() && !sample.blade && !background.follows_cut()) {
+    tool.follow_in_background(sample, centre);
     return;
   }
-  if (aside.follows_cut())
+  if (background.follows_cut())
     cutting.wait_for(sample, *result.cut);
   tool.follow(sample, centre, result);
 }
@@ -269,7 +270,7 @@ void Session::prepare(const StepSample& sample) {
   if (of.state.touch && !of.state.scenario.tool->grasp && model.patch.nodes.empty())
     of.contact.condense(of.contact.candidates(model), model);
   if (of.policy() != CutPolicy::in_step_ahead || of.state.scenario.blade->advance.value_or(1) > 0)
-    return; // in the loop it may be made beside the steps
+    return; // in the loop it may be made in the background
   StepSample meeting = sample;
   if (!meeting.blade)
     if (const auto first = std::find_if(steps().begin(), steps().end(), [](const StepSample& s) { return !!s.blade; });
@@ -295,38 +296,39 @@ void Session::set_options(const SessionOptions& options) {
   of.state.options = options;
   if (!options.recondensing)
     of.renewal.drop();
-  if (options.following_aside)
+  if (options.following_in_background)
     return;
-  if (of.aside.follows_cut())
+  if (of.background.follows_cut())
     of.cutting.take();
-  if (of.aside.proposing() != nullptr)
+  if (of.background.proposing() != nullptr)
     of.resisted->drop_proposal();
-  of.aside.drop_following();
+  of.background.drop_following();
 }
 
 PendingBody Session::pending() const {
   const Parts& of = *parts_;
-  const bool is_made_aside = of.aside.is_under_way();
-  const bool lags_aside = of.resisted && of.resisted->lags_aside();
+  const bool is_made_in_background = of.background.is_under_way();
+  const bool lags_in_background = of.resisted && of.resisted->lags_in_background();
   PendingBody pending;
-  pending.under_way = is_made_aside || of.renewal.is_under_way();
-  pending.there = is_made_aside ? of.aside.is_there() : of.renewal.is_there();
-  pending.put_off = (of.blade.put_off() > 0 && of.policy() == CutPolicy::aside && !of.aside.follows_cut()) ||
-                    (lags_aside && of.aside.proposing() == nullptr);
-  pending.lags = of.blade.put_off() > 0 || of.aside.follows_cut() || lags_aside;
+  pending.under_way = is_made_in_background || of.renewal.is_under_way();
+  pending.there = is_made_in_background ? of.background.is_there() : of.renewal.is_there();
+  pending.put_off =
+      (of.blade.put_off() > 0 && of.policy() == CutPolicy::in_background && !of.background.follows_cut()) ||
+      (lags_in_background && of.background.proposing() == nullptr);
+  pending.lags = of.blade.put_off() > 0 || of.background.follows_cut() || lags_in_background;
   return pending;
 }
 
 bool Session::swap_body() {
   Parts& of = *parts_;
-  if (of.aside.follows_cut())
+  if (of.background.follows_cut())
     return of.cutting.take();
-  if (of.aside.is_following()) {
+  if (of.background.is_following()) {
     of.tool.take();
     return true;
   }
-  if (of.aside.proposing() != nullptr) { // becomes the blade's once a step has solved it
-    of.aside.let_arrive();
+  if (of.background.proposing() != nullptr) { // becomes the blade's once a step has solved it
+    of.background.let_arrive();
     return true;
   }
   return of.renewal.is_under_way() && of.updater.take_renewed();

@@ -9,7 +9,7 @@ namespace spherecut::app {
 
 /// Bodies that the next steps wait for, or take over.
 struct PendingBody {
-  bool under_way = false; // one is made beside the steps
+  bool under_way = false; // one is made in the background
   /// It is there and has followed what was cut meanwhile, but for the last few increments where every step has one:
   /// Session::swap_body() has it follow those.
   bool there = false;
@@ -53,7 +53,7 @@ class Session {
   void lift_blade();
 
   [[nodiscard]] const SessionOptions& options() const;
-  /// What is made beside the steps and is not wanted any more is dropped, or taken over where it has followed a cut.
+  /// What is made in the background and is not wanted any more is dropped, or taken over where it has followed a cut.
   void set_options(const SessionOptions& options);
 
   [[nodiscard]] PendingBody pending() const;

@@ -15,10 +15,10 @@ namespace spherecut::app {
 namespace {
 
 // In units of the fine spacing:
-constexpr double tear_smoothing = 1; // length along the front over which motions are averaged
-constexpr double tear_slope = 2;     // by which they differ for each unit of G / G_c, at most
-constexpr double bridge = 4;         // a front shorter than this, too near to the surface for intensities, gives way
-constexpr double bridge_step = 3;    // by this in one increment
+constexpr double smoothing = 1;   // length along the front over which motions are averaged
+constexpr double slope = 2;       // by which they differ for each unit of G / G_c, at most
+constexpr double bridge = 4;      // a front shorter than this, too near to the surface for intensities, gives way
+constexpr double bridge_step = 3; // by this in one increment
 // Of the longest step:
 constexpr double first_step = 0.5, least_step = 0.2; // while the decay of G is not known; where it is
 constexpr double told = 0.5;        // increments at least so long tell the decay, and whether growth is unstable
@@ -106,10 +106,11 @@ Energies energies(const BodyModel& model) {
   return energies;
 }
 
-TearPropagation::TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact, AsideBodies& aside,
-                                 BodyUpdater& updater, const TearFronts& fronts, ResistedBlade* blade)
-    : state_(state), grasping_(grasping), contact_(contact), aside_(aside), updater_(updater), fronts_(fronts),
-      blade_(blade) {}
+TearPropagation::TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact,
+                                 BackgroundBodies& background, BodyUpdater& updater, const TearFronts& fronts,
+                                 ResistedBlade* blade)
+    : state_(state), grasping_(grasping), contact_(contact), background_(background), updater_(updater),
+      fronts_(fronts), blade_(blade) {}
 
 // What the step has done so far. A blade's cut takes of what the loads release what its surface needs; the rest of
 // that, and what a grasper does that lets go, belongs to nobody.
@@ -209,7 +210,7 @@ void TearPropagation::build(const StepSample& sample, std::shared_ptr<const topo
     growth.renewed = "the piece in the grasper has come off";
     state_.log.warn("grip", fmt::format("t = {:g} s: the piece in the grasper has come off", sample.time));
   }
-  aside_.drop_following();
+  background_.drop_following();
   updater_.build_cut(growth, next, update);
   {
     const StageTimer timer(update.seconds.solve);
@@ -244,7 +245,7 @@ std::vector<solvers::FrontState> acting(std::vector<solvers::FrontState> states,
 /// How far each of the places moves, m.
 std::vector<double> advances(const std::vector<solvers::FrontState>& places,
                              const std::vector<solvers::FrontState>& moving, double longest, double fine) {
-  const auto motion = solvers::tear_motion(moving, longest, tear_smoothing * fine, tear_slope * fine);
+  const auto motion = solvers::tear_motion(moving, longest, smoothing * fine, slope * fine);
   std::vector<double> result;
   result.reserve(places.size());
   for (const solvers::FrontState& place : places)

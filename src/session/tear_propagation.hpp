@@ -31,7 +31,7 @@ struct TearAccount {
 class TearPropagation {
  public:
   /// All of these must outlive it; `blade` null: none is resisted.
-  TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact, AsideBodies& aside,
+  TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact, BackgroundBodies& background,
                   BodyUpdater& updater, const TearFronts& fronts, ResistedBlade* blade);
 
   /// Tears the solved body as far as it goes in this step; the result's tear and cut tell of it. An increment that
@@ -49,7 +49,7 @@ class TearPropagation {
   SessionState& state_;
   Grasping& grasping_;
   ContactSolver& contact_;
-  AsideBodies& aside_;
+  BackgroundBodies& background_;
   BodyUpdater& updater_;
   const TearFronts& fronts_;
   ResistedBlade* blade_;               // null: none is resisted

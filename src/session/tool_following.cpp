@@ -33,10 +33,10 @@ void ToolFollowing::follow(const StepSample& sample, const topology::SurfaceCont
                     100 * result.force_jump, sample.time, 100 * allowed_force_jump));
 }
 
-void ToolFollowing::follow_aside(const StepSample& sample, const topology::SurfaceContact& centre) {
-  if (!aside_.is_following()) {
+void ToolFollowing::follow_in_background(const StepSample& sample, const topology::SurfaceContact& centre) {
+  if (!background_.is_following()) {
     const topology::SurfaceContact next = state_.zone.next_centre(centre);
-    aside_.follow({next}, updater_.following_tool(next));
+    background_.follow({next}, updater_.following_tool(next));
     return;
   }
   if (!state_.zone.is_left_by(centre))
@@ -47,7 +47,7 @@ void ToolFollowing::follow_aside(const StepSample& sample, const topology::Surfa
 }
 
 void ToolFollowing::take() {
-  auto [following, body] = aside_.take_following();
+  auto [following, body] = background_.take_following();
   BodyModel next = body.get().model;
   renewal_.drop();
   contact_.keep_grip();

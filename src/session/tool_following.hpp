@@ -1,4 +1,4 @@
-// Fine nodes go along with the tool: in the step, or on a body made beside the steps.
+// Fine nodes go along with the tool: in the step, or on a body made in the background.
 #pragma once
 
 #include "src/session/step_result.hpp"
@@ -9,14 +9,14 @@ namespace spherecut::app {
 class ToolFollowing {
  public:
   /// These must outlive it.
-  ToolFollowing(SessionState& state, ContactSolver& contact, BodyUpdater& updater, AsideBodies& aside,
+  ToolFollowing(SessionState& state, ContactSolver& contact, BodyUpdater& updater, BackgroundBodies& background,
                 WindowRenewal& renewal)
-      : state_(state), contact_(contact), updater_(updater), aside_(aside), renewal_(renewal) {}
+      : state_(state), contact_(contact), updater_(updater), background_(background), renewal_(renewal) {}
 
   /// The fine zone goes to where the contact is, and the body is built and solved there.
   void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
-  /// The same beside the steps: begins that, or takes it over once the contact has left the zone.
-  void follow_aside(const StepSample& sample, const topology::SurfaceContact& centre);
+  /// The same in the background: begins that, or takes it over once the contact has left the zone.
+  void follow_in_background(const StepSample& sample, const topology::SurfaceContact& centre);
   /// The body that has followed the tool takes over, after waiting for it. Throws what making it has thrown; the body
   /// is then as it was.
   void take();
@@ -27,7 +27,7 @@ class ToolFollowing {
   SessionState& state_;
   ContactSolver& contact_;
   BodyUpdater& updater_;
-  AsideBodies& aside_;
+  BackgroundBodies& background_;
   WindowRenewal& renewal_;
   bool taken_ = false;
 };

@@ -20,15 +20,15 @@ namespace {
 // making the window takes in place of the latter: 0.46, 0.95 and 1.7 s where it holds a quarter (1600 nodes), 0.35,
 // 0.34 and 0.55 s at 0.54 (590 nodes), 1.25, 1.4 and 2.9 s at two thirds (1380 nodes). A window serves
 // as many updates as fit into its zone: one of a spacing, three of a half, six of a quarter.
-constexpr double largest_tear_share = 0.5;
+constexpr double largest_share = 0.5;
 constexpr const char* spacing_changed = "the spacing has changed";
 
 } // namespace
 
-BodyUpdater::BodyUpdater(SessionState& state, ContactSolver& contact, const Grasping& grasping, AsideBodies& aside,
-                         WindowRenewal& renewal)
+BodyUpdater::BodyUpdater(SessionState& state, ContactSolver& contact, const Grasping& grasping,
+                         BackgroundBodies& background, WindowRenewal& renewal)
     : state_(state), scenario_(state.scenario), organ_(state.organ), model_(state.model), contact_(contact),
-      grasping_(grasping), aside_(aside), renewal_(renewal) {}
+      grasping_(grasping), background_(background), renewal_(renewal) {}
 
 BodyModel BodyUpdater::next() const {
   BodyModel next;
@@ -62,7 +62,7 @@ void BodyUpdater::build(BodyModel& model) {
 void BodyUpdater::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near) {
   const StageTimer timer(state_.profile.discretise);
   renewal_.drop();
-  aside_.drop_following();
+  background_.drop_following();
   app::assemble(scenario_, organ_.domain, model, way_ahead, near);
   const solvers::SprinkleReport& report = model.sprinkling.report;
   state_.log.say(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",
@@ -84,7 +84,7 @@ void BodyUpdater::lead_zone(const topology::Incision& incision, CutGrowth& growt
       return "";
     if (way.triangles.empty())
       return "no front that has moved goes on";
-    if (solvers::window_share(model_.body->problem(), scenario_.method, way) > largest_tear_share)
+    if (solvers::window_share(model_.body->problem(), scenario_.method, way) > largest_share)
       return too_much_of_body;
     return can_follow(scenario_, model_, way) ? "" : "too many nodes for a window by this method";
   };
@@ -237,13 +237,13 @@ bool BodyUpdater::take_renewed() {
   return true;
 }
 
-AsideBodies::Make BodyUpdater::following_tool(const topology::SurfaceContact& centre) const {
+BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContact& centre) const {
   FineZoneTracker there = state_.zone;
   there.move_to(centre);
   return [&scenario = scenario_, domain = organ_.domain,
           how = there.sprinkle_options(model_.incision, grasping_.kept_nodes()), previous = model_.sprinkling.nodes,
           coarseness = state_.zone.coarseness(), centre, reach = state_.zone.zone().candidate_radius] {
-    MadeAside made;
+    BackgroundBody made;
     BodyModel& model = made.model;
     model.incision = how.incision;
     model.sprinkling = resprinkle_held(scenario, *domain, how, previous);
@@ -258,15 +258,15 @@ AsideBodies::Make BodyUpdater::following_tool(const topology::SurfaceContact& ce
 }
 
 // Rebuilt: no window pays that serves one increment.
-AsideBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const topology::Incision>& incision,
-                                             const char* reason) const {
+BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const topology::Incision>& incision,
+                                                  const char* reason) const {
   const std::string renewed = spacing_stays() ? state_.hindrance() : spacing_changed;
   const FineZoneTracker& zone = state_.zone;
   return [&scenario = scenario_, domain = organ_.domain, how = zone.sprinkle_options(incision, grasping_.kept_nodes()),
           incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, reason,
           coarseness = zone.coarseness(), centre = contact_.is_in_reach() ? zone.centre() : std::nullopt,
           reach = zone.zone().candidate_radius, facing = zone.facing()] {
-    MadeAside made;
+    BackgroundBody made;
     BodyModel& model = made.model;
     BodyUpdate& update = made.report;
     model.incision = how.incision;

@@ -1,7 +1,7 @@
 // The ways in which the body of a session comes about: built, following its cut by an update, built anew behind it,
 // taken back. Of a cut, a blade's or a tear's, nodes beside what is new are exchanged and the system is updated where
-// it is touched; where that cannot be, or does not pay, it is built anew. What is made beside the steps is described
-// here too (AsideBodies), and a body that has been condensed anew there (WindowRenewal) takes over here.
+// it is touched; where that cannot be, or does not pay, it is built anew. What is made in the background is described
+// here too (BackgroundBodies), and a body that has been condensed anew there (WindowRenewal) takes over here.
 #pragma once
 
 #include "src/tissue/contact_solver.hpp"
@@ -20,14 +20,14 @@ struct CutGrowth {
 class BodyUpdater {
  public:
   /// These must outlive it.
-  BodyUpdater(SessionState& state, ContactSolver& contact, const Grasping& grasping, AsideBodies& aside,
+  BodyUpdater(SessionState& state, ContactSolver& contact, const Grasping& grasping, BackgroundBodies& background,
               WindowRenewal& renewal);
 
   /// A model without body, to come after the present one: touched as that, with the cut as it is now.
   [[nodiscard]] BodyModel next() const;
   /// Nodes of a model: fresh ones, or those of `previous` that still fit and new ones.
   void sprinkle(const solvers::NodeCloud* previous, BodyModel& model) const;
-  /// Assembles and condenses the body on the model's nodes. What is under way beside the steps is dropped.
+  /// Assembles and condenses the body on the model's nodes. What is under way in the background is dropped.
   void build(BodyModel& model);
   /// Assembles it alone, for a way of the cut ahead (no triangles: none) and for these candidates.
   void assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near);
@@ -44,10 +44,10 @@ class BodyUpdater {
   bool take_back_cut(const solvers::Discretisation* body);
 
   /// What makes a body that has followed the tool: with the fine zone about `centre`.
-  [[nodiscard]] AsideBodies::Make following_tool(const topology::SurfaceContact& centre) const;
+  [[nodiscard]] BackgroundBodies::Make following_tool(const topology::SurfaceContact& centre) const;
   /// What makes the body with this cut, on the nodes that a step would have made. `reason`: why it is made there.
-  [[nodiscard]] AsideBodies::Make following_cut(const std::shared_ptr<const topology::Incision>& incision,
-                                                const char* reason) const;
+  [[nodiscard]] BackgroundBodies::Make following_cut(const std::shared_ptr<const topology::Incision>& incision,
+                                                     const char* reason) const;
   /// The body that has been condensed anew takes over, after waiting for it. False: it could not follow.
   bool take_renewed();
 
@@ -65,7 +65,7 @@ class BodyUpdater {
   BodyModel& model_;
   ContactSolver& contact_;
   const Grasping& grasping_;
-  AsideBodies& aside_;
+  BackgroundBodies& background_;
   WindowRenewal& renewal_;
   std::optional<solvers::SprinkleIncrement> followed_; // by the body of the last cut
 };

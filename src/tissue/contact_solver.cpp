@@ -26,9 +26,9 @@ bool is_any_closed(const solvers::LipState& lips) {
 } // namespace
 
 ContactSolver::ContactSolver(SessionState& state, const Grasping& grasping, const BladeTrack& blade,
-                             const AsideBodies& aside)
+                             const BackgroundBodies& background)
     : state_(state), scenario_(state.scenario), organ_(state.organ), zone_(state.zone), grasping_(grasping),
-      blade_(blade), aside_(aside) {}
+      blade_(blade), background_(background) {}
 
 void ContactSolver::begin_step() {
   const auto kept = std::exchange(kept_grip_, std::nullopt);
@@ -199,7 +199,7 @@ std::vector<int> ContactSolver::touchable(std::vector<int> nodes, const topology
 // A loop in real time presses on while the blade rests: superposed fields are cheaper than a solution each time.
 void ContactSolver::extend_fields(BodyModel& model) const {
   const bool is_for_good =
-      blade_.rests() || (blade_.put_off() == 0 && !aside_.follows_cut()); // else the next body is on its way
+      blade_.rests() || (blade_.put_off() == 0 && !background_.follows_cut()); // else the next body is on its way
   const bool bare_patch = !solvers::has_fields(model.patch);
   const bool bare_lips = lips_touch_ && model.lips && !solvers::has_fields(*model.lips);
   if (!state_.options.force_only || !is_for_good || (!bare_patch && !bare_lips) || ++model.presses <= few_presses)

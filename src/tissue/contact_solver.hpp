@@ -2,7 +2,7 @@
 // between the nodes kept out of the tool.
 #pragma once
 
-#include "src/tissue/aside_bodies.hpp"
+#include "src/tissue/background_bodies.hpp"
 #include "src/tissue/blade_track.hpp"
 #include "src/tissue/grasping.hpp"
 #include "src/tissue/state.hpp"
@@ -17,7 +17,8 @@ inline constexpr double most_left_over = 0.02;
 class ContactSolver {
  public:
   /// All of these must outlive it.
-  ContactSolver(SessionState& state, const Grasping& grasping, const BladeTrack& blade, const AsideBodies& aside);
+  ContactSolver(SessionState& state, const Grasping& grasping, const BladeTrack& blade,
+                const BackgroundBodies& background);
 
   /// Friction goes on from the solution of the last step, should the nodes change in this one.
   void begin_step();
@@ -59,7 +60,7 @@ class ContactSolver {
   const FineZoneTracker& zone_;
   const Grasping& grasping_;
   const BladeTrack& blade_;
-  const AsideBodies& aside_;
+  const BackgroundBodies& background_;
   VectorX displaced_, displaced_coefficients_;              // at the nodes, of a field since solve() began
   const solvers::Discretisation* displaced_body_ = nullptr; // of that field; null: none
   std::optional<SurfaceWatch::Depths> penetration_;

@@ -19,10 +19,10 @@ namespace {
 
 constexpr double least_nodes_through = 1; // spacings through a wall, below which nothing is computed
 // In fine spacings:
-constexpr double contact_crowded_by_sheet = 0.3; // nearer to a sheet no node of a contact is put
-constexpr double zone_ahead = 1;                 // so far ahead of a front that may tear nodes are fine beforehand
-constexpr double zone_left = 0.5;                // a front this far off the middle of the fine zone has left it
-constexpr double moved_near = 1;                 // a front this near to what is new of the cut is expected to go on
+constexpr double crowded_by_sheet = 0.3; // nearer to a sheet no node of a contact is put
+constexpr double zone_ahead = 1;         // so far ahead of a front that may tear nodes are fine beforehand
+constexpr double zone_left = 0.5;        // a front this far off the middle of the fine zone has left it
+constexpr double moved_near = 1;         // a front this near to what is new of the cut is expected to go on
 
 } // namespace
 
@@ -226,7 +226,7 @@ solvers::SprinkleOptions FineZoneTracker::sprinkle_options(const std::shared_ptr
     options.seeds = contact_seeds(scenario_, *domain_, *centre_, zone_.spacing.fine);
   if (incision != nullptr) // nodes on it belong to one of its faces
     std::erase_if(options.seeds, [&](const solvers::SeedNode& seed) {
-      return incision->closest(seed.position, contact_crowded_by_sheet * zone_.spacing.fine).has_value();
+      return incision->closest(seed.position, crowded_by_sheet * zone_.spacing.fine).has_value();
     });
   options.random_seed = scenario_.nodes.random_seed;
   options.incision = incision;

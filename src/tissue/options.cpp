@@ -27,16 +27,18 @@ CutPolicy cut_policy(const Scenario& scenario, const SessionOptions& options) {
   const bool blade_alone = !scenario.tearing.enabled && !has_grasper(scenario);
   const std::optional<double>& advance = scenario.blade->advance;
   if (resists(scenario))
-    return options.following_aside && blade_alone && !advance ? CutPolicy::proposed_aside : CutPolicy::proposed;
-  if (options.following_aside && blade_alone && !cut_appends(scenario) && advance.value_or(aside_advance) > 0)
-    return CutPolicy::aside;
+    return options.following_in_background && blade_alone && !advance ? CutPolicy::proposed_in_background
+                                                                      : CutPolicy::proposed;
+  if (options.following_in_background && blade_alone && !cut_appends(scenario) &&
+      advance.value_or(background_advance) > 0)
+    return CutPolicy::in_background;
   const bool ahead = options.recondensing && !scenario.tearing.enabled && !cut_appends(scenario);
   return ahead ? CutPolicy::in_step_ahead : CutPolicy::in_step;
 }
 
 double blade_advance(const Scenario& scenario, const SessionOptions& options) {
-  const bool is_aside = cut_policy(scenario, options) == CutPolicy::aside;
-  return scenario.blade->advance.value_or(is_aside ? aside_advance : 0);
+  const bool is_in_background = cut_policy(scenario, options) == CutPolicy::in_background;
+  return scenario.blade->advance.value_or(is_in_background ? background_advance : 0);
 }
 
 } // namespace spherecut::app

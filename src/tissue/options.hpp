@@ -1,4 +1,4 @@
-// How a session is run, beside what its scenario says; and by which policy its body follows a blade.
+// How a session is run, besides what its scenario says; and by which policy its body follows a blade.
 #pragma once
 
 #include "src/scenario/scenario.hpp"
@@ -30,19 +30,19 @@ struct SessionOptions {
   /// replace, or the blade has gone most_advances times blade.advance since; until then cut and wound are those of the
   /// body. When it begins, and what it becomes, depends on the steps alone. So is what a blade that the tissue resists
   /// proposes to cut, for which it is waited when the blade leaves the body, too.
-  bool following_aside = false;
+  bool following_in_background = false;
   /// Whether a grasper is closed: a hand's in place of the times of the scenario; empty: by those.
   std::optional<bool> grip{};
 };
 
 /// How the body comes to follow what the blade cuts.
 enum class CutPolicy : std::uint8_t {
-  none,           // there is no blade
-  in_step,        // the step that cuts updates or rebuilds it
-  in_step_ahead,  // likewise; windows of its updates are condensed anew beside the steps
-  aside,          // it is made beside the steps, while the blade goes on
-  proposed,       // it is made and solved before the blade, which the tissue resists, has paid for it
-  proposed_aside, // likewise, beside the steps
+  none,                   // there is no blade
+  in_step,                // the step that cuts updates or rebuilds it
+  in_step_ahead,          // likewise; windows of its updates are condensed anew in the background
+  in_background,          // it is made in the background, while the blade goes on
+  proposed,               // it is made and solved before the blade, which the tissue resists, has paid for it
+  proposed_in_background, // likewise, in the background
 };
 CutPolicy cut_policy(const Scenario& scenario, const SessionOptions& options);
 
@@ -52,9 +52,9 @@ bool resists(const Scenario& scenario);
 /// Fine spacings that the blade goes before its body follows the cut.
 double blade_advance(const Scenario& scenario, const SessionOptions& options);
 
-/// Fine spacings of blade.advance where it is left out and a body is made beside the steps, and times blade.advance
+/// Fine spacings of blade.advance where it is left out and a body is made in the background, and times blade.advance
 /// that a blade goes on before the steps wait for that.
-inline constexpr double aside_advance = 0.5, most_advances = 3;
+inline constexpr double background_advance = 0.5, most_advances = 3;
 
 /// Whether the scenario has a blade or a precut, or tissue that tears.
 bool has_cuts(const Scenario& scenario);

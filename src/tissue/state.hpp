@@ -19,9 +19,9 @@ struct SessionProfile {
 /// What a step had to do with a body that was built or updated.
 enum class Rebuild : std::uint8_t {
   none,
-  in_step,     // it did that, or waited for it
-  aside,       // it took over what had been made beside the steps
-  aside_early, // before the blade had gone a third of the way on which it need not wait
+  in_step,             // it did that, or waited for it
+  in_background,       // it took over what had been made in the background
+  in_background_early, // before the blade had gone a third of the way on which it need not wait
 };
 
 /// Who leads the tool: the scenario's path, or a device, to which the path says no more than where nodes are fine at

@@ -7,7 +7,7 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double background_spacings = 5; // fine spacings ahead of the blade for which it is condensed beside the steps
+constexpr double background_spacings = 5; // fine spacings ahead of the blade, condensed in the background
 constexpr double drifted = 1e-8;          // residual of an updated body from which it is condensed anew
 constexpr double looked_after = 0.25;     // fine spacings that the blade goes before its way ahead is looked at again
 constexpr int followed_in_one = 8;        // increments, where every step has one

@@ -1,4 +1,4 @@
-// Condensing a body anew beside the updates by which it follows its cut, so that no step has to do it.
+// Condenses a body anew in the background while updates let it follow its cut, so that no step has to do it.
 #pragma once
 
 #include "src/model/recondensing.hpp"

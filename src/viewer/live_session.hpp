@@ -2,12 +2,10 @@
 // threads (src/live/realtime_loop.hpp) behind calls that a viewer's thread makes and that never wait for it.
 #pragma once
 
-#include "src/devices/pointer_hand.hpp"
 #include "src/live/realtime_loop.hpp"
-#include "src/live/recording.hpp"
+#include "src/viewer/session_recorder.hpp"
+#include "src/viewer/tool_places.hpp"
 
-#include <atomic>
-#include <mutex>
 #include <thread>
 
 namespace spherecut::app {
@@ -46,24 +44,18 @@ class LiveSession {
 
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
   [[nodiscard]] const topology::Domain& domain() const { return *domain_; }
-  [[nodiscard]] std::vector<HandMode> modes() const;
+  [[nodiscard]] const ToolPlaces& places() const { return *places_; }
   /// Nodes at the start.
   [[nodiscard]] int nodes() const { return nodes_; }
   [[nodiscard]] double fine_spacing() const { return fine_; }     // m
   [[nodiscard]] double coarse_spacing() const { return coarse_; } // m
-  /// Away from the organ: the number of a target there is 0.
-  [[nodiscard]] PointerTarget parked(HandMode mode) const;
-  /// Whether the tool can be put down at a place without being in the organ at rest.
-  [[nodiscard]] bool clear_of_organ(const PointerTarget& target) const;
 
   // One viewer thread:
   /// Without effect in a replay.
   void aim(const PointerTarget& target);
   [[nodiscard]] bool replays() const { return hand_ == nullptr; }
-  [[nodiscard]] bool recording() const { return recording_; }
-  [[nodiscard]] const std::filesystem::path& recorded_to() const { return record_; }
-  /// The file is whole soon after, when recording() is false.
-  void stop_recording() { stop_recording_ = true; }
+  [[nodiscard]] const SessionRecorder& recorder() const { return recorder_; }
+  void stop_recording() { recorder_.stop(); }
   void request(ViewerRequest request) { feed_->request(std::move(request)); }
   bool fetch_frame() { return feed_->fetch(); }
   [[nodiscard]] const ViewerFrame& frame() const { return feed_->frame(); }
@@ -77,37 +69,29 @@ class LiveSession {
   [[nodiscard]] std::uint64_t cuts() const { return cuts_; } // solves that cut something
   [[nodiscard]] bool failing() const { return failing_; }    // the last solve failed
   /// Why solves have failed since the last call, each reason once, and what ended the loop.
-  std::vector<std::string> failures();
+  std::vector<std::string> failures() { return failures_.take(); }
 
  private:
   void run();
   void note(const TickRecord& record);
   void note(const SolveRecord& record);
-  void end_recording(std::uint64_t lost);
-
-  void find_contact();
 
   Scenario scenario_;
   std::unique_ptr<HapticSimulation> simulation_;
   std::shared_ptr<const topology::Domain> domain_;
+  std::unique_ptr<const ToolPlaces> places_;
   int nodes_ = 0;
   double fine_ = 0, coarse_ = 0;
-  std::optional<PathPose> tool_start_, blade_start_;
   std::unique_ptr<Device> device_;
   PointerHand* hand_ = nullptr; // device_; null in a replay
-  std::filesystem::path record_;
-  std::unique_ptr<RecordingWriter> writer_; // the loop's; null: nothing is recorded
-  std::atomic<bool> recording_{false}, stop_recording_{false};
+  FailureList failures_;
+  SessionRecorder recorder_{failures_};
   std::unique_ptr<ViewerFeed> feed_;
-  std::unique_ptr<topology::ContactQuery> query_;
   TripleBuffer<LiveTick> ticks_; // from the loop's thread
   LiveTick newest_, summed_;     // the viewer thread's; the loop's
   double latency_ = 0;           // s, worst in this second, the loop's
   std::atomic<std::uint64_t> solves_{0}, cuts_{0};
   std::atomic<bool> failing_{false}, stop_{false};
-  std::mutex failures_mutex_;
-  std::vector<std::string> failures_; // guarded
-  std::string last_failure_;          // guarded
   std::thread thread_;
 };
 

@@ -109,9 +109,9 @@ std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMo
   const BoundingBox box = session.domain().bounds();
   Json modes = Json::array();
   Json park = Json::object();
-  for (const HandMode each : session.modes()) {
+  for (const HandMode each : session.places().modes()) {
     modes.push_back(name_of(each));
-    park[std::string(name_of(each))] = array_of(session.parked(each).position);
+    park[std::string(name_of(each))] = array_of(session.places().parked(each).position);
   }
   const std::string title = scenario.title.empty() ? scenario.file.stem().string() : scenario.title;
   return dumped({{"type", "session"},

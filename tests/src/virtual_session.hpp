@@ -9,11 +9,12 @@
 
 namespace spherecut::tests {
 
-/// Solves at regular ticks that follow tool and cut aside; every third takes over what has been made there.
-inline std::vector<app::SolveEvent> solves_aside(std::uint64_t ticks, std::uint64_t period, std::uint64_t delay) {
+/// Solves at regular ticks that follow tool and cut in the background; every third takes over what has been made there.
+inline std::vector<app::SolveEvent> solves_in_background(std::uint64_t ticks, std::uint64_t period,
+                                                         std::uint64_t delay) {
   std::vector<app::SolveEvent> events = app::regular_solves(ticks, period, delay);
   for (std::size_t i = 0; i < events.size(); ++i) {
-    events[i].aside = true;
+    events[i].in_background = true;
     events[i].swaps = i % 3 == 2;
   }
   return events;

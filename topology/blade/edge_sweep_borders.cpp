@@ -5,8 +5,10 @@
 namespace spherecut::topology {
 
 namespace {
+
 constexpr int samples = 8; // of a point's way
-}
+
+} // namespace
 
 Vector3 EdgeSweep::vertex_of(const Anchor& anchor) const {
   return sheets_.sheets()[anchor.sheet].vertices[anchor.vertex];

@@ -132,7 +132,7 @@ SurfaceMesh subdivide(const SurfaceMesh& mesh) {
 }
 
 /// Moves every vertex within the tangent plane towards the mean of its neighbours, then back onto the surface.
-void relax(SurfaceMesh& mesh) {
+void relax_mesh(SurfaceMesh& mesh) {
   const std::vector<Vector3> normals = vertex_normals(mesh);
   std::vector<Vector3> sum(mesh.vertices.size(), Vector3::Zero());
   std::vector<int> count(mesh.vertices.size(), 0);
@@ -171,7 +171,7 @@ SurfaceMesh make_liver(int target_triangles) {
     project(mesh);
   }
   for (int i = 0; i < 3; ++i)
-    relax(mesh);
+    relax_mesh(mesh);
 
   const Vector3 centre = bounds(mesh).centre();
   for (Vector3& v : mesh.vertices)

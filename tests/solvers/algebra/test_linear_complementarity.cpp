@@ -130,3 +130,18 @@ TEST_CASE("No contact needs no force") {
   CHECK(solution.forces.isZero(0));
   CHECK(solve_complementarity(MatrixX(0, 0), VectorX(0), {}, 1e-12).converged);
 }
+
+TEST_CASE("Complementarity closes gaps and lets go of forces down to the tolerance") {
+  // Springs that do not feel one another, pressed by `depth` or clear of the obstacle by it: force = depth /
+  // compliance.
+  const double compliance = 1e-3; // m/N
+  for (double depth : {1e-3, 5e-7, 2e-9}) {
+    const Eigen::Vector4d gap(-depth, depth, -0.5 * depth, 0);
+    for (const std::vector<char>& start : {std::vector<char>{}, {1, 1, 1, 1}, {0, 1, 0, 1}}) {
+      const ComplementaritySolution solution =
+          solve_complementarity(compliance * MatrixX::Identity(4, 4), gap, start, 1e-10);
+      CHECK(solution.converged);
+      CHECK((solution.forces - Eigen::Vector4d(depth, 0, 0.5 * depth, 0) / compliance).norm() < 1e-12 / compliance);
+    }
+  }
+}

@@ -79,6 +79,45 @@ TEST_CASE("A pressed tool leaves no penetration and no tension, and its force is
       }
 }
 
+TEST_CASE("A plate on a block between smooth walls presses as Hooke's law says, from half a micrometre on") {
+  // Uniaxial strain depth / height, all of the top in contact: force = (lambda + 2 mu) area depth / height.
+  const Vector3 lower(-0.02, -0.02, -0.02), upper(0.02, 0.02, 0);
+  solvers::Problem problem = held_box(lower, upper, 0.005, 0.2, {5e3, 0.3, 1000}, 4);
+  problem.prescribed.clear();
+  problem.touched_from = Vector3::UnitZ();
+  problem.prescribed_region = [](const Vector3&, const Vector3& normal, int axis) {
+    return axis == 2 ? normal.z() < -0.5 : std::abs(normal[axis]) > 0.5;
+  };
+  std::vector<int> top;
+  for (int i = 0; i < problem.nodes.size(); ++i) {
+    const Vector3& x = problem.nodes.positions[i];
+    for (int axis = 0; axis < 3; ++axis)
+      if (x[axis] == lower[axis] || (axis < 2 && x[axis] == upper[axis])) {
+        solvers::Prescribed wall{i, {false, false, false}, Vector3::Zero()};
+        wall.components[axis] = true;
+        problem.prescribed.push_back(wall);
+      }
+    if (x.z() == 0)
+      top.push_back(i);
+  }
+  const solvers::Material& material = problem.material;
+  const double stiffness = (material.lame_lambda() + 2 * material.shear_modulus()) * 0.04 * 0.04 / 0.02; // N/m
+  for (Method method : contact_methods) {
+    const auto body = solvers::discretise(problem, options_for(method));
+    const ContactPatch patch = solvers::condense(*body, top);
+    for (const double depth : {0.5e-6, 2e-6, 1e-4}) {
+      const ContactState state = press(patch, FlatPunch{0.05, 0.05}, {{0, 0, -depth}, Vector3::UnitZ()});
+      INFO(solvers::to_string(method) << ", depth " << depth << ", " << state.tool_force.z() / (stiffness * depth));
+      CHECK(state.converged);
+      CHECK(state.active_nodes == static_cast<int>(top.size()));
+      for (std::size_t c = 0; c < top.size(); ++c)
+        CHECK(std::abs(place(patch, state, c).z() + depth) < 1e-9);
+      // The points of galerkin's background cells leave 8e-5 of a linear field on irregular nodes.
+      CHECK(state.tool_force.z() == Approx(stiffness * depth).epsilon(method == Method::collocation ? 1e-6 : 1e-4));
+    }
+  }
+}
+
 TEST_CASE("At the rim of a leaning punch a node comes to rest on end face or flank") {
   // With these spheres it alternates between the two, from which no round of the linearised contact gets out.
   const solvers::Problem problem = held_box({-0.03, -0.03, -0.03}, {0.03, 0.03, 0}, 0.0075, 0.2, {5e3, 0.45, 1000}, 3);

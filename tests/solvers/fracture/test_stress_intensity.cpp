@@ -4,10 +4,14 @@
 #include "solvers/body/elastic_body.hpp"
 #include "topology/base/errors.hpp"
 
+#include "experiments/analytic/cracks.hpp"
 #include "tests/support/cut_block.hpp"
+#include "topology/incision/cut_sheets.hpp"
 
+#include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 using namespace spherecut;
@@ -17,14 +21,9 @@ using namespace spherecut::tests;
 namespace {
 
 // A discretisation whose field is given in closed form: what the extraction makes of an exact field is its own error.
-class ExactBody final : public Discretisation {
+class ExactBody : public Discretisation {
  public:
-  ExactBody(const CutBlock& block, const Intensities& k) : frame_(block.frame), k_(k) {
-    problem_.domain = block.domain;
-    problem_.incision = block.incision;
-    problem_.nodes = block.nodes;
-    problem_.material = {2, 0.3, 0};
-  }
+  explicit ExactBody(Problem problem) : problem_(std::move(problem)) {}
   Method method() const override { return Method::galerkin; }
   const Problem& problem() const override { return problem_; }
   const AssemblyReport& report() const override { return report_; }
@@ -35,31 +34,102 @@ class ExactBody final : public Discretisation {
   Vector3 contact_point(int) const override { return Vector3::Zero(); }
   MatrixX contact_displacements(const std::vector<int>&, const std::vector<Field>&) const override { return {}; }
   VectorX nodal_displacements(const Field&) const override { return {}; }
-  PointState at(const Vector3& x, const Field&) const override {
-    const Vector3 d = x - frame_.origin;
-    const TipField tip = tip_field(problem_.material, k_, d.dot(frame_.ahead), d.dot(frame_.normal));
-    Matrix3 turn;
-    turn << frame_.ahead, frame_.normal, frame_.tangent;
-    PointState state;
-    // Uniaxial stress along the front and a rotation load no face and carry no intensity.
-    const double nu = problem_.material.poisson_ratio;
-    Matrix3 uniform = 0.3 * ((1 + nu) * frame_.tangent * frame_.tangent.transpose() - nu * Matrix3::Identity());
-    uniform(0, 1) += 0.2;
-    uniform(1, 0) -= 0.2;
-    state.displacement = turn * tip.displacement + uniform * d;
-    state.gradient = turn * tip.gradient * turn.transpose() + uniform;
-    state.strain = 0.5 * (state.gradient + state.gradient.transpose());
-    state.stress = stress_from_gradient(problem_.material, state.gradient);
-    return state;
-  }
   std::vector<Vector3> constraint_forces(const Field&) const override { return {}; }
   double residual(const Field&, const std::vector<int>&, const std::vector<Vector3>&) const override { return 0; }
+
+ protected:
+  PointState state_of(const Vector3& displacement, const Matrix3& gradient) const {
+    PointState state;
+    state.displacement = displacement;
+    state.gradient = gradient;
+    state.strain = 0.5 * (gradient + gradient.transpose());
+    state.stress = stress_from_gradient(problem_.material, gradient);
+    return state;
+  }
 
  private:
   Problem problem_;
   AssemblyReport report_;
+};
+
+// The field of a straight front, with more that carries no intensity.
+class StraightFront final : public ExactBody {
+ public:
+  StraightFront(const CutBlock& block, const Intensities& k)
+      : ExactBody(problem_of(block, {2, 0.3, 0})), frame_(block.frame), k_(k) {}
+  PointState at(const Vector3& x, const Field&) const override {
+    const Vector3 d = x - frame_.origin;
+    const TipField tip = tip_field(problem().material, k_, d.dot(frame_.ahead), d.dot(frame_.normal));
+    Matrix3 turn;
+    turn << frame_.ahead, frame_.normal, frame_.tangent;
+    // Uniaxial stress along the front and a rotation load no face and carry no intensity.
+    const double nu = problem().material.poisson_ratio;
+    Matrix3 uniform = 0.3 * ((1 + nu) * frame_.tangent * frame_.tangent.transpose() - nu * Matrix3::Identity());
+    uniform(0, 1) += 0.2;
+    uniform(1, 0) -= 0.2;
+    return state_of(turn * tip.displacement + uniform * d, turn * tip.gradient * turn.transpose() + uniform);
+  }
+
+ private:
   CutFrame frame_;
   Intensities k_;
+};
+
+// A penny crack of radius 1 m across the z axis in a wide block. The displacement is u_theta(r, z) about the axis: that
+// of a twist by `twist` rad/m and that of a crack whose faces carry -`shear` r / radius.
+class TwistedPenny final : public ExactBody {
+ public:
+  TwistedPenny(double twist, double shear) : ExactBody(penny(twist, shear)), twist_(twist), shear_(shear) {}
+
+  PointState at(const Vector3& x, const Field&) const override {
+    // Fourth order differences on one side of the crack: the error goes with the fourth power of step / distance.
+    const double r = std::hypot(x.x(), x.y()), step = 1e-3 * std::hypot(r - 1, x.z());
+    const auto slope = [step](const auto& u) {
+      return (8 * (u(step) - u(-step)) - u(2 * step) + u(-2 * step)) / (12 * step);
+    };
+    const double side = x.z() < 0 ? -1 : 1, z = std::abs(x.z());
+    const double u = side * around(r, z);
+    const double along_r = side * slope([&](double d) { return around(r + d, z); });
+    // The field is continued across the face by its own formula, up to which it is smooth.
+    const double along_z = z > 2 * step
+                               ? slope([&](double d) { return around(r, z + d); })
+                               : (-25 * around(r, z) + 48 * around(r, z + step) - 36 * around(r, z + 2 * step) +
+                                  16 * around(r, z + 3 * step) - 3 * around(r, z + 4 * step)) /
+                                     (12 * step);
+    const Vector3 out = Vector3(x.x(), x.y(), 0) / r, about = Vector3::UnitZ().cross(out);
+    return state_of(u * about,
+                    about * (along_r * out + along_z * Vector3::UnitZ()).transpose() - u / r * out * about.transpose());
+  }
+
+ private:
+  static Problem penny(double twist, double shear) {
+    Problem problem;
+    problem.domain = topology::make_box_domain(Vector3::Constant(-3), Vector3::Constant(3), 0.2);
+    problem.incision = std::make_shared<topology::Incision>(
+        std::vector<topology::SurfaceMesh>{topology::make_disc_sheet(Vector3::Zero(), Vector3::UnitZ(), 1, 0.04)},
+        problem.domain);
+    problem.nodes.add(Vector3::UnitX(), 0.15, NodeKind::interior, Vector3::Zero());
+    problem.material = {2, 0.3, 0};
+    const double on_faces = problem.material.shear_modulus() * twist - shear; // Pa/m
+    if (on_faces != 0)
+      problem.loads.lip_traction = [on_faces](const Vector3& x, const Vector3& normal) -> Vector3 {
+        return on_faces * normal.z() * Vector3::UnitZ().cross(x);
+      };
+    return problem;
+  }
+
+  // u_theta at z >= 0. The crack's part is 4 shear / (3 pi mu) times
+  //   int_0^inf j_2(k) J_1(k r) exp(-k z) dk up to a factor, with the spherical Bessel function j_2, which is
+  //   int P_2(s) exp(i k s) ds / -2 over -1 < s < 1: integrated over k first, then over zeta = z + i s.
+  double around(double r, double z) const {
+    const std::complex<double> zeta(z, 1), root = std::sqrt(r * r + zeta * zeta);
+    const std::complex<double> first = root, second = 0.5 * (zeta * root - r * r * std::log((zeta + root) / r)),
+                               third = root * root * root / 3.0 - r * r * root;
+    const double crack = (-1.5 * (third - 2 * z * second + z * z * first) - 0.5 * first).imag() / r;
+    return twist_ * r * z + 4 * shear_ / (3 * std::numbers::pi * problem().material.shear_modulus()) * crack;
+  }
+
+  double twist_, shear_;
 };
 
 } // namespace
@@ -67,7 +137,7 @@ class ExactBody final : public Discretisation {
 TEST_CASE("Both extractions find the intensities of an exact field in mixed mode", "[stress_intensity]") {
   const Intensities k(1.3, -0.7, 0.5);
   const CutBlock block = cut_block(14, false, 1);
-  const ExactBody body(block, k);
+  const StraightFront body(block, k);
   const auto front = block.incision->front_frame(block.frame.origin, 0.1);
   REQUIRE(front);
   CHECK((displacement_correlation(body, {}, *front) - k).norm() < 1e-3);
@@ -78,11 +148,40 @@ TEST_CASE("Both extractions find the intensities of an exact field in mixed mode
   CHECK((interaction_integral(body, {}, *front, fine) - k).norm() < 1e-3);
 }
 
+TEST_CASE("At a curved front the integral of the third mode tells twist from intensity", "[stress_intensity]") {
+  const double shear = 0.9; // Pa at the front
+  const double mu = Material{2, 0.3, 0}.shear_modulus();
+  const TwistedPenny crack(shear / mu, shear), twist(shear / mu, 0);
+  const double exact = experiments::torsion_intensity(1, shear);
+  // The field is what the closed forms say of it: the turn of the faces, and no traction on them.
+  for (double r : {0.2, 0.6, 0.95}) {
+    CHECK(crack.at({r, 0, 1e-9}, {}).displacement.y() ==
+          Approx(0.5 * r * experiments::torsion_turn(crack.problem().material, 1, shear, r)).epsilon(1e-6));
+    CHECK(std::abs(crack.at({r, 0, 1e-9}, {}).stress(1, 2)) < 1e-6);
+  }
+  Field loaded;
+  loaded.load_factor = 1;
+  InteractionOptions fine;
+  fine.radial = 40;
+  fine.around = 64;
+  for (double w : {0.3, 2.0, 4.4}) {
+    const auto front = crack.problem().incision->front_frame({std::cos(w), std::sin(w), 0}, 0.1);
+    REQUIRE(front);
+    const Intensities of_crack = interaction_integral(crack, loaded, *front, fine),
+                      of_twist = interaction_integral(twist, loaded, *front, fine);
+    INFO("at " << w << ": " << of_crack.transpose() << " for " << exact << ", and of the twist "
+               << of_twist.transpose());
+    CHECK(std::abs(of_crack[2] - exact) < 2e-3 * exact);
+    CHECK(of_crack.head<2>().norm() < 1e-3 * exact);
+    CHECK(of_twist.norm() < 1e-3 * exact);
+  }
+}
+
 TEST_CASE("The integral holds where its tube leaves the body, if the shift fades towards the surface",
           "[stress_intensity]") {
   const Intensities k(1.3, -0.7, 0.5);
   const CutBlock block = cut_block(14, false, 1);
-  const ExactBody body(block, k);
+  const StraightFront body(block, k);
   int near = 0;
   for (const topology::FrontFrame& front : front_samples(*block.incision, 0.3 * block.nodes.spacings.front())) {
     const double depth = -block.domain->signed_distance(front.point) / block.nodes.spacings.front();
@@ -109,7 +208,7 @@ TEST_CASE("A tube of four spacings' length is shortened where it would leave the
           "[stress_intensity]") {
   const Intensities k(1.3, -0.7, 0.5);
   const CutBlock block = cut_block(14, false, 1);
-  const ExactBody body(block, k);
+  const StraightFront body(block, k);
   int near = 0;
   for (const topology::FrontFrame& front : front_samples(*block.incision, 0.2 * block.nodes.spacings.front())) {
     const double depth = -block.domain->signed_distance(front.point) / block.nodes.spacings.front();
@@ -146,7 +245,7 @@ TEST_CASE("Front samples keep their distance from one another and from the surfa
 TEST_CASE("A tube that leaves the body, a body without a cut and a place without a sheet are refused",
           "[stress_intensity]") {
   const CutBlock block = cut_block(6, false, 1);
-  const ExactBody body(block, {1, 0, 0});
+  const StraightFront body(block, {1, 0, 0});
   const auto front = block.incision->front_frame(block.frame.origin, 0.1);
   InteractionOptions wide;
   wide.outer = 5;
@@ -157,5 +256,5 @@ TEST_CASE("A tube that leaves the body, a body without a cut and a place without
   CHECK_THROWS_WITH(displacement_correlation(body, {}, *front, far), Catch::Contains("no sheet"));
   CutBlock uncut = block;
   uncut.incision = nullptr;
-  CHECK_THROWS_AS(displacement_correlation(ExactBody(uncut, {1, 0, 0}), {}, *front), InputError);
+  CHECK_THROWS_AS(displacement_correlation(StraightFront(uncut, {1, 0, 0}), {}, *front), InputError);
 }

@@ -181,8 +181,8 @@ TEST_CASE("A recording keeps every value, and a session that was killed all that
   CHECK(recording.solves[34].topology == 7 * 340);
   CHECK_FALSE(recording.solves[34].event.swaps);
   CHECK(recording.solves[35].event.swaps);
-  CHECK_FALSE(recording.solves[35].event.aside);
-  CHECK(recording.solves[36].event.aside);
+  CHECK_FALSE(recording.solves[35].event.in_background);
+  CHECK(recording.solves[36].event.in_background);
 }
 
 TEST_CASE("A recording of the first version is read without its torques, and replayed by its forces") {

@@ -219,7 +219,7 @@ TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the 
       cut_block + by_window + replaced(incision_at_end, "step = 0.2", "step = 0.05\nadvance = 0.3");
   const Scenario scenario = scenario_of(replaced(replaced(text, "-0.042", "-0.012"), "-0.043", "-0.013"));
   Session plain(scenario), session(scenario);
-  session.set_options({.following_aside = true});
+  session.set_options({.following_in_background = true});
   std::size_t i = 0;
   const auto go_until_it_cuts = [&] {
     while (i + 1 < session.steps().size() && !session.pending().under_way)

@@ -40,7 +40,7 @@ figures = false
 TEST_CASE("Nodes made beside the steps are those that a step would have made, and give the same force") {
   const Scenario scenario = scenario_of(slide);
   Session waits(scenario), goes_on(scenario);
-  goes_on.set_options({.following_aside = true});
+  goes_on.set_options({.following_in_background = true});
   int followed = 0;
   for (const StepSample& sample : waits.steps()) {
     const bool follows = waits.step(sample).resprinkled;
@@ -66,7 +66,7 @@ TEST_CASE("A tool that leaves the fine zone waits for the next one, and when its
   const Scenario scenario = scenario_of(slide);
   const auto run = [&](std::chrono::milliseconds pause, int& followed) {
     Session session(scenario);
-    session.set_options({.following_aside = true});
+    session.set_options({.following_in_background = true});
     std::vector<VectorX> fields;
     for (const StepSample& sample : session.steps()) {
       followed += session.step(sample).resprinkled ? 1 : 0;
@@ -83,7 +83,7 @@ TEST_CASE("A tool that leaves the fine zone waits for the next one, and when its
 }
 
 TEST_CASE("In the loop nodes made beside it are taken over at the recorded solve, with the same bits") {
-  const LoopRecords records = run_twice(scenario_of(slide), solves_aside(1500, 50, 20), 1500);
+  const LoopRecords records = run_twice(scenario_of(slide), solves_in_background(1500, 50, 20), 1500);
   CHECK(std::count_if(records.solves.begin(), records.solves.end(),
                       [](const SolveRecord& solve) { return solve.resprinkled; }) >= 2);
 }

@@ -28,7 +28,7 @@ void build_and_solve(TissueParts& parts, const StepSample& sample) {
 TEST_CASE("Fronts with more energy than they take tear until they have less, at the toughness of what is torn") {
   TissueParts parts(stretched_bar(0.15, 0.3, bar_notch));
   const TearFronts fronts(parts.state.scenario, parts.state.toughness, parts.state.zone.zone());
-  TearPropagation tears(parts.state, parts.grasping, parts.contact, parts.aside, parts.updater, fronts, nullptr);
+  TearPropagation tears(parts.state, parts.grasping, parts.contact, parts.background, parts.updater, fronts, nullptr);
   build_and_solve(parts, no_tool(0));
   const double before = parts.state.model.incision->area();
   StepResult result;
@@ -50,7 +50,8 @@ TEST_CASE("A blade that is resisted leaves no mark where it is lifted before its
   TissueParts parts(replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 20") +
                     blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.027]"}, 0.04, "0.1"));
   const TearFronts fronts(parts.state.scenario, parts.state.toughness, parts.state.zone.zone());
-  ResistedBlade resisted(parts.state, parts.blade, parts.contact, parts.aside, parts.updater, parts.renewal, fronts);
+  ResistedBlade resisted(parts.state, parts.blade, parts.contact, parts.background, parts.updater, parts.renewal,
+                         fronts);
   build_and_solve(parts, no_tool(0));
   const std::size_t half = parts.state.steps.size() / 2;
   for (std::size_t i = 0; i < half; ++i) {
@@ -105,14 +106,14 @@ TEST_CASE("The fine zone that follows the tool beside the steps becomes the one 
   REQUIRE(waits.state.zone.must_follow(centre));
   for (TissueParts* parts : {&waits, &goes_on})
     parts->contact.solve(waits.state.steps.back(), parts->state.model);
-  ToolFollowing within(waits.state, waits.contact, waits.updater, waits.aside, waits.renewal);
+  ToolFollowing within(waits.state, waits.contact, waits.updater, waits.background, waits.renewal);
   StepResult result;
   within.follow(sample, centre, result);
   CHECK(result.resprinkled);
   CHECK(waits.state.rebuild == Rebuild::in_step);
-  ToolFollowing beside(goes_on.state, goes_on.contact, goes_on.updater, goes_on.aside, goes_on.renewal);
-  beside.follow_aside(sample, centre);
-  REQUIRE(goes_on.aside.is_following());
+  ToolFollowing beside(goes_on.state, goes_on.contact, goes_on.updater, goes_on.background, goes_on.renewal);
+  beside.follow_in_background(sample, centre);
+  REQUIRE(goes_on.background.is_following());
   CHECK_FALSE(beside.has_taken());
   beside.take();
   CHECK(beside.has_taken());

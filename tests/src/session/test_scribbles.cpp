@@ -158,7 +158,7 @@ Scribbled scribble(unsigned seed, int each) {
   Scribbled out;
   ScribblingHand hand(seed);
   const std::vector<HandPoint> way = hand.scribbles(each);
-  const bool aside = seed % 2 == 0;
+  const bool in_background = seed % 2 == 0;
   HapticSimulation simulation(scribbled_scenario());
   const Session& session = simulation.session();
   const double whole = topology::volume(session.organ().domain->surface());
@@ -178,7 +178,7 @@ Scribbled scribble(unsigned seed, int each) {
   pose(0);
   simulation.prepare(device);
   SolveEvent event;
-  event.aside = aside;
+  event.in_background = in_background;
   ContactSnapshot snapshot;
   std::size_t next = 0;
   double area = 0;

@@ -132,7 +132,7 @@ Outcome draw(unsigned seed, bool resists) {
   pose(0);
   simulation.prepare(device);
   SolveEvent event;
-  event.aside = true;
+  event.in_background = true;
   const double least = session.zone().spacing.fine; // m
   constexpr std::uint64_t end = WavyStroke::ticks + 2 * WavyStroke::in + 3000;
   std::uint64_t next = 0;

@@ -17,10 +17,10 @@ struct TissueParts {
   app::SessionState state;
   app::BladeTrack blade{state.scenario};
   app::Grasping grasping{state.scenario, *state.organ.domain};
-  app::AsideBodies aside;
-  app::ContactSolver contact{state, grasping, blade, aside};
+  app::BackgroundBodies background;
+  app::ContactSolver contact{state, grasping, blade, background};
   app::WindowRenewal renewal{state, blade};
-  app::BodyUpdater updater{state, contact, grasping, aside, renewal};
+  app::BodyUpdater updater{state, contact, grasping, background, renewal};
 };
 
 } // namespace spherecut::tests

@@ -30,7 +30,7 @@ position = [0.034, -0.012, 0.018]
 
 // Steps beside which bodies are made; each is there at the third step after it was begun. `look` sees every step.
 void go(Session& session, const std::function<void(const StepResult&)>& look) {
-  session.set_options({.following_aside = true});
+  session.set_options({.following_in_background = true});
   int since = 0;
   for (const StepSample& sample : session.steps()) {
     since = session.pending().under_way ? since + 1 : 0;
@@ -48,25 +48,25 @@ TEST_CASE("A resisted blade whose cuts are made beside the steps waits at the fo
   const double area = run(in_step).back().cut->area;
   REQUIRE(area > 0.75 * 0.012 * 0.0198);
 
-  Session aside(scenario);
+  Session background(scenario);
   int waited = 0, taken = 0, in_the_step = 0;
   double shown = 0, last = 0, force = 0;
   std::uint64_t hash = 0;
   StepResult end;
-  go(aside, [&](const StepResult& step) {
+  go(background, [&](const StepResult& step) {
     CHECK_FALSE(step.cut->refused);
     CHECK(step.cut->area >= last);
-    taken += step.rebuild == Rebuild::aside ? 1 : 0;
+    taken += step.rebuild == Rebuild::in_background ? 1 : 0;
     in_the_step += step.rebuild == Rebuild::in_step ? 1 : 0;
-    if (aside.pending().under_way && step.cut->area > 0) { // what is shown and felt is the body that is there
+    if (background.pending().under_way && step.cut->area > 0) { // what is shown and felt is the body that is there
       ++waited;
       if (step.cut->area == shown)
         CHECK(step.cut->surface_hash == hash);
       shown = step.cut->area;
       hash = step.cut->surface_hash;
       CHECK(step.cut->blade.release <= std::max(toughness, force) * (1 + 1e-4)); // it does not rise
-      CHECK(aside.pending().lags == aside.blade()->lags());
-      CHECK((aside.blade()->lags() || step.cut->blade.release <= toughness * (1 + 1e-4)));
+      CHECK(background.pending().lags == background.blade()->lags());
+      CHECK((background.blade()->lags() || step.cut->blade.release <= toughness * (1 + 1e-4)));
     }
     last = step.cut->area;
     force = step.cut->blade.release;
@@ -75,7 +75,7 @@ TEST_CASE("A resisted blade whose cuts are made beside the steps waits at the fo
   CHECK(waited > 5);
   CHECK(taken > 4);
   CHECK(in_the_step <= 2); // when it leaves
-  CHECK_FALSE(aside.pending().under_way);
+  CHECK_FALSE(background.pending().under_way);
   CHECK(end.cut->area == Approx(area).epsilon(0.02));
   CHECK(end.cut->pieces == 1);
   const solvers::BladeLedger& ledger = end.cut->blade.ledger;
@@ -88,15 +88,15 @@ TEST_CASE("A blade whose first cut is long in the making waits for it, and nothi
   const Scenario scenario = scenario_of(through_a_corner);
   Session in_step(scenario);
   const double area = run(in_step).back().cut->area;
-  Session aside(scenario);
-  aside.set_options({.following_aside = true});
+  Session background(scenario);
+  background.set_options({.following_in_background = true});
   int waited = 0;
   StepResult end;
-  for (const StepSample& sample : aside.steps()) { // bodies are taken where the blade has got too far ahead
-    end = aside.step(sample);
-    if (end.cut->area > 0 || !aside.pending().under_way)
+  for (const StepSample& sample : background.steps()) { // bodies are taken where the blade has got too far ahead
+    end = background.step(sample);
+    if (end.cut->area > 0 || !background.pending().under_way)
       continue;
-    waited += aside.blade()->lags() ? 1 : 0;
+    waited += background.blade()->lags() ? 1 : 0;
     CHECK(end.cut->blade.release <= 2.4 * toughness * (1 + 1e-4));
   }
   CHECK(waited >= 2);
@@ -107,7 +107,7 @@ TEST_CASE("A blade whose first cut is long in the making waits for it, and nothi
 }
 
 TEST_CASE("A session whose resisted blade is followed beside the steps comes out the same twice") {
-  const LoopRecords records = run_twice(scenario_of(through_a_corner), solves_aside(400, 10, 10), 400);
+  const LoopRecords records = run_twice(scenario_of(through_a_corner), solves_in_background(400, 10, 10), 400);
   CHECK(records.solves.back().cut_area > 1e-4);
   CHECK(std::count_if(records.solves.begin(), records.solves.end(),
                       [](const SolveRecord& solve) { return solve.update == "taken over"; }) > 4);
@@ -117,7 +117,7 @@ TEST_CASE("A proposal under way is dropped with the blade, or where steps are to
   const Scenario scenario = scenario_of(through_a_corner);
   const bool is_lifted = GENERATE(true, false);
   Session session(scenario);
-  session.set_options({.following_aside = true});
+  session.set_options({.following_in_background = true});
   std::size_t i = 0;
   double area = 0;
   for (; i < session.steps().size() && !(session.pending().under_way && area > 0); ++i) {
@@ -130,7 +130,7 @@ TEST_CASE("A proposal under way is dropped with the blade, or where steps are to
   if (is_lifted)
     session.lift_blade();
   else
-    session.set_options({.following_aside = false});
+    session.set_options({.following_in_background = false});
   CHECK_FALSE(session.pending().under_way);
   CHECK_FALSE(session.swap_body());
   CHECK(topology::surface_hash(session.wound()->surface) == hash);
@@ -146,7 +146,7 @@ TEST_CASE("A proposal under way is dropped with the blade, or where steps are to
 TEST_CASE("A resisted blade that is left in the tissue still cuts what it has come to") {
   const Scenario scenario = scenario_of(through_a_corner);
   Session session(scenario);
-  session.set_options({.going_on = true, .following_aside = true});
+  session.set_options({.going_on = true, .following_in_background = true});
   double area = 0;
   std::optional<StepSample> last;
   for (const StepSample& sample : session.steps()) {

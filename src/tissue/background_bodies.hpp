@@ -1,4 +1,4 @@
-// Bodies made beside the steps, on threads of their own: the body as it is goes on meanwhile.
+// Bodies made in the background, on threads of their own: the body as it is goes on meanwhile.
 #pragma once
 
 #include "src/tissue/cut_report.hpp"
@@ -9,17 +9,17 @@
 
 namespace spherecut::app {
 
-/// A body that was made beside the steps, and how.
-struct MadeAside {
+/// A body that was made in the background, and how.
+struct BackgroundBody {
   BodyModel model;
   BodyUpdate report;
 };
 
 /// One body at a time is computed. It follows the tool or a cut, or it is what a blade that is resisted will cut next.
 /// What is taken or dropped is not there any more; what is dropped is computed to its end before the next one begins.
-class AsideBodies {
+class BackgroundBodies {
  public:
-  using Make = std::function<MadeAside()>;
+  using Make = std::function<BackgroundBody()>;
 
   /// A body that follows.
   struct Following {
@@ -46,9 +46,9 @@ class AsideBodies {
   [[nodiscard]] bool has_arrived() const { return proposing_ && proposing_->arrived; }
 
   /// The one that follows, and what it is for; get() waits for it, and throws what making it has thrown.
-  std::pair<Following, std::future<MadeAside>> take_following();
+  std::pair<Following, std::future<BackgroundBody>> take_following();
   /// Likewise.
-  std::pair<Proposing, std::future<MadeAside>> take_proposing();
+  std::pair<Proposing, std::future<BackgroundBody>> take_proposing();
   void drop_following();
   void drop_proposing();
   /// Waits for the proposed one; the next step is to take it.
@@ -62,12 +62,12 @@ class AsideBodies {
   template <class What>
   struct Making {
     What what;
-    std::future<MadeAside> made;
+    std::future<BackgroundBody> made;
     bool arrived = false;
   };
-  std::future<MadeAside> begin(Make make);
+  std::future<BackgroundBody> begin(Make make);
 
-  std::future<MadeAside> unwanted_; // one that nobody will take
+  std::future<BackgroundBody> unwanted_; // one that nobody will take
   std::optional<Making<Following>> following_;
   std::optional<Making<Proposing>> proposing_;
 };

@@ -62,9 +62,10 @@ bool same_sheets(const Session& a, const Session& b) {
 }
 
 // Cut area, m2, of a session that is solved at these ticks; how often a body was left under way.
-double area_when_solved(const Scenario& scenario, bool aside, const std::vector<std::uint64_t>& ticks, int& beside) {
+double area_when_solved(const Scenario& scenario, bool in_background, const std::vector<std::uint64_t>& ticks,
+                        int& beside) {
   HapticSimulation simulation(scenario);
-  simulation.set_following_aside(aside);
+  simulation.set_following_in_background(in_background);
   ScriptedPath device(simulation.path(), scenario.haptics.rate);
   ContactSnapshot snapshot;
   simulation.prepare(device.read(0));
@@ -88,7 +89,7 @@ TEST_CASE("A body made beside the steps is the one that a step would have made, 
       scenario_of((is_pressed ? pressed_and_cut : in_and_out) + "[method]\nname = \"" + std::string(method) + "\"\n");
   Session waits(scenario), goes_on(scenario);
   waits.set_options({.updating = false});
-  goes_on.set_options({.following_aside = true});
+  goes_on.set_options({.following_in_background = true});
   int followed = 0;
   bool is_same = true;
   double area = 0;
@@ -138,7 +139,7 @@ TEST_CASE("A blade that is too far ahead waits for its body, and when a thread r
   const Scenario scenario = scenario_of(pressed_and_cut);
   const auto run = [&](std::chrono::milliseconds pause, int& followed, double& area) {
     Session session(scenario);
-    session.set_options({.following_aside = true});
+    session.set_options({.following_in_background = true});
     std::vector<VectorX> fields;
     for (const StepSample& sample : session.steps()) {
       const StepResult result = session.step(sample);
@@ -164,19 +165,19 @@ TEST_CASE("A blade that is too far ahead waits for its body, and when a thread r
 TEST_CASE("A blade that leaves the tissue or is lifted while its body is under way has cut what it went through") {
   const Scenario scenario = scenario_of(in_and_out);
   const int swaps = GENERATE(0, 2, 5); // steps from the beginning of a body to where it takes over; 0: when waited for
-  Session plain(scenario), aside(scenario);
-  aside.set_options({.following_aside = true});
+  Session plain(scenario), background(scenario);
+  background.set_options({.following_in_background = true});
   int under_way = 0, followed = 0;
   StepResult here, there;
   for (const StepSample& sample : plain.steps()) {
     here = plain.step(sample);
-    there = aside.step(sample);
+    there = background.step(sample);
     CHECK_FALSE(there.cut->refused);
     followed += there.cut->update == SystemUpdate::taken_over ? 1 : 0;
     CHECK(there.cut->area <= here.cut->area * (1 + 1e-3));
-    under_way = aside.pending().under_way ? under_way + 1 : 0;
+    under_way = background.pending().under_way ? under_way + 1 : 0;
     if (swaps > 0 && under_way >= swaps)
-      CHECK(aside.swap_body());
+      CHECK(background.swap_body());
   }
   CHECK(followed >= 2);
   CHECK(there.cut->area == Approx(here.cut->area).epsilon(1e-3)); // the body is at rest, poses are the same there
@@ -184,11 +185,11 @@ TEST_CASE("A blade that leaves the tissue or is lifted while its body is under w
   CHECK(there.cut->sheets == here.cut->sheets);
 }
 
-TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the cut that was under way") {
+TEST_CASE("A blade lifted by the hand, or no longer followed in the background, leaves the cut that was under way") {
   const bool lifts = GENERATE(true, false);
   const Scenario scenario = scenario_of(in_and_out);
   Session session(scenario);
-  session.set_options({.following_aside = true});
+  session.set_options({.following_in_background = true});
   std::size_t i = 0;
   while (i < session.steps().size() && !session.pending().under_way)
     session.step(session.steps()[i++]);
@@ -197,7 +198,7 @@ TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the c
   if (lifts)
     session.lift_blade();
   else
-    session.set_options({.following_aside = false});
+    session.set_options({.following_in_background = false});
   const StepResult result = session.step(session.steps()[i]);
   CHECK_FALSE(session.pending().under_way);
   CHECK(result.cut->triangles > 0);
@@ -206,10 +207,10 @@ TEST_CASE("A blade lifted by the hand, or no longer followed aside, leaves the c
 }
 
 TEST_CASE("What was put off is cut when the blade is lifted or gone") {
-  const bool aside = GENERATE(true, false), is_gone = GENERATE(true, false);
+  const bool in_background = GENERATE(true, false), is_gone = GENERATE(true, false);
   const int poses = GENERATE(3, 65);
   Session session(scenario_of(in_and_out));
-  session.set_options({.following_aside = aside});
+  session.set_options({.following_in_background = in_background});
   std::size_t i = 0;
   while (session.model().incision == nullptr)
     session.step(session.steps()[i++]);
@@ -235,7 +236,7 @@ TEST_CASE("What was put off is cut when the blade is lifted or gone") {
     result = session.step(sample);
     CHECK_FALSE(result.cut->refused);
     if (session.pending().under_way) {
-      CHECK(aside);
+      CHECK(in_background);
       CHECK(session.swap_body());
     }
   }
@@ -245,9 +246,9 @@ TEST_CASE("What was put off is cut when the blade is lifted or gone") {
 
 TEST_CASE("Beside the steps a cut is put off by half a spacing unless the scenario says how far, and not at all at 0") {
   const std::string left_out = replaced(pressed_and_cut, "advance = 0.4\n", "");
-  const auto increments = [](const std::string& text, bool aside, int& beside) {
+  const auto increments = [](const std::string& text, bool in_background, int& beside) {
     Session session(scenario_of(text));
-    session.set_options({.following_aside = aside});
+    session.set_options({.following_in_background = in_background});
     int count = 0;
     beside = 0;
     for (const StepSample& sample : session.steps()) {
@@ -272,7 +273,7 @@ TEST_CASE("Beside the steps a cut is put off by half a spacing unless the scenar
 
 TEST_CASE("A blade that comes to rest is followed to where it is") {
   Session session(scenario_of(pressed_and_cut));
-  session.set_options({.following_aside = true});
+  session.set_options({.following_in_background = true});
   std::size_t i = 0;
   while (session.model().incision == nullptr) {
     session.step(session.steps()[i++]);
@@ -306,27 +307,28 @@ TEST_CASE("A blade that comes to rest is followed to where it is") {
 TEST_CASE("What is made beside the steps in time makes no nodes coarser, and early it makes them finer again") {
   DegradationRule rule(0.01);
   rule.solved(Rebuild::none, 1);
-  rule.solved(Rebuild::aside, 1);
-  rule.solved(Rebuild::aside_early, 1);
+  rule.solved(Rebuild::in_background, 1);
+  rule.solved(Rebuild::in_background_early, 1);
   CHECK(rule.level() == 0);
   rule.solved(Rebuild::in_step, 0.3); // the blade was too far ahead: it waited
   CHECK(rule.level() == 1);
   for (int i = 0; i < 7; ++i)
-    rule.solved(Rebuild::aside_early, 0.3);
-  rule.solved(Rebuild::aside, 0.3);
+    rule.solved(Rebuild::in_background_early, 0.3);
+  rule.solved(Rebuild::in_background, 0.3);
   CHECK(rule.level() == 1);
   for (int i = 0; i < 8; ++i)
-    rule.solved(Rebuild::aside_early, 0.3);
+    rule.solved(Rebuild::in_background_early, 0.3);
   CHECK(rule.level() == 0);
 }
 
 TEST_CASE("A scripted blade cuts to the end of its way however seldom it is solved, in real time beside the steps") {
-  const bool aside = GENERATE(true, false);
+  const bool in_background = GENERATE(true, false);
   const Scenario scenario = scenario_of(pressed_and_cut);
   int beside = 0;
   // 1000: the end of its way
-  const double area = area_when_solved(scenario, aside, {0, 100, 200, 450, 1000, 1300, 1310, 1320, 1330}, beside);
-  CHECK((beside >= 2) == aside);
+  const double area =
+      area_when_solved(scenario, in_background, {0, 100, 200, 450, 1000, 1300, 1310, 1320, 1330}, beside);
+  CHECK((beside >= 2) == in_background);
   CHECK(area == Approx(cut_area(scenario)).epsilon(0.01));
 }
 
@@ -339,12 +341,12 @@ TEST_CASE("A scripted blade that is past the end of its way at the next solve ha
 
 TEST_CASE("A step tells what it had to do with a body that was made anew") {
   Session session(scenario_of(pressed_and_cut));
-  session.set_options({.following_aside = true});
+  session.set_options({.following_in_background = true});
   int early = 0, late = 0, in_step = 0, steps = 0;
   for (const StepSample& sample : session.steps()) {
     const Rebuild rebuild = session.step(sample).rebuild;
-    early += rebuild == Rebuild::aside_early ? 1 : 0;
-    late += rebuild == Rebuild::aside ? 1 : 0;
+    early += rebuild == Rebuild::in_background_early ? 1 : 0;
+    late += rebuild == Rebuild::in_background ? 1 : 0;
     in_step += rebuild == Rebuild::in_step ? 1 : 0;
     steps = session.pending().under_way ? steps + 1 : 0;
     if (steps == (early == 0 ? 1 : late == 0 ? 4 : 50)) // at once, later, and not before it has to wait
@@ -375,8 +377,9 @@ TEST_CASE("While the blade moves fields of the contact are not made for a body t
   CHECK(press_on(0) > 0);
 }
 
-TEST_CASE("In the loop a body that followed its cut aside takes over at the recorded solve, with the same bits") {
-  const LoopRecords records = run_twice(scenario_of(pressed_and_cut), solves_aside(1000, 40, 20), 1000);
+TEST_CASE(
+    "In the loop a body that followed its cut in the background takes over at the recorded solve, with the same bits") {
+  const LoopRecords records = run_twice(scenario_of(pressed_and_cut), solves_in_background(1000, 40, 20), 1000);
   CHECK(std::count_if(records.solves.begin(), records.solves.end(),
                       [](const SolveRecord& solve) { return solve.update == "taken over"; }) >= 3);
 }
