@@ -21,7 +21,7 @@ struct RegionPlace {
 };
 
 BoxRegion region_box(const RegionPlace& at) {
-  const BoxRegion box{at.section.vector("lower"), at.section.vector("upper")};
+  BoxRegion box{at.section.vector("lower"), at.section.vector("upper")};
   for (int axis = 0; axis < 3; ++axis)
     if (!(box.lower[axis] < box.upper[axis])) {
       at.refuse("lower", fmt::format("lower: {} = {:g} m is not below that of upper, {:g} m; allowed: lower < upper in "
