@@ -13,17 +13,17 @@ constexpr int largest_size = linear_size + InterfaceRamps::most_ramps;
 constexpr double least_pivot = 1e-11;  // of a unit diagonal: what is left of a ramp that says nothing new
 constexpr double widest_ramp_sum = 20; // largest sum of |h_j|: beyond, the basis extrapolates
 
-using Moments = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, largest_size, largest_size>;
-using Coefficients = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, largest_size, 1>;
+using RampMoments = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, largest_size, largest_size>;
+using RampCoefficients = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, largest_size, 1>;
 
-using Turning = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, InterfaceRamps::most_ramps>;
+using RampTurning = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, InterfaceRamps::most_ramps>;
 
 /// Basis, weights and weight gradients of the nodes of a support; memory of a thread.
 struct RampMembers {
-  std::vector<Coefficients> basis;
+  std::vector<RampCoefficients> basis;
   std::vector<double> weight;
-  std::vector<Vector3> slope;   // of the weight, 1/m
-  std::vector<Turning> turning; // gradients of the ramps as their planes turn, 1/m
+  std::vector<Vector3> slope;       // of the weight, 1/m
+  std::vector<RampTurning> turning; // gradients of the ramps as their planes turn, 1/m
   void resize(int count) {
     turning.resize(count);
     basis.resize(count);
@@ -39,9 +39,9 @@ RampMembers& ramp_members_of_this_thread() {
 
 /// Columns of the basis that are left after those that depend on the ones before, by a Cholesky factorisation with a
 /// unit diagonal; the linear ones stay.
-std::vector<int> independent_columns(const Moments& scaled) {
+std::vector<int> independent_columns(const RampMoments& scaled) {
   const auto n = scaled.rows();
-  Moments lower = Moments::Zero(n, n);
+  RampMoments lower = RampMoments::Zero(n, n);
   std::vector<int> kept;
   for (int j = 0; j < n; ++j) {
     double pivot = scaled(j, j);
@@ -64,32 +64,32 @@ std::vector<int> independent_columns(const Moments& scaled) {
 
 /// Shape functions of the least squares fit with these moments: h_j = w_j P_j . M^-1 e_0, and their gradients. False
 /// where the moments are worse conditioned than allowed or the fit extrapolates.
-bool fit_with_ramps(const Moments& moments, double scale, double worst_condition, RampMembers& members,
+bool fit_with_ramps(const RampMoments& moments, double scale, double worst_condition, RampMembers& members,
                     ShapeFunctions& out) {
   const auto size = moments.rows();
-  Coefficients unit(size); // scales the diagonal to one
+  RampCoefficients unit(size); // scales the diagonal to one
   for (Eigen::Index j = 0; j < size; ++j)
     unit[j] = moments(j, j) > 0 ? 1 / std::sqrt(moments(j, j)) : 0;
-  const Moments scaled = unit.asDiagonal() * moments * unit.asDiagonal();
+  const RampMoments scaled = unit.asDiagonal() * moments * unit.asDiagonal();
   const std::vector<int> kept = independent_columns(scaled);
   const auto left = std::ssize(kept);
-  Moments least(left, left);
+  RampMoments least(left, left);
   for (Eigen::Index j = 0; j < left; ++j)
     for (Eigen::Index i = 0; i < left; ++i)
       least(i, j) = scaled(kept[i], kept[j]);
-  const Moments inverse = least.inverse();
+  const RampMoments inverse = least.inverse();
   out.moment_condition = least.cwiseAbs().colwise().sum().maxCoeff() * inverse.cwiseAbs().colwise().sum().maxCoeff();
   if (!(out.moment_condition <= worst_condition))
     return false;
 
-  const Coefficients value = unit[0] * inverse.col(0);
-  std::array<Coefficients, 3> slope;
+  const RampCoefficients value = unit[0] * inverse.col(0);
+  std::array<RampCoefficients, 3> slope;
   for (int axis = 0; axis < 3; ++axis)
-    slope[axis] = scale * unit[1 + axis] * Coefficients::Unit(left, 1 + axis);
+    slope[axis] = scale * unit[1 + axis] * RampCoefficients::Unit(left, 1 + axis);
   const std::size_t n = members.basis.size();
   for (std::size_t k = 0; k < n; ++k) {
-    Coefficients of(left);
-    Turning turning = Turning::Zero(3, left - linear_size);
+    RampCoefficients of(left);
+    RampTurning turning = RampTurning::Zero(3, left - linear_size);
     for (Eigen::Index j = 0; j < left; ++j) {
       of[j] = unit[kept[j]] * members.basis[k][kept[j]];
       if (j >= linear_size)
@@ -104,8 +104,8 @@ bool fit_with_ramps(const Moments& moments, double scale, double worst_condition
       slope[axis].tail(left - linear_size) -= members.weight[k] * fitted * turning.row(axis).transpose();
     }
   }
-  for (Coefficients& along : slope)
-    along = Coefficients(inverse * along);
+  for (RampCoefficients& along : slope)
+    along = RampCoefficients(inverse * along);
   for (std::vector<double>* array : {&out.value, &out.dx, &out.dy, &out.dz})
     array->resize(n);
   double sum = 0;
@@ -171,15 +171,15 @@ InterfaceRamps::Outcome InterfaceRamps::evaluate(const Vector3& x, const shape_k
   RampMembers& members = ramp_members_of_this_thread();
   members.resize(n);
   const double scale = std::sqrt(support.q[0]); // 1/m
-  Moments moments = Moments::Zero(size, size);
+  RampMoments moments = RampMoments::Zero(size, size);
   for (int k = 0; k < n; ++k) {
     const Vector3 d(support.dx[k], support.dy[k], support.dz[k]);
     const double q = support.q[k], s = std::sqrt(q) * d.norm(), t = std::max(1 - s, 0.0);
-    Coefficients& p = members.basis[k];
+    RampCoefficients& p = members.basis[k];
     p.resize(size);
     p[0] = 1;
     p.segment<3>(1) = scale * d;
-    members.turning[k] = Turning::Zero(3, crossed.count);
+    members.turning[k] = RampTurning::Zero(3, crossed.count);
     for (int r = 0; r < crossed.count; ++r) {
       const TangentPlane& plane = crossed.planes[r];
       p[linear_size + r] = 0;

@@ -17,21 +17,21 @@ std::shared_ptr<const MaterialRegions> two_regions(std::vector<RegionFace> first
   return std::make_shared<const MaterialRegions>(std::move(regions));
 }
 
-const Vector3 across = Vector3(0.1, -0.2, 1).normalized(); // normal of the layers
+const Vector3 layer_normal = Vector3(0.1, -0.2, 1).normalized(); // normal of the layers
 
-/// Layers along `across`: the first region up to 0.4, the second from 0.4 to 0.75.
+/// Layers along `layer_normal`: the first region up to 0.4, the second from 0.4 to 0.75.
 std::shared_ptr<const MaterialRegions> tilted_layers() {
-  return two_regions(half_space_faces({across, 0.4}), slab_faces({across, 0.75}, 0.35));
+  return two_regions(half_space_faces({layer_normal, 0.4}), slab_faces({layer_normal, 0.75}, 0.35));
 }
 
 /// Continuous, linear in each layer.
 double kinked(const Vector3& x) {
-  const double s = across.dot(x);
+  const double s = layer_normal.dot(x);
   return 0.3 + 0.2 * x.x() - 0.7 * x.y() + 1.5 * s + 3 * std::max(s - 0.4, 0.0) - 7 * std::max(s - 0.75, 0.0);
 }
 Vector3 gradient_of_kinked(const Vector3& x) {
-  const double s = across.dot(x);
-  return Vector3(0.2, -0.7, 0) + (1.5 + (s > 0.4 ? 3 : 0) - (s > 0.75 ? 7 : 0)) * across;
+  const double s = layer_normal.dot(x);
+  return Vector3(0.2, -0.7, 0) + (1.5 + (s > 0.4 ? 3 : 0) - (s > 0.75 ? 7 : 0)) * layer_normal;
 }
 
 Spheres spheres_with(const Problem& box, std::shared_ptr<const MaterialRegions> regions) {
