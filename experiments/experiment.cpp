@@ -80,6 +80,7 @@ const std::vector<Experiment>& all_experiments() {
       {"pure_shear_crack", "a crack in a wide strip stretched by up to 80 %: its energy release rate",
        run_pure_shear_crack},
       {"gaping", "a cut through half of a block stretched by 20 and 40 % opens as in finite elements", run_gaping},
+      {"layers", "two materials in one body: layers compressed and bent, a stiff ball that swells", run_layers},
       {"truth_cube", "a silicone cube under plate and ball: fitted at the smallest compression, the others predicted",
        run_truth_cube},
       {"liver_blade", "a straight edge through a block of liver: force a millimetre, indentation before the cut",

@@ -45,5 +45,6 @@ std::vector<Check> run_finite_locking(const ExperimentContext& context);
 std::vector<Check> run_tissue_fuzz(const ExperimentContext& context);
 std::vector<Check> run_pure_shear_crack(const ExperimentContext& context);
 std::vector<Check> run_gaping(const ExperimentContext& context);
+std::vector<Check> run_layers(const ExperimentContext& context);
 
 } // namespace spherecut::experiments

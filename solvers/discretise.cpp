@@ -29,6 +29,8 @@ std::unique_ptr<Discretisation> discretise(Problem problem, const Discretisation
   if (options.quadrature < 1 || !(options.cell_size > 0) || !std::isfinite(options.cell_size))
     throw InputError(fmt::format("background cells of {:g} spacings with {} points a direction; allowed: both above 0",
                                  options.cell_size, options.quadrature));
+  if (options.method != Method::galerkin)
+    require_one_material(problem, fmt::format("method {}", to_string(options.method)));
   switch (options.method) {
   case Method::collocation:
     return make_collocation(std::move(problem), options);

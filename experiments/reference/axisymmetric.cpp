@@ -124,17 +124,24 @@ std::vector<double> graded_interval(double dense, double coarse, int n, double e
 
 AxisymmetricSolution solve_axisymmetric(const AxisymmetricGrid& grid, const solvers::Material& material,
                                         const std::vector<AxisymmetricSupport>& supports) {
-  material.check();
+  return solve_axisymmetric(
+      grid, [&](const Vector2&) { return material; }, supports);
+}
+
+AxisymmetricSolution solve_axisymmetric(const AxisymmetricGrid& grid,
+                                        const std::function<solvers::Material(const Vector2& middle)>& material_of,
+                                        const std::vector<AxisymmetricSupport>& supports) {
   check(grid);
   const int nodes = static_cast<int>(grid.nodes.size()), unknowns = 2 * nodes;
-  const Eigen::Matrix4d D = elastic_matrix(material);
 
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(static_cast<std::size_t>(grid.rows / 2) * (grid.columns / 2) * 324);
   for (int row = 0; row + 2 < grid.rows; row += 2)
     for (int column = 0; column + 2 < grid.columns; column += 2) {
       const ElementNodes element = element_nodes(grid, row, column);
-      const ElementMatrix K = element_stiffness(grid, element, D);
+      const solvers::Material material = material_of(grid.nodes[element[4]]);
+      material.check();
+      const ElementMatrix K = element_stiffness(grid, element, elastic_matrix(material));
       for (int i = 0; i < 18; ++i)
         for (int j = 0; j < 18; ++j)
           entries.emplace_back(2 * element[i / 2] + i % 2, 2 * element[j / 2] + j % 2, K(i, j));

@@ -44,5 +44,9 @@ struct AxisymmetricSolution {
 /// support outside it, NumericalError naming an inverted element or for a singular system (body not held).
 AxisymmetricSolution solve_axisymmetric(const AxisymmetricGrid& grid, const solvers::Material& material,
                                         const std::vector<AxisymmetricSupport>& supports);
+/// The same of several materials: `material_of` tells that of the element with its middle node at (r, z).
+AxisymmetricSolution solve_axisymmetric(const AxisymmetricGrid& grid,
+                                        const std::function<solvers::Material(const Vector2& middle)>& material_of,
+                                        const std::vector<AxisymmetricSupport>& supports);
 
 } // namespace spherecut::experiments

@@ -78,6 +78,7 @@ int base_nodes(const NodeCloud& nodes) {
 std::unique_ptr<Discretisation> make_appended(Problem problem, const DiscretisationOptions& options,
                                               std::shared_ptr<const UncutBody>& uncut) {
   require_domain(problem);
+  require_one_material(problem, "a cut that appends");
   check_problem(problem);
   const int base = base_nodes(problem.nodes);
   const bool makes = uncut == nullptr || !uncut->fits(problem, base);
@@ -369,7 +370,7 @@ PointState AppendedBody::at(const Vector3& x, const Field& field) const {
   require_own(field);
   thread_local ShapeFunctions shape;
   shape_at(x, shape);
-  return state_from(problem_, shape, field);
+  return state_from(problem_, problem_.material, shape, field);
 }
 
 VectorX AppendedBody::nodal_displacements(const Field& field) const {

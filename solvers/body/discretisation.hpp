@@ -3,7 +3,7 @@
 #pragma once
 
 #include "solvers/body/held_region.hpp"
-#include "solvers/elasticity/material.hpp"
+#include "solvers/elasticity/regions.hpp"
 #include "solvers/nodes/nodes.hpp"
 #include "solvers/shapes/sight.hpp"
 #include "solvers/shapes/tuning.hpp"
@@ -53,6 +53,8 @@ struct Problem {
   std::shared_ptr<const topology::Incision> opaque;
   NodeCloud nodes;
   Material material;
+  /// Parts with a material of their own; null: none. `galerkin` without a cut alone.
+  std::shared_ptr<const MaterialRegions> regions;
   std::vector<Prescribed> prescribed;
   Loads loads;
   /// The part of the surface that `prescribed` holds, told point by point. With it the weak form holds the mean over
@@ -67,6 +69,9 @@ struct Problem {
   Tuning tuning{};
 
   [[nodiscard]] const std::shared_ptr<const topology::Incision>& hiding() const { return opaque ? opaque : incision; }
+  [[nodiscard]] const Material& material_at(const Vector3& x) const {
+    return regions != nullptr ? regions->material_at(x, material) : material;
+  }
 };
 
 /// What becomes of a piece that is cut off and that no prescribed displacement holds.

@@ -121,9 +121,20 @@ Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient) 
          material.shear_modulus() * (gradient + gradient.transpose());
 }
 
-Matrix3 initial_stress(const Problem& problem) {
-  return stress_from_gradient(problem.material,
+Matrix3 initial_stress(const Problem& problem, const Material& material) {
+  return stress_from_gradient(material,
                               0.5 * (problem.loads.initial_strain + problem.loads.initial_strain.transpose()));
+}
+
+Matrix3 initial_stress(const Problem& problem) {
+  return initial_stress(problem, problem.material);
+}
+
+void require_one_material(const Problem& problem, std::string_view what) {
+  if (problem.regions != nullptr)
+    throw InputError(fmt::format("{} on a body of several materials ({} regions, the first is '{}'): it takes one "
+                                 "alone; take method galerkin, linear and without a cut, or leave the regions out",
+                                 what, problem.regions->all().size(), problem.regions->all().front().name));
 }
 
 Sight sight_about_cut(const Problem& problem, Method method, SightRule rule) {
@@ -136,6 +147,7 @@ Sight sight_about_cut(const Problem& problem, Method method, SightRule rule) {
   }
   if (problem.material.poisson_ratio >= 0.45)
     sight.reach = tuning.front_reach_soft;
+  sight.regions = problem.regions;
   return sight;
 }
 
@@ -232,7 +244,7 @@ PointState ElasticBody::at(const Vector3& x, const Field& field) const {
   require_own(field);
   thread_local ShapeFunctions shape;
   require_support(spheres_, x, shape);
-  return state_from(problem_, shape, field);
+  return state_from(problem_, problem_.material_at(x), shape, field);
 }
 
 void require_support(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape) {
@@ -240,7 +252,8 @@ void require_support(const Spheres& spheres, const Vector3& x, ShapeFunctions& s
     throw InputError(fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
 }
 
-PointState state_from(const Problem& problem, const ShapeFunctions& shape, const Field& field) {
+PointState state_from(const Problem& problem, const Material& material, const ShapeFunctions& shape,
+                      const Field& field) {
   PointState state;
   double pressure = 0;
   for (int k = 0; k < shape.size(); ++k) {
@@ -261,11 +274,12 @@ PointState state_from(const Problem& problem, const ShapeFunctions& shape, const
   // The initial strain acts with the loads. A pressure unknown holds the volumetric part, -lambda tr(strain - initial).
   const Matrix3& initial = problem.loads.initial_strain;
   if (field.pressure.size() > 0)
-    state.stress = 2 * problem.material.shear_modulus() *
-                       (state.strain - field.load_factor * 0.5 * (initial + initial.transpose())) -
-                   pressure * Matrix3::Identity();
+    state.stress =
+        2 * material.shear_modulus() * (state.strain - field.load_factor * 0.5 * (initial + initial.transpose())) -
+        pressure * Matrix3::Identity();
   else
-    state.stress = stress_from_gradient(problem.material, state.gradient) - field.load_factor * initial_stress(problem);
+    state.stress =
+        stress_from_gradient(material, state.gradient) - field.load_factor * initial_stress(problem, material);
   return state;
 }
 

@@ -44,8 +44,12 @@ void check_problem(const Problem& problem);
 Matrix3 stress_from_gradient(const Material& material, const Matrix3& gradient);
 
 /// Stress that the initial strain of the loads leaves behind where the body does not deform, with its sign turned:
-/// sigma = C strain - initial_stress, Pa.
+/// sigma = C strain - initial_stress, Pa. Outside the regions, or in the given material.
 Matrix3 initial_stress(const Problem& problem);
+Matrix3 initial_stress(const Problem& problem, const Material& material);
+
+/// Throws InputError that tells what takes one material alone where the problem has regions.
+void require_one_material(const Problem& problem, std::string_view what);
 
 /// How the spheres of a method reach around the cut of a problem. Near incompressibility the enrichment reaches
 /// farther, as the supports of the weak form do: at nu = 0.49 a reach of 1.75 spacings leaves 3.0 % of a penny's volume
@@ -63,8 +67,9 @@ MatrixX pattern_loads(const Spheres& spheres, const std::vector<ForcePattern>& p
 /// Shape functions at x. Throws InputError when no support covers it.
 void require_support(const Spheres& spheres, const Vector3& x, ShapeFunctions& shape);
 
-/// Everything at a point whose shape functions are known.
-PointState state_from(const Problem& problem, const ShapeFunctions& shape, const Field& field);
+/// Everything at a point whose shape functions and material are known.
+PointState state_from(const Problem& problem, const Material& material, const ShapeFunctions& shape,
+                      const Field& field);
 
 /// Shared part of the two finite-sphere discretisations.
 class ElasticBody : public Discretisation {

@@ -303,7 +303,7 @@ PointState GrowingBody::at(const Vector3& x, const Field& field) const {
   require_own(field);
   thread_local ShapeFunctions shape;
   shape_at(x, shape);
-  return state_from(problem_, shape, field);
+  return state_from(problem_, problem_.material, shape, field);
 }
 
 std::vector<Vector3> GrowingBody::constraint_forces(const Field& field) const {

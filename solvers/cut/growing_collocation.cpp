@@ -391,6 +391,7 @@ BodyGrowth GrowingCollocation::grow(const SprinkleIncrement& change, Problem gro
 }
 
 std::unique_ptr<Discretisation> make_growable(Problem problem, GrowthOptions options) {
+  require_one_material(problem, "a cut that grows");
   if (options.method.method == Method::collocation) {
     require_domain(problem);
     return std::make_unique<GrowingCollocation>(std::move(problem), std::move(options));

@@ -26,6 +26,7 @@ constexpr double least_mapped_jacobian = 0.05;
 Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) {
   if (law == nullptr)
     throw InputError("a body at finite strain needs a law");
+  require_one_material(problem, "a law of finite strain");
   const ElasticConstants moduli = law->small_strain();
   problem.material.young_modulus = moduli.young_modulus();
   problem.material.poisson_ratio = moduli.poisson_ratio();

@@ -1,6 +1,7 @@
 // Method of finite spheres in weak form (Galerkin), the symmetric discretisation.
 //
-// K_IJ = integral over the body of [lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1], g = grad h, by background cells.
+// K_IJ = integral over the body of [lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1], g = grad h, by background cells. Of
+// a body of several materials the integral of mu g g^T and that of lambda g g^T are added up apart.
 // Displacements are prescribed as means over each held node's share of the surface, m_i(u) = g_i: multipliers constant
 // over each share, so that a constant traction is met exactly (point constraints fail the patch test by their own
 // quadrature of the traction). A penalty P = `holding` E h_i per component adds P m m^T, and the force of the
@@ -22,20 +23,35 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <optional>
+#include <span>
 #include <unordered_map>
 
 namespace spherecut::solvers {
 
 namespace {
 
+/// That of the least compressible part: what locks there decides the spheres of the whole body.
+Material least_compressible(const Problem& problem) {
+  Material material = problem.material;
+  if (problem.regions != nullptr)
+    for (const MaterialRegion& region : problem.regions->all())
+      material.poisson_ratio = std::max(material.poisson_ratio, region.material.poisson_ratio);
+  return material;
+}
+
 class Galerkin final : public ElasticBody {
  public:
   Galerkin(Problem problem, const DiscretisationOptions& options, bool is_factored = true)
       : ElasticBody(std::move(problem), Method::galerkin, galerkin_support_radius(problem, options), options.sight,
-                    galerkin_lengths(problem.material)) {
+                    galerkin_lengths(least_compressible(problem))) {
     const Stopwatch assembly;
-    cells_ = background_cells(*problem_.domain, problem_.nodes, background_of(options), problem_.hiding().get(),
+    BackgroundOptions background = background_of(options);
+    background.regions = problem_.regions;
+    cells_ = background_cells(*problem_.domain, problem_.nodes, background, problem_.hiding().get(),
                               *BoxMemory::of(problem_.domain));
+    if (problem_.regions != nullptr)
+      find_materials();
     hold_surface();
     assemble(options.unheld, !is_factored || !initial_stress(problem_).isZero(0));
     assemble_loads();
@@ -140,10 +156,16 @@ class Galerkin final : public ElasticBody {
                   const std::vector<Vector3>& nodal_forces) const override;
 
  private:
+  void find_materials();
   void hold_surface();
   void treat_unheld(UnheldPieces unheld);
   void assemble(UnheldPieces unheld, bool shapes_are_kept);
-  [[nodiscard]] StiffnessTiles evaluate_cells(bool shapes_are_kept);
+  /// Sums over the cells: of one material, of products of gradients; of several, of these times mu and times lambda.
+  struct CellSums {
+    StiffnessTiles shear;
+    std::optional<StiffnessTiles> volumetric;
+  };
+  [[nodiscard]] CellSums evaluate_cells(bool shapes_are_kept);
   void order_nodes(const std::vector<StiffnessTiles::Pair>& pairs, UnheldPieces unheld);
   [[nodiscard]] bool is_dropped(int node) const { return !dropped_.empty() && dropped_[node] != 0; }
   void assemble_loads();
@@ -248,6 +270,7 @@ class Galerkin final : public ElasticBody {
   }
 
   BackgroundCells cells_;
+  std::vector<Material> materials_; // of every quadrature point; empty: the problem's everywhere
   std::unique_ptr<SurfacePatches> patches_;
   mutable std::unordered_map<int, DisplacementMean> contact_means_; // by node, as they are asked for
   std::vector<DisplacementMean> held_;                              // one per prescribed entry
@@ -262,6 +285,17 @@ class Galerkin final : public ElasticBody {
   VectorX loads_;
   std::unique_ptr<OrderedCholesky> factorisation_;
 };
+
+void Galerkin::find_materials() {
+  std::vector<Vector3> places;
+  places.reserve(cells_.points.size());
+  for (const QuadraturePoint& point : cells_.points) {
+    places.push_back(point.position);
+    materials_.push_back(problem_.material_at(point.position));
+  }
+  problem_.regions->require_apart_and_resolved(
+      places, *std::min_element(problem_.nodes.spacings.begin(), problem_.nodes.spacings.end()));
+}
 
 void Galerkin::hold_surface() {
   patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision, std::nullopt,
@@ -291,20 +325,39 @@ void Galerkin::treat_unheld(UnheldPieces unheld) {
   }
 }
 
+/// The gradients of a cell times the root of a modulus of every point's material.
+const CellShapes& weighted(const CellShapes& shapes, std::span<const Material> materials,
+                           double (Material::*modulus)() const, CellShapes& out) {
+  out = shapes;
+  std::array<double, most_cell_points> root{};
+  for (int q = 0; q < shapes.points; ++q)
+    root[q] = std::sqrt((materials[q].*modulus)());
+  const std::size_t rows = 3 * shapes.nodes.size();
+  for (std::size_t row = 0; row < rows; ++row)
+    for (int q = 0; q < shapes.points; ++q)
+      out.gradients[row * static_cast<std::size_t>(shapes.stride) + q] *= root[q];
+  return out;
+}
+
 /// Evaluates the cells, cluster by cluster while they are at hand. The same bits with any number of threads: every
 /// column of tiles gets its clusters in their order.
-StiffnessTiles Galerkin::evaluate_cells(bool shapes_are_kept) {
-  StiffnessTiles tiles(problem_.nodes.positions);
+Galerkin::CellSums Galerkin::evaluate_cells(bool shapes_are_kept) {
+  CellSums sums{StiffnessTiles(problem_.nodes.positions), std::nullopt};
+  StiffnessTiles& tiles = sums.shear;
+  const bool are_several = !materials_.empty();
+  if (are_several)
+    sums.volumetric.emplace(problem_.nodes.positions);
   const std::vector<int> order = cells_by_place(cells_);
   shapes_.resize(shapes_are_kept ? order.size() : 0);
   struct Worker {
     CellEvaluator evaluator;
-    CellCluster cluster;
-    CellShapes shapes;
+    CellCluster cluster, volumetric;
+    CellShapes shapes, weighted;
     std::span<const int> cells;
   };
   const int threads = thread_count(), batch = threads == 1 ? 1 : 32, shares = threads == 1 ? 1 : 4 * threads;
-  std::vector<Worker> workers(batch, {CellEvaluator(spheres_), CellCluster(tiles.groups()), {}, {}});
+  std::vector<Worker> workers(
+      batch, {CellEvaluator(spheres_), CellCluster(tiles.groups()), CellCluster(tiles.groups()), {}, {}, {}});
   for (std::size_t next = 0; next < order.size();) {
     int in_batch = 0;
     for (; in_batch < batch && next < order.size(); ++in_batch) {
@@ -322,27 +375,37 @@ StiffnessTiles Galerkin::evaluate_cells(bool shapes_are_kept) {
         const SharedSightTime::Part timed(sight_time);
         Worker& worker = workers[k];
         worker.cluster.clear();
+        worker.volumetric.clear();
         for (const int cell : worker.cells) {
           CellShapes& shapes = shapes_are_kept ? shapes_[cell] : worker.shapes;
           worker.evaluator.evaluate(cells_.of(cell), shapes);
-          worker.cluster.add(shapes);
+          if (!are_several) {
+            worker.cluster.add(shapes);
+            continue;
+          }
+          const std::span<const Material> materials = std::span(materials_).subspan(cells_.start[cell]);
+          worker.cluster.add(weighted(shapes, materials, &Material::shear_modulus, worker.weighted));
+          worker.volumetric.add(weighted(shapes, materials, &Material::lame_lambda, worker.weighted));
         }
       });
     }
     parallel_ranges(shares, 1, [&](int share, int) {
-      for (int k = 0; k < in_batch; ++k)
+      for (int k = 0; k < in_batch; ++k) {
         tiles.add(workers[k].cluster, 1, share, shares);
+        if (are_several)
+          sums.volumetric->add(workers[k].volumetric, 1, share, shares);
+      }
     });
   }
   for (std::size_t p = 0; p < held_.size(); ++p)
     tiles.add_held(held_[p], problem_.prescribed[p].components,
                    constraint_stiffness(problem_, problem_.prescribed[p].node));
-  return tiles;
+  return sums;
 }
 
 void Galerkin::assemble(UnheldPieces unheld, bool shapes_are_kept) {
-  const StiffnessTiles tiles = evaluate_cells(shapes_are_kept);
-  std::vector<StiffnessTiles::Pair> pairs = tiles.pairs();
+  const CellSums sums = evaluate_cells(shapes_are_kept);
+  std::vector<StiffnessTiles::Pair> pairs = sums.shear.pairs(sums.volumetric ? &*sums.volumetric : nullptr);
   order_nodes(pairs, unheld);
   build_stiffness(std::move(pairs), rank_, dropped_, anchors_, problem_, stiffness_, elastic_);
 }
@@ -399,12 +462,13 @@ void Galerkin::assemble_loads() {
   if (problem_.loads.lip_traction && problem_.incision != nullptr)
     for (const SurfacePoint& point : lip_quadrature(*problem_.incision, problem_.nodes))
       add(point.position, point.weight * problem_.loads.lip_traction(point.position, point.normal));
-  const Matrix3 initial = initial_stress(problem_);
-  if (!initial.isZero(0))
+  if (!problem_.loads.initial_strain.isZero(0))
     for (std::size_t c = 0; c < shapes_.size(); ++c) {
       const CellShapes& cell = shapes_[c];
       for (int q = 0; q < cell.points; ++q) {
-        const double root = std::sqrt(cells_.points[cells_.start[c] + q].weight);
+        const int point = cells_.start[c] + q;
+        const double root = std::sqrt(cells_.points[point].weight);
+        const Matrix3 initial = initial_stress(problem_, materials_.empty() ? problem_.material : materials_[point]);
         for (std::size_t k = 0; k < cell.nodes.size(); ++k)
           loads_.segment<3>(3 * static_cast<Eigen::Index>(cell.nodes[k])) += root * initial * cell.gradient(k, q);
       }
@@ -460,7 +524,7 @@ bool is_nearly_incompressible(const Material& material) {
 double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options) {
   if (options.support_radius > 0)
     return options.support_radius;
-  if (is_nearly_incompressible(problem.material))
+  if (is_nearly_incompressible(least_compressible(problem)))
     return problem.tuning.sphere_radius_soft;
   return problem.hiding() != nullptr || options.cut_ahead ? problem.tuning.sphere_radius_cut
                                                           : problem.tuning.sphere_radius;
@@ -475,16 +539,30 @@ std::vector<double> NodeCloud::*galerkin_lengths(const Material& material) {
 }
 
 double constraint_stiffness(const Problem& problem, int node) {
-  return problem.tuning.holding * problem.material.young_modulus * problem.nodes.spacings[node];
+  const double spacing = problem.nodes.spacings[node];
+  const double modulus = problem.regions != nullptr
+                             ? problem.regions->stiffest_near(problem.nodes.positions[node], spacing, problem.material)
+                             : problem.material.young_modulus;
+  return problem.tuning.holding * modulus * spacing;
 }
 
-std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const DiscretisationOptions& options) {
+namespace {
+
+void check_galerkin(const Problem& problem) {
   require_domain(problem);
+  if (problem.hiding() != nullptr)
+    require_one_material(problem, "a cut, or a narrow gap of the surface,");
+}
+
+} // namespace
+
+std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const DiscretisationOptions& options) {
+  check_galerkin(problem);
   return std::make_unique<Galerkin>(std::move(problem), options, false);
 }
 
 std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
-  require_domain(problem);
+  check_galerkin(problem);
   return std::make_unique<Galerkin>(std::move(problem), options);
 }
 

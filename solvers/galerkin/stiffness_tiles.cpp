@@ -162,7 +162,7 @@ void StiffnessTiles::add_held(const DisplacementMean& mean, const std::array<boo
   }
 }
 
-std::vector<StiffnessTiles::Pair> StiffnessTiles::pairs() const {
+std::vector<StiffnessTiles::Pair> StiffnessTiles::pairs(const StiffnessTiles* volumetric) const {
   std::vector<Pair> all;
   std::size_t tiles = 0;
   for (const Column& column : columns_)
@@ -174,6 +174,9 @@ std::vector<StiffnessTiles::Pair> StiffnessTiles::pairs() const {
       for (int j = 0; j < tile_nodes; ++j) {
         const auto& plane = column.tiles[t].plane[j];
         const HeldTile* held = column.held[t] < 0 ? nullptr : &column.held_tiles[column.held[t]];
+        const StiffnessTile* other = nullptr; // groups that a mean alone has brought together come after those of cells
+        if (volumetric != nullptr && t < volumetric->columns_[own].tiles.size())
+          other = &volumetric->columns_[own].tiles[t];
         std::array<bool, tile_nodes> elastic{};
         // As a rule the first products tell, and the others need not be fetched from memory.
         for (int p = 0; p < 9 && !std::all_of(elastic.begin(), elastic.end(), std::identity()); ++p)
@@ -185,7 +188,8 @@ std::vector<StiffnessTiles::Pair> StiffnessTiles::pairs() const {
               held != nullptr && (penalty[0] != 0 || penalty[tile_nodes] != 0 || penalty[2 * tile_nodes] != 0);
           if (elastic[i] || is_held)
             all.push_back({groups_.node_at[column.groups[t] * tile_nodes + i], groups_.node_at[own * tile_nodes + j],
-                           &plane[0][i], is_held ? penalty : nullptr});
+                           &plane[0][i], is_held ? penalty : nullptr,
+                           elastic[i] && other != nullptr ? &other->plane[j][0][i] : nullptr});
         }
       }
   }

@@ -83,19 +83,31 @@ class StiffnessTiles {
     int row, column;        // nodes
     const double* products; // entry 3 a + b of dI,a dJ,b is products[(3 a + b) * tile_nodes]
     const double* held;     // penalty of component c is held[c * tile_nodes]; null: none
-    /// lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1, N/m.
+    /// Of a body of several materials: `products` are summed up times mu, these times lambda. Null: of one, neither is.
+    const double* volumetric = nullptr;
+    /// lambda gI gJ^T + mu gJ gI^T + mu (gI . gJ) 1, N/m; the moduli are those of the one material.
     [[nodiscard]] Matrix3 stiffness(double lambda, double mu) const {
-      Matrix3 g;
-      for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b)
-          g(a, b) = products[(3 * a + b) * tile_nodes];
+      const auto matrix = [](const double* of) {
+        Matrix3 g;
+        for (int a = 0; a < 3; ++a)
+          for (int b = 0; b < 3; ++b)
+            g(a, b) = of[(3 * a + b) * tile_nodes];
+        return g;
+      };
+      const Matrix3 g = matrix(products);
+      if (volumetric != nullptr) {
+        Matrix3 block = matrix(volumetric) + g.transpose();
+        block.diagonal().array() += g.trace();
+        return block;
+      }
       Matrix3 block = lambda * g + mu * g.transpose();
       block.diagonal().array() += mu * g.trace();
       return block;
     }
   };
-  /// In an order that depends on nothing but what was added. They point into the tiles.
-  [[nodiscard]] std::vector<Pair> pairs() const;
+  /// In an order that depends on nothing but what was added. They point into the tiles. `volumetric` (null: none): the
+  /// same clusters, weighted with lambda as these are with mu.
+  [[nodiscard]] std::vector<Pair> pairs(const StiffnessTiles* volumetric = nullptr) const;
 
  private:
   struct HeldTile {

@@ -46,7 +46,9 @@ class BoxFiller {
     const bool is_deep = distance < -half.norm();
     BoxMemory::Box* const at_surface = known_ != nullptr && !is_deep ? &remembered(centre, half) : nullptr;
     const bool inside = is_deep || (at_surface != nullptr ? at_surface->inside : corners_inside(centre, half));
-    if (has_walls_ && is_walled(centre, half))
+    if (options_.regions != nullptr && is_layered(centre, half))
+      add_layered(centre, half, inside);
+    else if (has_walls_ && is_walled(centre, half))
       add_walled(centre, half);
     else if (incision_ != nullptr && may_be_split(centre, half))
       add_split(centre, half, inside);
@@ -161,6 +163,89 @@ class BoxFiller {
       if (volume > 1e-3 * 8 * octant_half.prod())
         cells_.points.push_back({moment / volume, volume});
     }
+  }
+
+  /// Whether a face between materials may pass through the box.
+  [[nodiscard]] bool is_layered(const Vector3& centre, const Vector3& half) const {
+    return crossing_faces(centre, half, nullptr) > 0;
+  }
+
+  /// How many faces between materials may pass through the box, and the one nearest to its centre.
+  int crossing_faces(const Vector3& centre, const Vector3& half, const RegionFace** nearest) const {
+    int count = 0;
+    double least = half.norm();
+    for (const RegionFace& face : options_.regions->faces()) {
+      const double distance = std::abs(face.distance(centre));
+      if (distance >= half.norm() || distance >= face.normal(centre).cwiseAbs().dot(half))
+        continue;
+      ++count;
+      if (nearest != nullptr && distance < least) {
+        *nearest = &face;
+        least = distance;
+      }
+    }
+    return count;
+  }
+
+  /// Material of one region in an octant.
+  struct RegionPart {
+    int region;
+    double volume = 0;
+    Vector3 moment = Vector3::Zero();
+  };
+
+  /// Adds the parts of a small box on either side of the face nearest to it, `fraction` of their volumes, moved by
+  /// `shift`.
+  void add_region_parts(const Vector3& x, const Vector3& half, double fraction, const Vector3& shift,
+                        std::vector<RegionPart>& parts) const {
+    const RegionFace* face = nullptr;
+    std::array<BoxPart, 2> pieces{BoxPart{8 * half.prod(), x}, BoxPart{}};
+    if (crossing_faces(x, half, &face) > 0) {
+      const Vector3 normal = face->normal(x);
+      pieces = split_box(x, half, x - face->distance(x) * normal, normal);
+    }
+    for (const BoxPart& piece : pieces) {
+      if (piece.volume == 0)
+        continue;
+      const int region = options_.regions->at(piece.centroid);
+      auto part = std::find_if(parts.begin(), parts.end(), [&](const RegionPart& of) { return of.region == region; });
+      if (part == parts.end())
+        part = parts.insert(parts.end(), {region});
+      part->volume += fraction * piece.volume;
+      part->moment += fraction * piece.volume * (piece.centroid + shift);
+    }
+  }
+
+  /// Points of a box that faces between materials pass: every octant has one for each region in it. An octant of one
+  /// face, inside the body, is divided by the face's tangent plane, others by that of every sample.
+  void add_layered(const Vector3& centre, const Vector3& half, bool inside) {
+    const Vector3 octant_half = half / 2;
+    std::vector<RegionPart> parts;
+    for (int octant = 0; octant < octants; ++octant) {
+      const Vector3 middle = octant_centre(centre, half, octant);
+      parts.clear();
+      const int detail = inside && crossing_faces(middle, octant_half, nullptr) <= 1 ? 1 : inside ? 4 : 2;
+      const Vector3 sample_half = octant_half / detail;
+      for (int a = 0; a < detail; ++a)
+        for (int b = 0; b < detail; ++b)
+          for (int c = 0; c < detail; ++c) {
+            const Vector3 x = middle - octant_half + sample_half.cwiseProduct(Vector3(2 * a + 1, 2 * b + 1, 2 * c + 1));
+            const auto [fraction, shift] =
+                inside ? std::pair(1.0, Vector3(Vector3::Zero())) : part_inside(x, sample_half);
+            if (fraction > 0)
+              add_region_parts(x, sample_half, fraction, shift, parts);
+          }
+      for (const RegionPart& part : parts)
+        if (part.volume > 1e-4 * 8 * octant_half.prod())
+          add_region_point(part);
+    }
+  }
+
+  /// A point at the centroid of the part.
+  void add_region_point(const RegionPart& part) {
+    if (std::ssize(cells_.points) - cells_.start.back() == most_cell_points)
+      cells_.start.push_back(static_cast<int>(cells_.points.size()));
+    cells_.points.push_back({part.moment / part.volume, part.volume});
   }
 
   bool may_be_split(const Vector3& centre, const Vector3& half) const {

@@ -1,6 +1,7 @@
 // Background cells for the quadrature of the weak form: an octree over the body, independent of any mesh.
 #pragma once
 
+#include "solvers/elasticity/regions.hpp"
 #include "solvers/nodes/nodes.hpp"
 
 #include <span>
@@ -38,6 +39,9 @@ struct BackgroundOptions {
   // Halving a cell that is a little too large would cost eight times the points: where the spacing is graded, cells
   // range from slack / 2 to slack times the size asked for.
   double slack = 1.6;
+  // Faces between materials; null: none. Octants of a cell that one passes are divided by it, and each part has a point
+  // of its own. Not together with an incision.
+  std::shared_ptr<const MaterialRegions> regions{};
 };
 
 /// Cells inside the body carry their centre (rule 1), six points (2) or 3 x 3 x 3 Gauss points (3). Cells that meet the

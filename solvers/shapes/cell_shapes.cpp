@@ -1,6 +1,7 @@
 #include "solvers/shapes/cell_shapes.hpp"
 
 #include "solvers/shapes/cut_sight.hpp"
+#include "solvers/shapes/interface_ramps.hpp"
 #include "topology/base/errors.hpp"
 
 #include <algorithm>
@@ -87,6 +88,10 @@ bool CellEvaluator::evaluate_together(std::span<const QuadraturePoint> points, C
     return false;
   find_candidates(points, cell);
   const bool concerned = keep_reached(points, cell);
+  if (const InterfaceRamps* const ramps = spheres_.ramps(); ramps != nullptr)
+    for (const int node : cell.nodes)
+      if (ramps->concerns(node))
+        return false; // its points have bases of their own
   const auto count = static_cast<int>(cell.nodes.size());
   cell.gradients.resize(static_cast<std::size_t>(3 * count) * cell.stride);
   std::uint32_t altered = 0;

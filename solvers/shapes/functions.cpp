@@ -2,6 +2,7 @@
 
 #include "solvers/shapes/cut_sight.hpp"
 #include "solvers/shapes/derivatives.hpp"
+#include "solvers/shapes/interface_ramps.hpp"
 #include "solvers/shapes/kernel.hpp"
 #include "topology/base/errors.hpp"
 
@@ -9,6 +10,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <numeric>
+#include <optional>
 
 namespace spherecut::solvers {
 
@@ -144,6 +146,29 @@ bool evaluate_near_cut(const Kernel& kernel, const Spheres& spheres, const Vecto
          evaluate_grown_near_cut(kernel, spheres, x, second, out);
 }
 
+/// Beside a face between materials, first with ramps, then without. Empty: no node lies across a face.
+std::optional<bool> evaluate_with_ramps(const Spheres& spheres, const Vector3& x, const Support& support, bool second,
+                                        ShapeFunctions& out) {
+  const InterfaceRamps& ramps = *spheres.ramps();
+  if (second)
+    throw InputError("second derivatives beside a face between materials: there are none; take a method without them "
+                     "(galerkin)");
+  InterfaceRamps::Outcome outcome = ramps.evaluate(x, support, spheres.worst_condition(), out);
+  if (outcome == InterfaceRamps::Outcome::plain)
+    return std::nullopt;
+  double factor = 1;
+  for (int step = 0; step < growth_steps_at_point && outcome != InterfaceRamps::Outcome::sound; ++step) {
+    SupportMemory memory(spheres.size());
+    collect_grown(spheres, x, factor *= radius_growth, memory.support);
+    outcome = ramps.evaluate(x, memory.support, spheres.worst_condition(), out);
+    out.growth = factor;
+  }
+  if (outcome == InterfaceRamps::Outcome::sound)
+    return true;
+  out.growth = 1;
+  return std::nullopt;
+}
+
 bool evaluate_point(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
   out.growth = 1;
   const SphereGrid::Cell cell = spheres.grid().find(x);
@@ -151,6 +176,9 @@ bool evaluate_point(const Kernel& kernel, const Spheres& spheres, const Vector3&
   kernel.collect(cell, x.data(), memory.support);
   if (spheres.cut() != nullptr && spheres.cut()->concerns(memory.support))
     return evaluate_near_cut(kernel, spheres, x, second, out);
+  if (spheres.ramps() != nullptr && spheres.ramps()->concerns(memory.support))
+    if (const std::optional<bool> sound = evaluate_with_ramps(spheres, x, memory.support, second, out))
+      return *sound;
   return evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out) ||
          (spheres.cut() == nullptr ? evaluate_grown(kernel, spheres, x, second, out)
                                    : evaluate_grown_near_cut(kernel, spheres, x, second, out));
@@ -326,6 +354,11 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
     grid_ = std::make_shared<const SphereGrid>(centres_, radii_);
     if (cut_ != nullptr)
       cut_->update_radii(centres_, radii_);
+  }
+  if (sight.regions != nullptr) {
+    if (basis != Basis::linear || sight.incision != nullptr)
+      throw InputError("shape functions: ramps beside faces between materials go with the linear basis and no cut");
+    ramps_ = std::make_shared<const InterfaceRamps>(sight.regions, centres_, radii_);
   }
   grown_ = static_cast<int>(std::count_if(growing.level.begin(), growing.level.end(), [](int l) { return l > 0; }));
 }

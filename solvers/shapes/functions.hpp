@@ -16,6 +16,7 @@ enum class Basis { linear, quadratic }; // P = {1, x, y, z} or all monomials up 
 double quartic_spline(double s);
 
 class CutSight;
+class InterfaceRamps;
 
 /// The spheres of a node cloud with a search grid. Immutable once built; queries are thread safe. Where there is an
 /// incision no sphere reaches through it: a node that is hidden from a point does not support it, or, by the rules that
@@ -26,9 +27,10 @@ class Spheres {
   /// Radii rho * spacing. Where the support of a node (the nodes whose spheres hold it) has fewer than basis + 2
   /// members or a moment matrix worse conditioned than `worst_condition`, the spheres around it grow by 1.25 until it
   /// is sound. Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than
-  /// basis + 2 nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, or an incision is
-  /// given with the quadratic basis. Nodes marked in `absent` (may be empty) have no sphere, radius 0, and support
-  /// nothing. `before` (may be null): spheres most of which may be the same; where all are, so is their grid.
+  /// basis + 2 nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, an incision or regions
+  /// are given with the quadratic basis, or both of them. Nodes marked in `absent` (may be empty) have no sphere,
+  /// radius 0, and support nothing. `before` (may be null): spheres most of which may be the same; where all are, so is
+  /// their grid.
   Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis = Basis::linear,
           double worst_condition = 1e9, const Sight& sight = {}, const std::vector<char>& absent = {},
           const Spheres* before = nullptr);
@@ -44,6 +46,8 @@ class Spheres {
   [[nodiscard]] const SphereGrid& grid() const { return *grid_; }
   /// What the spheres know of the cut; null when there is none.
   [[nodiscard]] const CutSight* cut() const { return cut_.get(); }
+  /// What they know of faces between materials; null when there are none.
+  [[nodiscard]] const InterfaceRamps* ramps() const { return ramps_.get(); }
 
  private:
   struct Growing;
@@ -55,6 +59,7 @@ class Spheres {
   int grown_ = 0;
   std::shared_ptr<const SphereGrid> grid_;
   std::shared_ptr<CutSight> cut_;
+  std::shared_ptr<const InterfaceRamps> ramps_;
 };
 
 /// Three unknowns each of which carries a vector function: what is gathered along the front of a cut.
@@ -80,7 +85,7 @@ struct ShapeFunctions {
 /// Values and exact first derivatives at x. False when the support of x is not sound (fewer nodes than basis functions,
 /// a moment matrix worse conditioned than the spheres allow, or an enriched basis that extrapolates), even after trying
 /// radii grown by 1.25 up to four times at this point. The support is in ascending order of nodes. Where the enriched
-/// basis has no sound support the linear one takes its place.
+/// basis, or the one with ramps, has no sound support the linear one takes its place.
 bool evaluate(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
 
 /// The same at many points; out[i] belongs to points[i]. False when any support is not sound; the first such point is
@@ -88,7 +93,7 @@ bool evaluate(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
 bool evaluate(const Spheres& spheres, std::span<const Vector3> points, std::span<ShapeFunctions> out);
 
 /// Values, exact first and second derivatives at x. Throws InputError where a cut is to be seen by another rule than
-/// `visibility`: those that bend around the front have no second derivatives.
+/// `visibility`: those that bend around the front have no second derivatives, nor have ramps beside a face.
 bool evaluate_second(const Spheres& spheres, const Vector3& x, ShapeFunctions& out);
 
 } // namespace spherecut::solvers

@@ -1,6 +1,7 @@
-// How spheres of influence reach around a cut.
+// How spheres of influence reach around a cut and across faces between materials.
 #pragma once
 
+#include "solvers/elasticity/regions.hpp"
 #include "solvers/shapes/tuning.hpp"
 #include "topology/incision/incision.hpp"
 
@@ -31,6 +32,9 @@ struct Sight {
   int enriched_growth = 0;
   /// Spheres of nodes within `reach` of the front are larger by this; an enriched basis may want it.
   double radius_factor = 1;
+  /// Parts of the body with a material of their own: the basis has ramps beside their faces (interface_ramps.hpp).
+  /// Null: none. Not together with an incision.
+  std::shared_ptr<const MaterialRegions> regions{};
 };
 
 } // namespace spherecut::solvers

@@ -4,6 +4,7 @@
 #include "solvers/contact/bank_pairs.hpp"
 #include "src/model/finite_model.hpp"
 #include "src/scenario/law_reader.hpp"
+#include "src/scenario/region_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/incision/gap_walls.hpp"
 
@@ -81,6 +82,7 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
     problem.opaque = topology::with_walls(model.incision, model.sprinkling.walls);
   problem.nodes = model.sprinkling.nodes;
   problem.material = scenario.material;
+  problem.regions = regions_of(scenario, domain);
   problem.prescribed = fixed_nodes(scenario, *domain, problem.nodes);
   const bool held_fully = std::all_of(scenario.fixed.begin(), scenario.fixed.end(), [](const FixedRegion& region) {
     return region.components == std::array<bool, 3>{true, true, true};
@@ -98,7 +100,13 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
   problem.touched_from = model.touched_from;
   if (scenario.gravity) {
     const Vector3 weight = scenario.material.density * *scenario.gravity;
-    problem.loads.body_force = [weight](const Vector3&) -> const Vector3& { return weight; };
+    if (problem.regions == nullptr)
+      problem.loads.body_force = [weight](const Vector3&) -> const Vector3& { return weight; };
+    else
+      problem.loads.body_force = [regions = problem.regions, elsewhere = scenario.material,
+                                  gravity = *scenario.gravity](const Vector3& x) -> Vector3 {
+        return regions->material_at(x, elsewhere).density * gravity;
+      };
   }
   problem.loads.initial_strain = -scenario.pretension;
   const bool pressed = std::any_of(scenario.precuts.begin(), scenario.precuts.end(),

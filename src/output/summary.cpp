@@ -37,6 +37,13 @@ OrderedJson inputs(const Session& session) {
   out["young_modulus_Pa"] = scenario.material.young_modulus;
   out["poisson_ratio"] = scenario.material.poisson_ratio;
   out["density_kg_m3"] = scenario.material.density;
+  if (!scenario.regions.empty())
+    out["regions"] = OrderedJson::array();
+  for (const RegionSettings& region : scenario.regions)
+    out["regions"].push_back({{"name", region.name},
+                              {"young_modulus_Pa", region.material.young_modulus},
+                              {"poisson_ratio", region.material.poisson_ratio},
+                              {"density_kg_m3", region.material.density}});
   out["gravity_m_s2"] = scenario.gravity ? json(*scenario.gravity) : OrderedJson(nullptr);
   out["organ"] = {{"triangles", domain.surface().triangles.size()}, {"volume_m3", topology::volume(domain.surface())},
                   {"area_m2", topology::area(domain.surface())},    {"lower_m", json(domain.bounds().lower)},

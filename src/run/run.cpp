@@ -8,6 +8,7 @@
 #include "src/model/finite_model.hpp"
 #include "src/output/run_output.hpp"
 #include "src/scenario/law_reader.hpp"
+#include "src/scenario/region_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/base/interruption.hpp"
 
@@ -253,6 +254,8 @@ void check_scenario(const std::filesystem::path& file, const std::filesystem::pa
   say(short_text(session));
   say(walls_text(session.walls()));
   say(law_text(session.scenario().law));
+  if (!session.scenario().regions.empty())
+    say(regions_text(session.scenario().regions));
   if (!can_run(session.scenario()))
     try {
       require_run(session.scenario());

@@ -2,6 +2,7 @@
 
 #include "src/scenario/cut_reader.hpp"
 #include "src/scenario/law_reader.hpp"
+#include "src/scenario/region_reader.hpp"
 #include "src/scenario/tear_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/files/label_volume.hpp"
@@ -332,6 +333,7 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   scenario.material = {material.has("young_modulus") ? material.number("young_modulus")
                                                      : solvers::small_strain_moduli(scenario.law.spec).young_modulus(),
                        material.number("poisson_ratio"), material.number("density")};
+  scenario.regions = material_regions(material, file, scenario.material, offences);
   scenario.toughness = material.optional_number("toughness").value_or(0);
   for (const Section& section : material.tables("layer"))
     scenario.layers.push_back(toughness_layer(section, scenario.layers.size() + 1, offences));
@@ -376,6 +378,7 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   if (scenario.blade)
     check_blade_force(scenario, root, offences);
   check_tearing(scenario, root, offences);
+  check_regions(scenario, offences);
   scenario.method.cut_ahead = scenario.blade || !scenario.precuts.empty();
   if (!scenario.tool && !scenario.blade && scenario.precuts.empty() && !scenario.tearing.enabled && !scenario.gravity &&
       scenario.pretension.isZero())

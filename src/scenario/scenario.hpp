@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -52,6 +53,29 @@ struct BoxRegion {
 struct SphereRegion {
   Vector3 centre; // m
   double radius;  // m
+};
+
+/// Nearer to a plane than half its thickness.
+struct SlabRegion {
+  Plane middle;
+  double thickness = 0; // m
+};
+/// Depths below the organ's surface.
+struct DepthRegion {
+  double from = 0, to = 0; // m
+};
+/// Inside a closed surface.
+struct SolidRegion {
+  std::shared_ptr<const topology::Domain> solid;
+};
+
+/// A part of the organ with a material of its own.
+struct RegionSettings {
+  using Shape = std::variant<BoxRegion, SphereRegion, Plane, SlabRegion, DepthRegion, SolidRegion>;
+  std::string name; // for messages
+  Shape shape;
+  solvers::Material material;
+  int line = 0; // of the scenario file
 };
 
 struct FixedRegion {
@@ -120,7 +144,8 @@ struct Scenario {
   OrganSettings organ;
   LawSettings law;
   solvers::Material material; // small-strain moduli of the law, and the density
-  double toughness = 0;       // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
+  std::vector<RegionSettings> regions;
+  double toughness = 0; // of the material, G_c, J/m2 of new cut; 0: not given, nothing resists a blade
   std::vector<ToughnessLayer> layers;
   std::function<double(const Vector3&)> toughness_function; // J/m2, a program's own, in place of both; empty: theirs
   TearSettings tearing;

@@ -133,6 +133,10 @@ TEST_CASE("Quick stress intensities: straight and round fronts") {
   require_quick_run_passes("sif");
 }
 
+TEST_CASE("Quick layers: two materials in one body") {
+  require_quick_run_passes("layers");
+}
+
 TEST_CASE("Quick kink: the first new piece of sheet") {
   require_quick_run_passes("kink");
 }
