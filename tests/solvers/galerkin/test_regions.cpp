@@ -188,5 +188,5 @@ TEST_CASE("Regions that overlap or hold no point, and what takes one material al
     options.method = method;
     CHECK_THROWS_WITH(discretise(problem, options), Contains(std::string(to_string(method))) && Contains("'part'"));
   }
-  CHECK_THROWS_WITH(FiniteBody(problem, make_law({NeoHookeanLaw{1}, 10})), Contains("finite strain"));
+  CHECK_THROWS_WITH(FiniteBody(problem, make_law({NeoHookeanLaw{1}, 10, {}})), Contains("finite strain"));
 }
