@@ -35,6 +35,6 @@ set(CPACK_SPHERECUT_PYTHON_FOLDER "${SPHERECUT_PYTHON_FOLDER}")
 set(CPACK_SOURCE_GENERATOR TGZ)
 set(CPACK_SOURCE_PACKAGE_FILE_NAME "spherecut-${PROJECT_VERSION}-source")
 string(REGEX REPLACE "([][+.*()^$?|\\\\])" "\\\\\\1" source "${PROJECT_SOURCE_DIR}")
-set(CPACK_SOURCE_IGNORE_FILES "^${source}/(build|out|\\.git|\\.cache|\\.mypy_cache|env)(/|$)" "/node_modules/" "/__pycache__/" "/compile_commands\\.json$"
+set(CPACK_SOURCE_IGNORE_FILES "^${source}/(build|out|\\.git|\\.cache|\\.mypy_cache|\\.pytest_cache|env)(/|$)" "/node_modules/" "/__pycache__/" "/compile_commands\\.json$"
   "\\.egg-info/" "\\.pyc$")
 include(CPack)
