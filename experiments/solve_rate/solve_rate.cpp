@@ -1,7 +1,7 @@
 // Problem:   how many times a second can the whole step run, from where the tool is to the force on it, on one core?
 //            The paper's 34 nodes; 100, 300 and 1000 nodes, uncut and while a blade cuts at 10 mm/s beside the ball;
 //            the body follows the cut in every step, or once the blade has gone 0.3 or 0.5 spacings, in the step where
-//            it has or beside the steps, where the tissue resists the blade too. Half a second, from the first cut on,
+//            it has or in the background, where the tissue resists the blade too. Half a second, from the first cut on,
 //            and two, which are a cut of five spacings. Beside the steps the clock leads: the blade goes on while a
 //            step takes its time.
 // Reference: the paper's 100 a second with 34 nodes; the time of one Cholesky factorisation of a dense 900 x 900 matrix
@@ -56,10 +56,10 @@ constexpr std::uint64_t step_ticks = 10;  // from one step to the next, ms
 
 struct Rate {
   int nodes = 0;
-  double seconds = 0;                        // processor time of a step, mean; beside the steps: s from one to the next
-  std::vector<double> steps{};               // s, of each; by the clock from when it was due
-  double behind = 0;                         // s from where a cut was begun to where its body took over, mean
-  int cuts = 0;                              // increments among them
+  double seconds = 0;          // processor time of a step, mean; in the background: s from one to the next
+  std::vector<double> steps{}; // s, of each; by the clock from when it was due
+  double behind = 0;           // s from where a cut was begun to where its body took over, mean
+  int cuts = 0;                // increments among them
   std::map<std::uint64_t, Vector3> forces{}; // N, on the ball, by the tick
 };
 
@@ -208,7 +208,7 @@ class OneCore {
 };
 
 /// The same motion by the clock, on one core: a step is due every `period` ms, at the pose of then, or where one takes
-/// longer at the last that is due by then; what follows the cut is made beside the steps.
+/// longer at the last that is due by then; what follows the cut is made in the background.
 Rate rate_by_the_clock(const Motion& motion, int steps, std::uint64_t period) {
   using Clock = std::chrono::steady_clock;
   const OneCore core;

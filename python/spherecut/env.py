@@ -174,7 +174,7 @@ class CuttingEnv(_Base):  # type: ignore[misc]
     ) -> None:
         """scenario: a Scenario or its file; None: default_scenario(). holds: of "blade" and "tool". speed: m/s. time_step:
         s. places: of ``release``; 0 leaves the front out. margin: m, how far outside the organ's bounds things may go.
-        beside: bodies that follow the cut are made on a thread beside the steps; what comes out depends on the steps
+        beside: bodies that follow the cut are made on a thread in the background; what comes out depends on the steps
         alone."""
         if scenario is None:
             scenario = default_scenario()

@@ -122,27 +122,28 @@ double MaterialRegions::stiffest_near(const Vector3& x, double reach, const Mate
   return is_deep ? stiffest : std::max(stiffest, elsewhere.young_modulus);
 }
 
-void MaterialRegions::require_apart_and_resolved(std::span<const Vector3> points, double spacing) const {
-  std::vector<std::size_t> held(regions_.size(), 0);
+void MaterialRegions::require_apart(std::span<const Vector3> points) const {
   for (const Vector3& x : points) {
-    int first = -1;
-    for (std::size_t r = 0; r < regions_.size(); ++r) {
-      if (!regions_[r].holds(x))
+    const MaterialRegion* first = nullptr;
+    for (const MaterialRegion& region : regions_) {
+      if (!region.holds(x))
         continue;
-      ++held[r];
-      if (first >= 0)
+      if (first != nullptr)
         throw InputError(fmt::format("material regions '{}' and '{}' overlap: both hold ({:.6g}, {:.6g}, {:.6g}) m; "
                                      "allowed: regions apart from each other, or that share a face",
-                                     regions_[first].name, regions_[r].name, x.x(), x.y(), x.z()));
-      first = static_cast<int>(r);
+                                     first->name, region.name, x.x(), x.y(), x.z()));
+      first = &region;
     }
   }
-  for (std::size_t r = 0; r < regions_.size(); ++r)
-    if (held[r] == 0)
+}
+
+void MaterialRegions::require_resolved(std::span<const Vector3> points, double spacing) const {
+  for (const MaterialRegion& region : regions_)
+    if (std::none_of(points.begin(), points.end(), [&](const Vector3& x) { return region.holds(x); }))
       throw InputError(fmt::format("material region '{}' holds none of the {} quadrature points of the body: it lies "
                                    "outside it, or is too small for nodes {:.4g} m apart; allowed: a region within the "
                                    "body of about that size at least",
-                                   regions_[r].name, points.size(), spacing));
+                                   region.name, points.size(), spacing));
 }
 
 } // namespace spherecut::solvers

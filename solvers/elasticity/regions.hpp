@@ -56,9 +56,10 @@ class MaterialRegions {
   [[nodiscard]] const Material& material_at(const Vector3& x, const Material& elsewhere) const;
   /// Largest Young's modulus of the materials nearer to x than `reach`, m; Pa.
   [[nodiscard]] double stiffest_near(const Vector3& x, double reach, const Material& elsewhere) const;
-  /// Throws InputError where two regions hold one of the points, with their names and the place, or where a region
-  /// holds none, with the size of the regions' points, m.
-  void require_apart_and_resolved(std::span<const Vector3> points, double spacing) const;
+  /// Throws InputError where two regions hold one of the points, with their names and the place.
+  void require_apart(std::span<const Vector3> points) const;
+  /// Throws InputError where a region holds none of the points, the quadrature points of nodes `spacing` m apart.
+  void require_resolved(std::span<const Vector3> points, double spacing) const;
 
  private:
   std::vector<MaterialRegion> regions_;

@@ -293,8 +293,9 @@ void Galerkin::find_materials() {
     places.push_back(point.position);
     materials_.push_back(problem_.material_at(point.position));
   }
-  problem_.regions->require_apart_and_resolved(
-      places, *std::min_element(problem_.nodes.spacings.begin(), problem_.nodes.spacings.end()));
+  problem_.regions->require_apart(places);
+  problem_.regions->require_resolved(places,
+                                     *std::min_element(problem_.nodes.spacings.begin(), problem_.nodes.spacings.end()));
 }
 
 void Galerkin::hold_surface() {

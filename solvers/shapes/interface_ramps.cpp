@@ -1,8 +1,11 @@
 #include "solvers/shapes/interface_ramps.hpp"
 
+#include "topology/base/errors.hpp"
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+#include <fmt/format.h>
 
 namespace spherecut::solvers {
 
@@ -145,17 +148,21 @@ InterfaceRamps::Crossed InterfaceRamps::faces_crossed(const Vector3& x, const sh
     smallest = std::min(smallest, support.q[k]);
   for (const RegionFace& face : regions_->faces()) {
     const double distance = face.distance(x);
-    if (crossed.count == most_ramps || distance * distance * smallest >= 1)
+    if (distance * distance * smallest >= 1)
       continue;
-    TangentPlane& plane = crossed.planes[crossed.count];
-    plane = {distance, face.normal(x), Matrix3::Zero()};
-    for (int k = 0; k < support.count; ++k)
-      if (plane.is_beyond({support.dx[k], support.dy[k], support.dz[k]})) {
-        if (face.turning)
-          plane.turning = face.turning(x);
-        ++crossed.count;
-        break;
-      }
+    TangentPlane plane{distance, face.normal(x), Matrix3::Zero()};
+    bool divides = false;
+    for (int k = 0; k < support.count && !divides; ++k)
+      divides = plane.is_beyond({support.dx[k], support.dy[k], support.dz[k]});
+    if (!divides)
+      continue;
+    if (crossed.count == most_ramps)
+      throw InputError(fmt::format("more than {} faces between materials divide the spheres about ({:.6g}, {:.6g}, "
+                                   "{:.6g}) m, which reach {:.3g} m; allowed: {}. Finer nodes or fewer regions do",
+                                   most_ramps, x.x(), x.y(), x.z(), 1 / std::sqrt(smallest), most_ramps));
+    if (face.turning)
+      plane.turning = face.turning(x);
+    crossed.planes[crossed.count++] = plane;
   }
   return crossed;
 }

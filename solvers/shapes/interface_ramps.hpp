@@ -33,11 +33,12 @@ class InterfaceRamps {
     sound,   // `out` holds the shape functions
     unsound, // too few nodes for the basis, or a moment matrix worse conditioned than allowed
   };
-  /// Shape functions at x and their exact gradients on the nodes of `support`, all whose spheres hold x.
+  /// Shape functions at x and their exact gradients on the nodes of `support`, all whose spheres hold x. Throws
+  /// InputError where more faces than most_ramps divide the support.
   Outcome evaluate(const Vector3& x, const shape_kernel::Support& support, double worst_condition,
                    ShapeFunctions& out) const;
 
-  static constexpr int most_ramps = 6; // of one point; faces beyond are passed over
+  static constexpr int most_ramps = 8; // of one point
 
  private:
   /// Tangent plane of a face, as the point sees it.

@@ -10,7 +10,7 @@ namespace spherecut::app {
 enum class SystemUpdate : std::uint8_t {
   none,           // nothing was cut
   updated,        // only what the cut touched was computed
-  taken_over,     // made beside the steps, or updated on a body that had been condensed anew there
+  taken_over,     // made in the background, or updated on a body that had been condensed anew there
   condensed_anew, // updated, after everything away from the predicted way had been eliminated anew
   rebuilt,        // from scratch
 };

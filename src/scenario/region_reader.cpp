@@ -141,6 +141,27 @@ std::shared_ptr<const solvers::MaterialRegions> regions_of(const Scenario& scena
   return std::make_shared<const solvers::MaterialRegions>(std::move(regions));
 }
 
+void require_regions_apart(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& organ) {
+  constexpr int across = 50; // places along the longest side
+  const auto regions = regions_of(scenario, organ);
+  if (regions == nullptr)
+    return;
+  const Vector3 lower = organ->bounds().lower, extent = organ->bounds().extent();
+  const double step = extent.maxCoeff() / across;
+  const auto places = [&](int axis) { return static_cast<int>(extent[axis] / step); };
+  std::vector<Vector3> inside;
+  for (int i = 0; i <= places(0); ++i)
+    for (int j = 0; j <= places(1); ++j)
+      for (int k = 0; k <= places(2); ++k)
+        if (const Vector3 x = lower + step * Vector3(i + 0.5, j + 0.5, k + 0.5); organ->signed_distance(x) < 0)
+          inside.push_back(x);
+  try {
+    regions->require_apart(inside);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}:{}: {}", scenario.file.string(), scenario.regions.front().line, error.what()));
+  }
+}
+
 std::string regions_text(const std::vector<RegionSettings>& regions) {
   std::string text;
   for (const RegionSettings& region : regions)

@@ -3,6 +3,7 @@
 #include "src/base/process_settings.hpp"
 #include "src/base/stage_timer.hpp"
 #include "src/scenario/law_reader.hpp"
+#include "src/scenario/region_reader.hpp"
 #include "src/tissue/cut_checks.hpp"
 #include "topology/base/interruption.hpp"
 
@@ -21,6 +22,7 @@ const Scenario& checked(const Scenario& scenario, const Organ& organ, Leader lea
   interruption_point();
   if (leader == Leader::device)
     require_linear(scenario.file, scenario.law);
+  require_regions_apart(scenario, organ.domain);
   use_one_blas_thread();
   for (const std::string& remark : organ.remarks)
     log.warn(remark, remark);

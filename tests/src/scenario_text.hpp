@@ -131,7 +131,7 @@ inline std::string long_bar(double strain, double toughness, const std::string& 
 }
 
 /// The shallow notch, which tears on in short increments.
-/// A cut whose bodies are followed by updates of a window, or made beside the steps.
+/// A cut whose bodies are followed by updates of a window, or made in the background.
 inline const std::string by_window = "[cut]\nsight = \"enriched\"\n";
 
 inline std::string growing_notch(const std::string& method) {

@@ -1,4 +1,4 @@
-// What a blade that the tissue resists proposes to cut, made beside the steps.
+// What a blade that the tissue resists proposes to cut, made in the background.
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/src/virtual_session.hpp"
@@ -42,7 +42,7 @@ void go(Session& session, const std::function<void(const StepResult&)>& look) {
 
 } // namespace
 
-TEST_CASE("A resisted blade whose cuts are made beside the steps waits at the force of steady cutting and cuts all") {
+TEST_CASE("A resisted blade whose cuts are made in the background waits at the force of steady cutting and cuts all") {
   const Scenario scenario = scenario_of(through_a_corner);
   Session in_step(scenario);
   const double area = run(in_step).back().cut->area;
@@ -106,7 +106,7 @@ TEST_CASE("A blade whose first cut is long in the making waits for it, and nothi
   CHECK(ledger.imbalance() < 0.02);
 }
 
-TEST_CASE("A session whose resisted blade is followed beside the steps comes out the same twice") {
+TEST_CASE("A session whose resisted blade is followed in the background comes out the same twice") {
   const LoopRecords records = run_twice(scenario_of(through_a_corner), solves_in_background(400, 10, 10), 400);
   CHECK(records.solves.back().cut_area > 1e-4);
   CHECK(std::count_if(records.solves.begin(), records.solves.end(),

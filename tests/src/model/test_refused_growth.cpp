@@ -214,7 +214,7 @@ position = [0.003, 0, 0.012]
   FAIL("no cut was refused");
 }
 
-TEST_CASE("A cut whose body cannot be made beside the steps is refused, and the next one makes up for it") {
+TEST_CASE("A cut whose body cannot be made in the background is refused, and the next one makes up for it") {
   const std::string text =
       cut_block + by_window + replaced(incision_at_end, "step = 0.2", "step = 0.05\nadvance = 0.3");
   const Scenario scenario = scenario_of(replaced(replaced(text, "-0.042", "-0.012"), "-0.043", "-0.013"));

@@ -1,4 +1,4 @@
-// A body that follows a cut which was put off beside the steps, taken over at a definite step.
+// A body that follows a cut which was put off in the background, taken over at a definite step.
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 #include "tests/src/virtual_session.hpp"
@@ -82,7 +82,7 @@ double area_when_solved(const Scenario& scenario, bool in_background, const std:
 
 } // namespace
 
-TEST_CASE("A body made beside the steps is the one that a step would have made, and gives the same force") {
+TEST_CASE("A body made in the background is the one that a step would have made, and gives the same force") {
   const auto [method, is_pressed] =
       GENERATE(std::pair("galerkin", true), std::pair("galerkin", false), std::pair("collocation", true));
   const Scenario scenario =
@@ -304,7 +304,7 @@ TEST_CASE("A blade that comes to rest is followed to where it is") {
   CHECK_FALSE(session.pending().put_off);
 }
 
-TEST_CASE("What is made beside the steps in time makes no nodes coarser, and early it makes them finer again") {
+TEST_CASE("What is made in the background in time makes no nodes coarser, and early it makes them finer again") {
   DegradationRule rule(0.01);
   rule.solved(Rebuild::none, 1);
   rule.solved(Rebuild::in_background, 1);
@@ -321,7 +321,7 @@ TEST_CASE("What is made beside the steps in time makes no nodes coarser, and ear
   CHECK(rule.level() == 0);
 }
 
-TEST_CASE("A scripted blade cuts to the end of its way however seldom it is solved, in real time beside the steps") {
+TEST_CASE("A scripted blade cuts to the end of its way however seldom it is solved, in real time in the background") {
   const bool in_background = GENERATE(true, false);
   const Scenario scenario = scenario_of(pressed_and_cut);
   int beside = 0;

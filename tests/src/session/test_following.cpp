@@ -1,4 +1,4 @@
-// Nodes that follow the tool beside the steps, fixed regions that keep theirs, and what a viewer is told of tears.
+// Nodes that follow the tool in the background, fixed regions that keep theirs, and what a viewer is told of tears.
 #include "src/live/haptic_report.hpp"
 #include "src/live/tear_status.hpp"
 #include "tests/src/scenario_session.hpp"
@@ -37,7 +37,7 @@ figures = false
 
 } // namespace
 
-TEST_CASE("Nodes made beside the steps are those that a step would have made, and give the same force") {
+TEST_CASE("Nodes made in the background are those that a step would have made, and give the same force") {
   const Scenario scenario = scenario_of(slide);
   Session waits(scenario), goes_on(scenario);
   goes_on.set_options({.following_in_background = true});

@@ -94,7 +94,7 @@ TEST_CASE("A body that the blade comes near to is condensed anew beside it, and 
   CHECK((parts.state.model.field.coefficients - before).norm() < 2e-3 * before.norm()); // finer cells along the way
 }
 
-TEST_CASE("The fine zone that follows the tool beside the steps becomes the one that follows it within them") {
+TEST_CASE("The fine zone that follows the tool in the background becomes the one that follows it within them") {
   TissueParts waits(small_scenario), goes_on(small_scenario);
   for (TissueParts* parts : {&waits, &goes_on}) {
     parts->state.contact = parts->state.touch->contact;

@@ -1,8 +1,8 @@
 // Scribbles of a scalpel over a live block, as a hand that wants to see what happens draws them: straight strokes to
 // and fro across one another, some of them without lifting the blade between. SPHERECUT_SCRIBBLES blocks (2) from the
 // seed SPHERECUT_SCRIBBLES_FIRST (1) on, SPHERECUT_SCRIBBLES_EACH scribbles (1) in each. Odd seeds: the body follows in
-// the step; even ones: it is made beside the steps. Processor time is printed, never judged; work is, by a count of the
-// sight lines that had to go through all triangles. SPHERECUT_SCRIBBLES_SIGHT names a cut.sight in place of the
+// the step; even ones: it is made in the background. Processor time is printed, never judged; work is, by a count of
+// the sight lines that had to go through all triangles. SPHERECUT_SCRIBBLES_SIGHT names a cut.sight in place of the
 // method's own; SPHERECUT_SCRIBBLES_LIVER=1 draws over the live liver in place of the block.
 #include "solvers/algebra/parallel.hpp"
 #include "src/live/simulation.hpp"

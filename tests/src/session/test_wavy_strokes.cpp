@@ -1,5 +1,5 @@
 // Wavy strokes over the live liver, as a busy machine solves them: seldom, late, with coarser and coarser nodes, bodies
-// made beside the steps and taken over at some solve. SPHERECUT_STROKES of them (1), from the seed
+// made in the background and taken over at some solve. SPHERECUT_STROKES of them (1), from the seed
 // SPHERECUT_STROKES_FIRST (163, which has ten crumbs to leave out) on; SPHERECUT_STROKES_FULL=1: with all triangles and
 // nodes of the scenario.
 #include "src/live/shown_opening.hpp"

@@ -1,4 +1,4 @@
-// Bodies made beside the steps: one at a time, and each given up or taken.
+// Bodies made in the background: one at a time, and each given up or taken.
 #include "src/tissue/background_bodies.hpp"
 #include "topology/base/errors.hpp"
 
@@ -18,7 +18,7 @@ BackgroundBody with_nodes(int count) {
 
 } // namespace
 
-TEST_CASE("A body made beside the steps is taken once, with what it is for") {
+TEST_CASE("A body made in the background is taken once, with what it is for") {
   BackgroundBodies background;
   CHECK_FALSE(background.is_under_way());
   background.follow({std::nullopt, 0.5, 12}, [] { return with_nodes(7); });

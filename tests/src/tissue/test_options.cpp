@@ -39,7 +39,7 @@ TEST_CASE("A body follows its blade in the step, ahead of it or beside it, as sc
   CHECK(policies(tough_block + drawn + "[tearing]\n") == std::vector{proposed, proposed, proposed, proposed});
 }
 
-TEST_CASE("A blade goes half a spacing ahead of a body that is made beside the steps, else as far as it is told") {
+TEST_CASE("A blade goes half a spacing ahead of a body that is made in the background, else as far as it is told") {
   const Scenario usual = scenario_of(cut_block + drawn), told = scenario_of(cut_block + at_once);
   CHECK(blade_advance(usual, {}) == 0);
   CHECK(blade_advance(usual, {.following_in_background = true}) == background_advance);
