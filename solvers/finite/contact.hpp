@@ -20,6 +20,9 @@ class FiniteContact {
 
   [[nodiscard]] const topology::ToolShape& tool() const { return tool_; }
   [[nodiscard]] const std::vector<int>& candidates() const { return nodes_; }
+  /// Of every candidate: the middle of its share at rest, m, and the mean over it.
+  [[nodiscard]] const std::vector<Vector3>& places() const { return rest_; }
+  [[nodiscard]] const std::vector<DisplacementMean>& means() const { return means_; }
   void set_pose(const topology::ToolPose& pose) { pose_ = pose; }
   /// The tool is nowhere: nothing touches.
   void release();

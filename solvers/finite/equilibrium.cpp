@@ -2,6 +2,7 @@
 
 #include "topology/base/errors.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -15,6 +16,7 @@ constexpr int most_trials = 12;                   // of one line search
 constexpr double wanted_decrease = 1e-4;          // of what the slope promises
 constexpr double energy_rounding = 1e-13;         // of an energy
 constexpr double most_extrapolated = 4;           // last steps that are gone once more
+constexpr double left_of_a_rise = 0.1;            // of forces of contact that have risen: what may stay unbalanced
 constexpr int most_contact_rounds = 20;           // updates of the forces of contact in a step
 constexpr int most_newton_iterations = 30;        // of one round
 constexpr int most_times = 20;                    // the iterations of a round, before a solve gives up
@@ -66,6 +68,7 @@ void Equilibrium::set_contact(const topology::ToolShape& tool, const std::vector
   FiniteContact contact(body_, tool, candidates);
   contact_.emplace(std::move(contact));
   responses_.clear();
+  rest_compliance_ = {};
   memory_.clear();
   state_.contact_forces.assign(candidates.size(), 0);
   state_.tool.reset();
@@ -76,6 +79,7 @@ void Equilibrium::set_lips(std::vector<LipPair> pairs) {
   FiniteLips lips(body_, std::move(pairs));
   lips_.emplace(std::move(lips));
   responses_.clear();
+  rest_compliance_ = {};
   memory_.clear();
   state_.lip_forces.assign(lips_->pairs().size(), 0);
   has_before_ = false;
@@ -212,6 +216,70 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
   return may_go_on && has_newton && step(target, FiniteMethod::newton, status);
 }
 
+std::vector<Matrix3> Equilibrium::from_stress_free(std::vector<Matrix3> maps) const {
+  const Matrix3 prestrained = body_.prestrain() / body_.prestrain().determinant();
+  if (prestrained != Matrix3::Identity())
+    for (Matrix3& map : maps)
+      map *= prestrained;
+  return maps;
+}
+
+// C = A C_0 A^T with the maps A at the candidates, less what the lips that touch hold back.
+MatrixX Equilibrium::contact_compliance(const std::vector<int>& chosen) {
+  if (!contact_)
+    throw InputError("the compliance of a contact, but no tool: set_contact comes first");
+  const std::vector<DisplacementMean>& means = contact_->means();
+  const auto size = std::ssize(chosen);
+  std::vector<const DisplacementMean*> of;
+  for (const int c : chosen)
+    of.push_back(&means[static_cast<std::size_t>(c)]);
+  find_responses(rest_, chosen, of, responses_);
+  if (rest_compliance_.chosen != chosen || rest_compliance_.matrix.rows() != 3 * size) {
+    rest_compliance_.chosen = chosen;
+    rest_compliance_.matrix.resize(3 * size, 3 * size);
+    for (Eigen::Index j = 0; j < size; ++j) {
+      const MatrixX& response = responses_.at(chosen[j]);
+      for (Eigen::Index i = 0; i <= j; ++i) {
+        const Matrix3 between = mean_response(*of[i], response);
+        rest_compliance_.matrix.block<3, 3>(3 * i, 3 * j) = between;
+        rest_compliance_.matrix.block<3, 3>(3 * j, 3 * i) = between.transpose();
+      }
+    }
+  }
+  const std::vector<Matrix3> maps = from_stress_free(body_.piola_maps(state_.coefficients));
+  const auto map_of = [&](Eigen::Index i) -> const Matrix3& { return maps[contact_->candidates()[chosen[i]]]; };
+  MatrixX carried(3 * size, 3 * size);
+  for (Eigen::Index j = 0; j < size; ++j)
+    for (Eigen::Index i = 0; i < size; ++i)
+      carried.block<3, 3>(3 * i, 3 * j) =
+          map_of(i) * rest_compliance_.matrix.block<3, 3>(3 * i, 3 * j) * map_of(j).transpose();
+  std::vector<ActiveConstraint> closed;
+  if (lips_)
+    lips_->append_active(maps, closed);
+  if (closed.empty())
+    return carried;
+  const auto count = std::ssize(closed);
+  std::vector<int> keys;
+  std::vector<const DisplacementMean*> apart;
+  for (const ActiveConstraint& constraint : closed) {
+    keys.push_back(constraint.key);
+    apart.push_back(constraint.mean);
+  }
+  find_responses(rest_, keys, apart, responses_);
+  MatrixX to_lips(3 * size, count), between_lips(count, count);
+  for (Eigen::Index l = 0; l < count; ++l) {
+    const MatrixX& response = responses_.at(closed[l].key);
+    for (Eigen::Index i = 0; i < size; ++i)
+      to_lips.block<3, 1>(3 * i, l) = map_of(i) * (mean_response(*of[i], response) * closed[l].direction);
+    for (Eigen::Index k = 0; k <= l; ++k)
+      between_lips(k, l) = between_lips(l, k) =
+          closed[k].direction.dot(mean_response(*closed[k].mean, response) * closed[l].direction);
+    between_lips(l, l) += 1 / closed[l].stiffness;
+  }
+  carried -= to_lips * between_lips.ldlt().solve(to_lips.transpose());
+  return 0.5 * (carried + carried.transpose());
+}
+
 bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
   Trial now;
   if (!begin_step(target, now, status))
@@ -229,11 +297,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
 /// A state to iterate from: where the last steps lead to, or nearer where that has no energy. False: there is none.
 bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus& status) {
   const std::vector<Matrix3> maps = body_.piola_maps(state_.coefficients);
-  maps_ = maps;
-  const Matrix3 from_stress_free = body_.prestrain() / body_.prestrain().determinant();
-  if (from_stress_free != Matrix3::Identity())
-    for (Matrix3& map : maps_)
-      map *= from_stress_free;
+  maps_ = from_stress_free(maps);
   const double ahead = extrapolation(target);
   const VectorX prediction =
       ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
@@ -262,7 +326,7 @@ bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus&
 /// Rounds of iterations, until forces balance and nothing lies in the tool or in itself along the normals as they are
 /// then.
 bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
-  bool converged = iterate(target, method, now, status);
+  bool converged = iterate(target, method, options_.tolerance, now, status);
   for (int round = 0; converged; ++round) {
     std::vector<double> balanced; // forces of the lips along the normals so far
     if (lips_) {
@@ -279,8 +343,11 @@ bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, E
       contact_->accept_forces();
     if (lips_)
       lips_->set_known_forces(balanced);
+    // The forces of contact have risen by what is unbalanced now. Where loads or a pre-strain are much larger, that may
+    // be below the tolerance; the body has to yield to it all the same before they rise again.
     evaluate(now.coefficients, target, now, status);
-    converged = iterate(target, method, now, status);
+    const double risen = now.residual.norm() / now.acting;
+    converged = iterate(target, method, std::min(options_.tolerance, left_of_a_rise * risen), now, status);
   }
   return converged;
 }
@@ -434,14 +501,15 @@ VectorX Equilibrium::newton_direction(const Trial& now, EquilibriumStatus& statu
   }
 }
 
-bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
+bool Equilibrium::iterate(const State& target, FiniteMethod method, double tolerance, Trial& now,
+                          EquilibriumStatus& status) {
   Trial next;
   const bool quasi = method == FiniteMethod::quasi_newton;
   const int most = quasi ? options_.maximum_iterations : std::min(options_.maximum_iterations, most_newton_iterations);
   for (int iteration = 0;; ++iteration) {
     const double norm = now.residual.norm();
     status.residual = norm / now.acting;
-    if (status.residual < options_.tolerance)
+    if (status.residual < tolerance)
       return true;
     if (iteration == most || is_spent(method, status, options_))
       return false;

@@ -76,6 +76,11 @@ class Equilibrium {
   /// Force of the constraint of every prescribed entry on the body, N.
   [[nodiscard]] const std::vector<Vector3>& constraint_forces() const { return reactions_; }
   [[nodiscard]] const FiniteContact* contact() const { return contact_ ? &*contact_ : nullptr; }
+  /// Displacements of the middles of candidates' shares to small forces on them in the present state, the tool taken
+  /// away, faces of cuts that touch held together: the response of the rest operator, carried by the deformation.
+  /// `chosen`: places in contact()->candidates(). 3 rows and columns each, symmetric, m/N. Throws InputError without a
+  /// contact.
+  [[nodiscard]] MatrixX contact_compliance(const std::vector<int>& chosen);
   [[nodiscard]] const FiniteLips* lips() const { return lips_ ? &*lips_ : nullptr; }
 
  private:
@@ -94,13 +99,15 @@ class Equilibrium {
   };
   [[nodiscard]] State target_of(const FiniteLoading& loading) const;
   [[nodiscard]] State between(const State& from, const State& to, double part) const;
+  /// Maps that carry the stress-free body to a state, given those of its nodes from rest.
+  [[nodiscard]] std::vector<Matrix3> from_stress_free(std::vector<Matrix3> maps) const;
   bool go(const State& target, int halvings, EquilibriumStatus& status);
   bool step(const State& target, FiniteMethod method, EquilibriumStatus& status);
   bool begin_step(const State& target, Trial& now, EquilibriumStatus& status);
   bool settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
   void accept_step(const State& target, const Trial& now, EquilibriumStatus& status);
-  /// Iterates with the forces of contact known so far.
-  bool iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
+  /// Iterates with the forces of contact known so far, until what is unbalanced is `tolerance` of what acts.
+  bool iterate(const State& target, FiniteMethod method, double tolerance, Trial& now, EquilibriumStatus& status);
   void evaluate(const VectorX& coefficients, const State& target, Trial& trial, EquilibriumStatus& status);
   [[nodiscard]] double extrapolation(const State& target) const;
   [[nodiscard]] VectorX predict(const State& target);
@@ -117,6 +124,11 @@ class Equilibrium {
   std::optional<FiniteContact> contact_;
   std::optional<FiniteLips> lips_;
   ConstraintResponses responses_; // of the rest operator
+  struct RestCompliance { // between candidates' shares, at rest
+    std::vector<int> chosen;
+    MatrixX matrix; // m/N
+  };
+  RestCompliance rest_compliance_;
   StepMemory memory_;
   State state_, before_;
   bool has_before_ = false;

@@ -144,6 +144,22 @@ int BodyModel::nearest_seen(const Vector3& x) const {
   return static_cast<int>(nearest);
 }
 
+const solvers::NodeCloud& BodyModel::nodes() const {
+  return finite != nullptr ? sprinkling.nodes : body->problem().nodes;
+}
+
+int BodyModel::sphere_count() const {
+  return finite != nullptr ? finite->spheres().size() : body->sphere_count();
+}
+
+double BodyModel::sphere_radius(int node) const {
+  return finite != nullptr ? finite->spheres().radii()[static_cast<std::size_t>(node)] : body->sphere_radius(node);
+}
+
+int BodyModel::coefficient_count() const {
+  return finite != nullptr ? 3 * finite->spheres().size() : body->coefficient_count();
+}
+
 bool BodyModel::solved() const {
   return finite != nullptr ? finite->solved() : state.has_value();
 }
@@ -166,10 +182,13 @@ solvers::PointState BodyModel::at(const Vector3& x) const {
 }
 
 void BodyModel::shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const {
+  const auto find = [&](const Vector3& place) {
+    finite != nullptr ? finite->shape_at(place, shape) : body->shape_at(place, shape);
+  };
   try {
-    body->shape_at(x, shape);
+    find(x);
   } catch (const InputError&) {
-    body->shape_at(sprinkling.nodes.positions[nearest_seen(x)], shape);
+    find(sprinkling.nodes.positions[nearest_seen(x)]);
   }
 }
 

@@ -43,6 +43,9 @@ class FiniteModel {
   /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
   /// from the volume ratio there. Throws InputError where no sphere covers it.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const;
+  /// Shape functions there, with which the displacement is a sum over coefficients. Throws as at().
+  void shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const;
+  [[nodiscard]] const solvers::Spheres& spheres() const { return body_.spheres(); }
   [[nodiscard]] bool solved() const { return last_.has_value(); }
   /// Of the last solution.
   [[nodiscard]] const FiniteStep& last() const { return *last_; }
@@ -50,6 +53,12 @@ class FiniteModel {
   /// Gap of every pair of lips along its normal, m.
   [[nodiscard]] std::vector<double> openings() const;
   [[nodiscard]] VectorX nodal_displacements() const; // 3 a node, m
+  /// The last solution as a loop wants it that asks for the force at other poses of the tool: displacements = base +
+  /// compliance * forces, exact at this pose, the compliance that of small motions about it. `wanted`: free nodes of
+  /// the surface; those that touch the tool join them.
+  void condense(const std::vector<int>& wanted, solvers::ContactPatch& patch, solvers::ContactState& state);
+  /// Finds what condense() onto these nodes needs of the body at rest.
+  void prepare_to_condense(const std::vector<int>& wanted);
   [[nodiscard]] int candidates() const { return static_cast<int>(candidates_.size()); }
   [[nodiscard]] int held() const { return held_nodes(body_.problem().prescribed); }
 
@@ -62,6 +71,7 @@ class FiniteModel {
   };
   FiniteStep solve_step(double time, const std::optional<topology::ToolPose>& pose);
   void lay_skin();
+  [[nodiscard]] std::vector<int> places_among_candidates(const std::vector<int>& nodes) const;
   [[nodiscard]] double deepest(const topology::ToolPose& pose) const;
   void summarise_contact(FiniteStep& step) const;
 

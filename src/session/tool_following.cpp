@@ -1,5 +1,7 @@
 #include "src/session/tool_following.hpp"
 
+#include "src/tissue/finite_body.hpp"
+
 #include <fmt/format.h>
 #include <utility>
 
@@ -52,6 +54,7 @@ void ToolFollowing::take() {
   renewal_.drop();
   contact_.keep_grip();
   state_.zone.move_to(*following.centre);
+  take_over_finite(state_.model, next);
   state_.model = std::move(next);
   taken_ = true;
   state_.log.say(fmt::format("the fine zone has followed the tool: {} nodes", state_.model.sprinkling.nodes.size()));

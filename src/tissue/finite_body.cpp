@@ -24,6 +24,19 @@ void make_finite(SessionState& state, BodyModel& model, const BodyModel* before)
                             2 * model.pairs.size(), model.finite->held(), name_of(state.scenario.law)));
 }
 
+void make_finite_apart(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                       const std::vector<int>& wanted, BodyModel& model) {
+  model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
+  model.finite = std::make_shared<FiniteModel>(scenario, domain, model, scenario.tool.has_value());
+  if (!wanted.empty())
+    model.finite->prepare_to_condense(wanted);
+}
+
+void take_over_finite(const BodyModel& before, BodyModel& next) {
+  if (next.finite != nullptr && before.solved())
+    next.finite->go_on_from(before);
+}
+
 // Where the way from the last state does not lead to equilibrium, the one from rest may.
 void solve_finite(double time, const std::optional<topology::ToolPose>& pose, BodyModel& model,
                   SessionProfile& profile) {
