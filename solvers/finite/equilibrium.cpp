@@ -3,9 +3,11 @@
 #include "topology/base/errors.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::solvers {
 
@@ -103,7 +105,7 @@ void Equilibrium::set_coefficients(const VectorX& coefficients, double load_fact
   state_.prescribed.clear();
   for (const DisplacementMean& mean : body_.held().means())
     state_.prescribed.push_back(mean.of(coefficients));
-  memory_.clear();
+  set_tangent(nullptr);
   has_before_ = false;
 }
 
@@ -197,6 +199,7 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
             : "",
         rest_.condition()));
   }
+  renew_preconditioner(status);
   return status;
 }
 
@@ -208,6 +211,11 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
     return false;
   if (step(target, may_go_on ? options_.method : FiniteMethod::newton, status))
     return true;
+  if (tangent_ && may_go_on) { // it may be too far away
+    set_tangent(nullptr);
+    if (step(target, options_.method, status))
+      return true;
+  }
   if (halvings > 0 && motion(state_, target).norm() > 0) {
     ++status.halvings;
     const State middle = between(state_, target, 0.5);
@@ -216,12 +224,41 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
   return may_go_on && has_newton && step(target, FiniteMethod::newton, status);
 }
 
-std::vector<Matrix3> Equilibrium::from_stress_free(std::vector<Matrix3> maps) const {
+std::vector<Matrix3> Equilibrium::carrying(std::vector<Matrix3> maps) const {
   const Matrix3 prestrained = body_.prestrain() / body_.prestrain().determinant();
   if (prestrained != Matrix3::Identity())
     for (Matrix3& map : maps)
       map *= prestrained;
+  if (tangent_)
+    for (std::size_t i = 0; i < maps.size(); ++i)
+      maps[i] *= tangent_->back[i];
   return maps;
+}
+
+void Equilibrium::set_tangent(std::unique_ptr<CarriedTangent> tangent) {
+  tangent_ = std::move(tangent);
+  excess_ = 0;
+  memory_.clear();
+  responses_.clear();
+  rest_compliance_ = {};
+}
+
+// What happens depends on counts of iterations alone, so that the bits do not depend on the machine.
+void Equilibrium::renew_preconditioner(const EquilibriumStatus& status) {
+  if (options_.worth_of_tangent == 0 || options_.method != FiniteMethod::quasi_newton)
+    return;
+  excess_ += std::max(0, status.iterations - options_.few_iterations);
+  if (excess_ < options_.worth_of_tangent)
+    return;
+  const std::unique_ptr<CarriedTangent> before = std::exchange(tangent_, nullptr);
+  std::vector<Matrix3> back = carrying(body_.piola_maps(state_.coefficients));
+  for (Matrix3& map : back)
+    map = map.inverse().eval();
+  try {
+    set_tangent(std::make_unique<CarriedTangent>(RestOperator(body_, state_.coefficients), std::move(back)));
+  } catch (const NumericalError&) { // not positive definite: the rest operator is
+    set_tangent(nullptr);
+  }
 }
 
 // C = A C_0 A^T with the maps A at the candidates, less what the lips that touch hold back.
@@ -233,7 +270,7 @@ MatrixX Equilibrium::contact_compliance(const std::vector<int>& chosen) {
   std::vector<const DisplacementMean*> of;
   for (const int c : chosen)
     of.push_back(&means[static_cast<std::size_t>(c)]);
-  find_responses(rest_, chosen, of, responses_);
+  find_responses(preconditioner(), chosen, of, responses_);
   if (rest_compliance_.chosen != chosen || rest_compliance_.matrix.rows() != 3 * size) {
     rest_compliance_.chosen = chosen;
     rest_compliance_.matrix.resize(3 * size, 3 * size);
@@ -246,7 +283,7 @@ MatrixX Equilibrium::contact_compliance(const std::vector<int>& chosen) {
       }
     }
   }
-  const std::vector<Matrix3> maps = from_stress_free(body_.piola_maps(state_.coefficients));
+  const std::vector<Matrix3> maps = carrying(body_.piola_maps(state_.coefficients));
   const auto map_of = [&](Eigen::Index i) -> const Matrix3& { return maps[contact_->candidates()[chosen[i]]]; };
   MatrixX carried(3 * size, 3 * size);
   for (Eigen::Index j = 0; j < size; ++j)
@@ -265,7 +302,7 @@ MatrixX Equilibrium::contact_compliance(const std::vector<int>& chosen) {
     keys.push_back(constraint.key);
     apart.push_back(constraint.mean);
   }
-  find_responses(rest_, keys, apart, responses_);
+  find_responses(preconditioner(), keys, apart, responses_);
   MatrixX to_lips(3 * size, count), between_lips(count, count);
   for (Eigen::Index l = 0; l < count; ++l) {
     const MatrixX& response = responses_.at(closed[l].key);
@@ -297,7 +334,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
 /// A state to iterate from: where the last steps lead to, or nearer where that has no energy. False: there is none.
 bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus& status) {
   const std::vector<Matrix3> maps = body_.piola_maps(state_.coefficients);
-  maps_ = from_stress_free(maps);
+  maps_ = carrying(maps);
   const double ahead = extrapolation(target);
   const VectorX prediction =
       ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
@@ -469,12 +506,19 @@ std::vector<ActiveConstraint> Equilibrium::active_constraints(const std::vector<
   return constraints;
 }
 
+std::vector<int> Equilibrium::touching() const {
+  std::vector<int> keys;
+  for (const ActiveConstraint& constraint : active_constraints({}))
+    keys.push_back(constraint.key);
+  return keys;
+}
+
 VectorX Equilibrium::precondition(const VectorX& residual) {
   VectorX carried(residual.size()), answer;
   for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
     carried.segment<3>(3 * i) = maps_[i].transpose() * residual.segment<3>(3 * i);
-  rest_.solve(carried, answer);
-  correct(rest_, active_constraints(maps_), responses_, answer);
+  preconditioner().solve(carried, answer);
+  correct(preconditioner(), active_constraints(maps_), responses_, answer);
   for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
     answer.segment<3>(3 * i) = (maps_[i] * answer.segment<3>(3 * i)).eval();
   body_.held().complete(answer, {});
@@ -532,6 +576,7 @@ bool Equilibrium::iterate(const State& target, FiniteMethod method, double toler
       if (!(slope < 0))
         return false;
     }
+    const std::vector<int> touched = touching();
     double length = 1;
     bool accepted = false;
     int trials = 0;
@@ -559,7 +604,9 @@ bool Equilibrium::iterate(const State& target, FiniteMethod method, double toler
       }
       return false;
     }
-    if (quasi)
+    if (quasi && touching() != touched) // what is remembered is of other constraints than those that act now
+      memory_.clear();
+    else if (quasi)
       memory_.add(next.coefficients - now.coefficients, next.residual - now.residual);
     std::swap(now, next);
   }

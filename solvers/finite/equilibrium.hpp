@@ -1,7 +1,8 @@
 // Equilibria of a body at finite strain, step by step along a path of prescribed displacements, loads and tool poses.
 //
-// Quasi-Newton: L-BFGS preconditioned by the factor of the stress-free stiffness, carried by nodal Piola maps that are
-// fixed during a solve, with the memory of steps kept from solve to solve. A line search on the energy refuses states
+// Quasi-Newton: L-BFGS preconditioned by the factor of the stress-free stiffness, or of the tangent at a state that has
+// been where that pays, carried by nodal Piola maps that are fixed during a solve, with the memory of steps kept from
+// solve to solve. A line search on the energy refuses states
 // that are inverted. Start: the last two states extrapolated, or the response of the rest operator. A step that does
 // not converge is halved; where that does not help, Newton's method takes over.
 #pragma once
@@ -29,6 +30,10 @@ struct EquilibriumOptions {
   double least_jacobian = 0.01; // the line search stops short of it
   double penetration = 1e-3;    // of the tool into the middles of shares, and of lips into each other, in spacings
   bool fall_back = true;        // whether Newton's method is asked at all
+  /// Iterations beyond `few_iterations` a step, summed over steps, after which the tangent at the present state
+  /// preconditions in place of that at rest: what assembling and factoring it takes, in iterations. 0: never.
+  int worth_of_tangent = 30;
+  int few_iterations = 4;
 };
 
 /// What the body is to be in equilibrium with.
@@ -91,6 +96,10 @@ class Equilibrium {
     std::optional<topology::ToolPose> tool;
     std::vector<double> contact_forces, lip_forces;
   };
+  struct CarriedTangent { // at a state that has been
+    RestOperator matrix;
+    std::vector<Matrix3> back; // inverse of the maps from the stress-free body to that state, a node each
+  };
   struct Trial { // an evaluation
     VectorX coefficients, residual;
     double energy = 0, acting = 0, strain_energy = 0, least_jacobian = 0;
@@ -99,8 +108,11 @@ class Equilibrium {
   };
   [[nodiscard]] State target_of(const FiniteLoading& loading) const;
   [[nodiscard]] State between(const State& from, const State& to, double part) const;
-  /// Maps that carry the stress-free body to a state, given those of its nodes from rest.
-  [[nodiscard]] std::vector<Matrix3> from_stress_free(std::vector<Matrix3> maps) const;
+  /// Maps that carry the body of the preconditioner to a state, given those of its nodes from rest.
+  [[nodiscard]] std::vector<Matrix3> carrying(std::vector<Matrix3> maps) const;
+  [[nodiscard]] const RestOperator& preconditioner() const { return tangent_ ? tangent_->matrix : rest_; }
+  void renew_preconditioner(const EquilibriumStatus& status);
+  void set_tangent(std::unique_ptr<CarriedTangent> tangent);
   bool go(const State& target, int halvings, EquilibriumStatus& status);
   bool step(const State& target, FiniteMethod method, EquilibriumStatus& status);
   bool begin_step(const State& target, Trial& now, EquilibriumStatus& status);
@@ -113,6 +125,8 @@ class Equilibrium {
   [[nodiscard]] VectorX predict(const State& target);
   [[nodiscard]] VectorX precondition(const VectorX& residual);
   [[nodiscard]] std::vector<ActiveConstraint> active_constraints(const std::vector<Matrix3>& maps) const;
+  /// Keys of the constraints that were active at the last evaluation.
+  [[nodiscard]] std::vector<int> touching() const;
   /// Deepest that the tool lies in the body or lips in each other at the last evaluation, spacings.
   [[nodiscard]] double deepest(const State& target) const;
   [[nodiscard]] VectorX newton_direction(const Trial& now, EquilibriumStatus& status);
@@ -123,8 +137,10 @@ class Equilibrium {
   RestOperator rest_;
   std::optional<FiniteContact> contact_;
   std::optional<FiniteLips> lips_;
-  ConstraintResponses responses_; // of the rest operator
-  struct RestCompliance { // between candidates' shares, at rest
+  std::unique_ptr<CarriedTangent> tangent_; // null: the rest operator preconditions
+  int excess_ = 0;                          // iterations beyond the few of a step since that was chosen
+  ConstraintResponses responses_;           // of the preconditioner
+  struct RestCompliance {                   // between candidates' shares, of the preconditioner as it is
     std::vector<int> chosen;
     MatrixX matrix; // m/N
   };

@@ -192,8 +192,8 @@ void ViewerFeed::add_extras(const HapticSimulation& simulation, ViewerFrame& fra
   const std::vector<Vector3> deformed = deformed_nodes(model);
   if (request_.nodes)
     for (std::size_t i = 0; i < deformed.size(); ++i)
-      frame.node_list.push_back({deformed[i].cast<float>(),
-                                 static_cast<float>(model.sphere_radius(static_cast<int>(i))), nodes.kinds[i]});
+      frame.node_list.push_back(
+          {deformed[i].cast<float>(), static_cast<float>(model.sphere_radius(static_cast<int>(i))), nodes.kinds[i]});
   for (const ViewerRequest::Pick& pick : request_.picks)
     frame.picks.push_back(picked(pick, model, deformed));
 }

@@ -159,8 +159,8 @@ void Session::Parts::step_finite(const StepSample& sample, std::vector<topology:
   result.rebuild = std::exchange(state.rebuild, Rebuild::none);
 }
 
-// Where a path leads the tool, nodes are fine all along it. What has faded of a viscoelastic body is known at the points
-// of its quadrature, and those of other nodes are elsewhere.
+// Where a path leads the tool, nodes are fine all along it. What has faded of a viscoelastic body is known at the
+// points of its quadrature, and those of other nodes are elsewhere.
 bool Session::Parts::may_follow_finite() {
   if (state.leader == Leader::path || !state.touch)
     return false;
@@ -251,8 +251,8 @@ bool Session::Parts::cut_freely(const StepSample& sample, bool another_body, Ste
     return false;
   bool solved = false;
   if (state.model.built() && !state.model.solved() && (sample.blade || another_body)) { // by its field a blade is
-    contact.solve(sample, state.model);                                                  // carried to the tissue at
-    solved = true;                                                                       // rest
+    contact.solve(sample, state.model);                                                 // carried to the tissue at
+    solved = true;                                                                      // rest
   }
   return cutting.move(sample, *result.cut) || solved;
 }

@@ -32,9 +32,9 @@ const Scenario& checked(const Scenario& scenario, const Organ& organ, Leader lea
 } // namespace
 
 SessionState::SessionState(Scenario scenario_in, std::function<void(const std::string&)> say, Leader led_by)
-    : leader(led_by), scenario(std::move(scenario_in)), log(std::move(say)), organ(timed_organ(scenario.organ, profile.organ)),
-      query(organ.domain->surface()), toughness(toughness_field(scenario)),
-      zone(checked(scenario, organ, leader, log), organ.domain) {}
+    : leader(led_by), scenario(std::move(scenario_in)), log(std::move(say)),
+      organ(timed_organ(scenario.organ, profile.organ)), query(organ.domain->surface()),
+      toughness(toughness_field(scenario)), zone(checked(scenario, organ, leader, log), organ.domain) {}
 
 void SessionState::check_pieces(double time) {
   require_pieces(incisions->wound(), zone.spacing());
