@@ -17,10 +17,15 @@ constexpr double most_penetration = 1e-3;
 /// Of the acting forces, gravity among them: a small force of contact is to be told from what is left.
 constexpr double most_unbalanced = 1e-4;
 
-solvers::EquilibriumOptions equilibrium_options() {
+solvers::EquilibriumOptions equilibrium_options(Patience patience) {
   solvers::EquilibriumOptions options;
   options.penetration = most_penetration;
   options.tolerance = most_unbalanced;
+  if (patience == Patience::of_a_hand) {
+    options.maximum_iterations = 40;
+    options.halvings = 3;
+    options.fall_back = false;
+  }
   return options;
 }
 
@@ -104,10 +109,10 @@ bool can_run(const Scenario& scenario) {
 }
 
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
-                         const BodyModel& nodes, bool touched)
+                         const BodyModel& nodes, bool touched, Patience patience)
     : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario),
             fibre_field(scenario.law)),
-      equilibrium_(body_, equilibrium_options()), is_prestrained_(!scenario.pretension.isZero(0)),
+      equilibrium_(body_, equilibrium_options(patience)), is_prestrained_(!scenario.pretension.isZero(0)),
       pairs_(body_, nodes.pairs) {
   if (!nodes.pairs.empty() && scenario.cut.lips != solvers::LipCondition::open)
     equilibrium_.set_lips(nodes.pairs);

@@ -23,12 +23,16 @@ struct FiniteStep {
   double penetration = 0; // m, deepest that corners and middles of the surface's triangles lie in the tool
 };
 
+/// How long an equilibrium is looked for that may not be there: a hand would wait for seconds, and its next pose may
+/// have one.
+enum class Patience : std::uint8_t { of_a_run, of_a_hand };
+
 class FiniteModel {
  public:
   /// The body on nodes, cut and lips of `nodes`. `touched`: whether a tool may come to it. Throws as require_run() and
   /// solvers::FiniteBody.
   FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, const BodyModel& nodes,
-              bool touched);
+              bool touched, Patience patience);
 
   /// Begins where another body of the same organ, on other nodes or with less of the cut, has come to.
   void go_on_from(const BodyModel& before);
@@ -47,7 +51,9 @@ class FiniteModel {
   void shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const;
   [[nodiscard]] const solvers::Spheres& spheres() const { return body_.spheres(); }
   [[nodiscard]] bool solved() const { return last_.has_value(); }
-  /// Of the last solution.
+  /// Of the last solution: time, s, pose of the tool, and what else there is to tell.
+  [[nodiscard]] double time() const { return *time_; }
+  [[nodiscard]] const std::optional<topology::ToolPose>& pose() const { return pose_; }
   [[nodiscard]] const FiniteStep& last() const { return *last_; }
   [[nodiscard]] const VectorX& coefficients() const { return equilibrium_.coefficients(); } // 3 a node, m
   /// Gap of every pair of lips along its normal, m.

@@ -174,9 +174,9 @@ bool BladeCutting::take() {
     state_.profile.sprinkle += report.seconds.sprinkling;
     state_.profile.discretise += report.seconds.assembly + report.seconds.visibility;
     state_.profile.condense += report.seconds.solve;
+    take_over_finite(state_.model, made.model, state_.profile);
     renewal_.drop();
     contact_.keep_grip();
-    take_over_finite(state_.model, made.model);
     state_.model = std::move(made.model);
   } catch (const std::runtime_error& error) {
     state_.incisions->take_back();

@@ -15,8 +15,9 @@ void make_finite(SessionState& state, BodyModel& model, const BodyModel* before 
 void make_finite_apart(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                        const std::vector<int>& wanted, BodyModel& model);
 
-/// Such a body takes over from the one before.
-void take_over_finite(const BodyModel& before, BodyModel& next);
+/// Such a body takes over from the one before, in equilibrium at the time and with the tool of its last solution; it
+/// may be a linear one, and then nothing is done. Throws NumericalError where there is no equilibrium.
+void take_over_finite(const BodyModel& before, BodyModel& next, SessionProfile& profile);
 
 /// Goes on to equilibrium at `time`, s, with the tool at a pose (empty: there is none). Throws NumericalError.
 void solve_finite(double time, const std::optional<topology::ToolPose>& pose, BodyModel& model,
