@@ -135,36 +135,62 @@ PlacedPart& CutSpace::place_of(PartId part) const {
   return *known;
 }
 
-/// The connected components of some parts, numbered from the first part on: that of each, and how many there are.
-/// local_ tells the place of each part when this returns.
-int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>& component) {
+/// The connected components of some parts, numbered from the first part on: that of each, and how many there are. Parts
+/// that are marked as faint (may be empty) join nothing, and go with a component that they touch. local_ tells the place of each part when this returns.
+int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>& component,
+                              const std::vector<char>& faint_parts) {
   for (std::size_t k = 0; k < parts.size(); ++k)
     local_[parts[k]] = static_cast<int>(k);
   component.assign(parts.size(), -1);
+  const auto is_faint = [&](int place) { return !faint_parts.empty() && faint_parts[place] != 0; };
   int count = 0;
   std::vector<int> pending;
-  for (std::size_t start = 0; start < parts.size(); ++start) {
-    if (component[start] >= 0)
-      continue;
-    component[start] = count;
-    pending.assign(1, static_cast<int>(start));
-    while (!pending.empty()) {
-      const int at = pending.back();
-      pending.pop_back();
+  const auto spread = [&](bool into_faint) {
+    for (std::size_t done = 0; done < pending.size(); ++done) {
+      const int at = pending[done];
       cut_.for_each_linked(parts[at], [&](PartId next) {
         const int place = local_[next];
-        if (place >= 0 && component[place] < 0) {
-          component[place] = count;
+        if (place >= 0 && component[place] < 0 && is_faint(place) == into_faint) {
+          component[place] = component[at];
           pending.push_back(place);
         }
       });
     }
-    ++count;
+  };
+  for (std::size_t start = 0; start < parts.size(); ++start) {
+    if (component[start] >= 0 || is_faint(static_cast<int>(start)))
+      continue;
+    component[start] = count++;
+    pending.assign(1, static_cast<int>(start));
+    spread(false);
   }
+  if (faint_parts.empty())
+    return count;
+  pending.clear();
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    if (component[k] >= 0)
+      pending.push_back(static_cast<int>(k));
+  spread(true);
+  for (std::size_t k = 0; k < parts.size(); ++k) // linked to nothing but others like it
+    if (component[k] < 0)
+      component[k] = count > 0 ? 0 : (count = 1) - 1;
   return count;
 }
 
-/// Energy of a sphere in a part, but for the material.
+// Boxes at the rim of a sphere reach beyond it, and may join around a front outside of it what the cut parts inside.
+std::vector<char> CutSpace::faint_of(int node, const std::vector<PartId>& parts) const {
+  std::vector<double> energy;
+  double whole = 0;
+  for (const PartId part : parts) {
+    energy.push_back(energy_in(node, part));
+    whole += energy.back();
+  }
+  std::vector<char> faint_parts;
+  for (const double own : energy)
+    faint_parts.push_back(own < faint * whole ? 1 : 0);
+  return faint_parts;
+}
+
 double CutSpace::energy_in(int node, PartId part) const {
   const int box = box_of(part);
   const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
@@ -187,7 +213,9 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
     for (int k = 0; k < cut_.part_count(box); ++k)
       parts.push_back(part_id(box, k));
   std::vector<int> component;
-  const int count = find_components(parts, component);
+  int count = find_components(parts, component, {});
+  if (count == 1 && !incision_->front_frame(spheres_.centres()[node], spheres_.radii()[node]))
+    count = find_components(parts, component, faint_of(node, parts));
   const int own_place = local_[cut_.part_at(spheres_.centres()[node], *incision_)];
   const int own = own_place < 0 ? component.front() : component[own_place];
   for (const PartId part : parts)

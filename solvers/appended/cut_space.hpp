@@ -125,7 +125,9 @@ class CutSpace {
   /// Boxes that the sphere of a node may reach, ascending; kept.
   [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
   void add_twins(int node, std::vector<CutFunction>& found);
-  int find_components(const std::vector<PartId>& parts, std::vector<int>& component);
+  int find_components(const std::vector<PartId>& parts, std::vector<int>& component,
+                      const std::vector<char>& faint_parts);
+  [[nodiscard]] std::vector<char> faint_of(int node, const std::vector<PartId>& parts) const;
   [[nodiscard]] double energy_in(int node, PartId part) const;
   void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
   void find_curved_front();
