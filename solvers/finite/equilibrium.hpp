@@ -21,13 +21,15 @@ FiniteMethod finite_method_from_string(std::string_view name);
 
 struct EquilibriumOptions {
   FiniteMethod method = FiniteMethod::quasi_newton;
-  /// Norm of the unbalanced forces over that of the forces that act: of loads, pre-strain, held surface and tool.
+  /// Norm of the unbalanced forces over that of the forces that act: of loads, pre-strain, held surface and tool, and
+  /// that of a tool with friction, or bonded, at the end of the step before: it may pass through zero, or let go.
   double tolerance = 1e-3;
   int maximum_iterations = 100; // of one step; then it is halved
   int halvings = 6;             // of a step, before Newton's method is asked
   int memory = 20;              // steps that are remembered
   double least_jacobian = 0.01; // the line search stops short of it
   double penetration = 1e-3;    // of the tool into the middles of shares, and of lips into each other, in spacings
+  double unsettled = 1e-3;      // change of the forces along the tool's surface by a last round, over the acting forces
   bool fall_back = true;        // whether Newton's method is asked at all
 };
 
@@ -47,9 +49,11 @@ struct EquilibriumStatus {
   double energy = 0;                     // J, strain energy
   int touching = 0;                      // shares that touch the tool
   int closed = 0;                        // pairs of lips that touch each other
-  double penetration = 0;                // in spacings, of the tool or of lips
+  double penetration = 0;                // in spacings, of the tool or of lips, or of what is bonded off its place
   Vector3 tool_force = Vector3::Zero();  // N, of the body on the tool
   Vector3 tool_torque = Vector3::Zero(); // N m, of the same about the tool's point
+  Vector3 friction = Vector3::Zero();    // N, the part of tool_force that friction exerts along the tool's surface
+  double friction_work = 0;              // J, taken by friction on the way
 };
 
 class Equilibrium {
@@ -57,8 +61,16 @@ class Equilibrium {
   /// The body outlives it, and is used by one of these at a time.
   explicit Equilibrium(const FiniteBody& body, const EquilibriumOptions& options = {});
 
-  /// The tool that presses, and the nodes that it may touch; as FiniteContact.
-  void set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates);
+  /// The tool that presses, and the nodes that it may touch; as FiniteContact. With friction, or bonded, what happens
+  /// depends on the way: a solve then goes there in strides of a tenth, or half, of the tool's tip radius, and where
+  /// the tool was nowhere it comes back along its axis from where it is clear of all candidates.
+  void set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates,
+                   const FiniteContactOptions& options = {});
+  /// A tool at that pose holds the shares of these nodes from now on, in place of any other tool: they move with it as
+  /// with a rigid body.
+  void take_hold(const topology::ToolShape& tool, const topology::ToolPose& pose, const std::vector<int>& nodes);
+  /// There is no tool any more.
+  void let_go();
   /// Faces of a cut that do not go through each other; as FiniteLips.
   void set_lips(std::vector<LipPair> pairs);
 
@@ -70,9 +82,13 @@ class Equilibrium {
 
   [[nodiscard]] const VectorX& coefficients() const { return state_.coefficients; } // m, 3 a node
   /// Begins from these, as from a state with that part of the loads and the tool there (empty: nowhere), to which a
-  /// halved step goes back. Nothing is remembered of the way, nor of forces of contact.
+  /// halved step goes back. Nothing is remembered of the way, nor of forces of contact, but `shares`, one a candidate
+  /// (empty: nothing touches).
   void set_coefficients(const VectorX& coefficients, double load_factor = 0,
-                        const std::optional<topology::ToolPose>& tool = std::nullopt);
+                        const std::optional<topology::ToolPose>& tool = std::nullopt,
+                        std::vector<ContactShare> shares = {});
+  /// Of every candidate of the contact, as the last solve has left them.
+  [[nodiscard]] const std::vector<ContactShare>& contact_shares() const { return state_.shares; }
   /// Force of the constraint of every prescribed entry on the body, N.
   [[nodiscard]] const std::vector<Vector3>& constraint_forces() const { return reactions_; }
   [[nodiscard]] const FiniteContact* contact() const { return contact_ ? &*contact_ : nullptr; }
@@ -84,7 +100,9 @@ class Equilibrium {
     std::vector<Vector3> prescribed;
     double load_factor = 0;
     std::optional<topology::ToolPose> tool;
-    std::vector<double> contact_forces, lip_forces;
+    std::vector<ContactShare> shares; // of the contact
+    std::vector<double> lip_forces;
+    double gripped = 0; // N, norm of the nodal forces of a tool that is not without friction
   };
   struct Trial { // an evaluation
     VectorX coefficients, residual;
@@ -94,6 +112,8 @@ class Equilibrium {
   };
   [[nodiscard]] State target_of(const FiniteLoading& loading) const;
   [[nodiscard]] State between(const State& from, const State& to, double part) const;
+  [[nodiscard]] bool minds_way() const; // the contact does: it rubs or bonds
+  [[nodiscard]] int strides(const State& target) const;
   bool go(const State& target, int halvings, EquilibriumStatus& status);
   bool step(const State& target, FiniteMethod method, EquilibriumStatus& status);
   bool begin_step(const State& target, Trial& now, EquilibriumStatus& status);
@@ -108,6 +128,8 @@ class Equilibrium {
   [[nodiscard]] std::vector<ActiveConstraint> active_constraints(const std::vector<Matrix3>& maps) const;
   /// Deepest that the tool lies in the body or lips in each other at the last evaluation, spacings.
   [[nodiscard]] double deepest(const State& target) const;
+  /// Whether the forces along the tool's surface are those of the places found.
+  [[nodiscard]] bool is_settled(const State& target, const Trial& now) const;
   [[nodiscard]] VectorX newton_direction(const Trial& now, EquilibriumStatus& status);
   [[nodiscard]] VectorX motion(const State& from, const State& to) const;
 
