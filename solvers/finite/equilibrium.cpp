@@ -198,6 +198,7 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
   const std::vector<Vector3> reactions = reactions_;
   EquilibriumStatus status;
   least_seen_ = last_residual_ = 1;
+  last_unsettled_ = 0;
   const auto go_back = [&] {
     state_ = begin;
     before_ = before;
@@ -208,7 +209,7 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
   bool found = true;
   try {
     const int steps = strides(target);
-    if (contact_ && target.tool && !state_.tool && contact_->options().condition != ContactCondition::frictionless)
+    if (minds_way() && target.tool && !state_.tool)
       state_.tool = contact_->clear_pose(*target.tool, state_.coefficients);
     const State start = state_;
     for (int k = 1; found && k <= steps; ++k)
@@ -224,7 +225,7 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
     go_back();
     throw NumericalError(fmt::format(
         "no equilibrium found: {:.3g} of the step was reached in {} iterations and {} halvings; the unbalanced force "
-        "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}{}; the condition of the rest "
+        "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}{}{}; the condition of the rest "
         "stiffness is {:.3g}",
         reached, status.iterations, status.halvings, last_residual_, options_.tolerance, least_seen_,
         least_seen_ <= options_.least_jacobian ? ": the body is about to be inverted" : "",
@@ -233,6 +234,10 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
                           contact_ && target.tool && contact_->deepest() > options_.penetration ? "the tool"
                                                                                                 : "itself at a cut",
                           options_.penetration)
+            : "",
+        last_residual_ < options_.tolerance && last_unsettled_ > options_.unsettled
+            ? fmt::format(", friction or bonds still change by {:.3g} of the acting forces a round (limit {:.3g})",
+                          last_unsettled_, options_.unsettled)
             : "",
         rest_.condition()));
   }
@@ -261,6 +266,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     return false;
   const bool converged = settle(target, method, now, status);
   last_residual_ = status.residual;
+  last_unsettled_ = contact_ && target.tool ? contact_->unsettled() / now.acting : 0;
   if (!converged)
     return false;
   if (method == FiniteMethod::newton)
@@ -306,7 +312,7 @@ bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus&
     if (now.usable && (!body_.minds_volume() || now.least_jacobian > least_predicted_jacobian))
       break;
   }
-  if (now.usable && minds_way() && target.tool && contact_->options().condition == ContactCondition::bonded &&
+  if (now.usable && target.tool && contact_ && contact_->options().condition == ContactCondition::bonded &&
       contact_->renew()) // what the tool has overtaken is held from the start
     evaluate(VectorX(now.coefficients), target, now, status);
   return now.usable;

@@ -145,7 +145,7 @@ class Equilibrium {
   std::vector<Matrix3> maps_; // from the stress-free state, a node each
   FiniteForces forces_;
   std::vector<Vector3> reactions_;
-  double least_seen_ = 1, last_residual_ = 0;
+  double least_seen_ = 1, last_residual_ = 0, last_unsettled_ = 0;
   double prestrain_forces_ = 0; // N, norm of those that the pre-strain of the body at rest exerts
 };
 

@@ -38,6 +38,8 @@ void FiniteStepper::step(const StepSample& sample, bool was_cut, StepResult& res
 
 std::vector<Vector3> places_of_contact(const SessionState& state) {
   std::vector<Vector3> places{state.zone.centre()->point};
+  if (state.scenario.tool->grasp) // it touches where it takes hold
+    return places;
   const double pitch = state.scenario.contact.follow_fraction * state.zone.spacing().radius;
   for (const StepSample& sample : state.steps) {
     if (!sample.tool)

@@ -161,6 +161,8 @@ void BodyUpdater::build_finite_cut(BodyModel& next, BodyUpdate& report) const {
   }
   const StageTimer timer(report.seconds.assembly);
   make_finite(state_, next, &model_);
+  if (grasping_.holds())
+    next.finite->hold_on(grasping_.nodes(next, state_.zone.fine()), *model_.finite);
   report.nodes = next.sprinkling.nodes.size();
   const std::vector<int>& from = next.sprinkling.kept_from;
   report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
