@@ -119,6 +119,7 @@ position = [0.00002, 0, 0.03]
   for (const std::size_t k : {1, 2}) {
     INFO("step " << k << ": " << b[k].force.transpose() << " for " << a[k].force.transpose());
     CHECK((b[k].force - a[k].force).norm() < 0.01 * a[k].force.norm());
+    CHECK((b[k].torque - a[k].torque).norm() < 0.01 * 0.008 * a[k].force.norm()); // about the grasper's point
     CHECK(b[k].active_nodes == a[k].active_nodes);
     CHECK(b[k].candidates == a[k].candidates);
     CHECK(b[k].contact_radius == Approx(a[k].contact_radius).epsilon(0.05));
