@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <catch2/catch.hpp>
 #include <numbers>
+#include <random>
 
 using namespace spherecut;
 using namespace spherecut::solvers;
@@ -420,6 +421,37 @@ TEST_CASE("A step that is halved rubs as one that is not") {
   CHECK(some > 0);
   CHECK((fine - whole).norm() < 0.03 * whole.norm());
   CHECK((halved - whole).norm() < 0.03 * whole.norm());
+}
+
+TEST_CASE("On random ways every step of a tool that rubs, or is bonded, finds its equilibrium") {
+  for (const int seed : {1, 2, 3}) {
+    std::mt19937 random(seed);
+    const auto one = [&] { return 2.0 * random() / std::mt19937::max() - 1; };
+    const Problem problem = on_base(0.2);
+    const FiniteBody body(problem, experiments::neo_hookean(1, seed == 3 ? 0.49 : 0.4));
+    for (const FiniteContactOptions& contact : {rubbing(0.3 * seed), bonded()}) {
+      EquilibriumOptions options;
+      options.tolerance = 1e-4;
+      Equilibrium equilibrium(body, options);
+      equilibrium.set_contact(seed == 2 ? topology::ToolShape(FlatPunch{0.25, 1}) : SphereTip{0.3},
+                              top_of(problem, true), contact);
+      Vector3 place(0.5, 0.5, 1.02), axis = up;
+      for (int step = 0; step < 20; ++step) {
+        INFO("seed " << seed << ", step " << step);
+        const EquilibriumStatus status = equilibrium.solve(at(place, axis));
+        CHECK(status.residual < options.tolerance);
+        CHECK(status.penetration <= options.penetration);
+        CHECK(status.friction_work >= -1e-6);
+        for (const ContactShare& share : equilibrium.contact_shares())
+          if (contact.condition == ContactCondition::frictional)
+            CHECK(share.along.norm() <= contact.friction * share.pressing * (1 + 1e-9));
+        place += 0.05 * Vector3(one(), one(), step < 6 ? -0.6 : 0.6 * one());
+        place = place.cwiseMax(Vector3(0.3, 0.3, 0.75)).cwiseMin(Vector3(0.7, 0.7, 1.05));
+        const Vector3 turned = (axis + 0.05 * Vector3(one(), one(), 0)).normalized();
+        axis = turned.z() > 0.9 ? turned : up;
+      }
+    }
+  }
 }
 
 TEST_CASE("Grips refuse what they cannot use") {
