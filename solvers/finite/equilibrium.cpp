@@ -235,9 +235,8 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
                                                                                                 : "itself at a cut",
                           options_.penetration)
             : "",
-        last_residual_ < options_.tolerance && last_unsettled_ > options_.unsettled
-            ? fmt::format(", friction or bonds still change by {:.3g} of the acting forces a round (limit {:.3g})",
-                          last_unsettled_, options_.unsettled)
+        last_residual_ < options_.tolerance && last_unsettled_ > 0
+            ? fmt::format(", friction or bonds still change by {:.3g} of the acting forces a round", last_unsettled_)
             : "",
         rest_.condition()));
   }
@@ -266,7 +265,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     return false;
   const bool converged = settle(target, method, now, status);
   last_residual_ = status.residual;
-  last_unsettled_ = contact_ && target.tool ? contact_->unsettled() / now.acting : 0;
+  last_unsettled_ = is_settled(target, now) ? 0 : contact_->unsettled() / now.acting;
   if (!converged)
     return false;
   if (method == FiniteMethod::newton)
@@ -357,7 +356,10 @@ bool Equilibrium::minds_way() const {
 }
 
 bool Equilibrium::is_settled(const State& target, const Trial& now) const {
-  return !contact_ || !target.tool || contact_->unsettled() <= options_.unsettled * now.acting;
+  if (!contact_ || !target.tool)
+    return true;
+  const double gripping = std::max(contact_->force_norm(), state_.gripped); // loads may be far larger
+  return contact_->unsettled() <= std::max(options_.unsettled * gripping, options_.tolerance * now.acting);
 }
 
 /// The state becomes that of the trial, which is in equilibrium.

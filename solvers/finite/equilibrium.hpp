@@ -29,8 +29,9 @@ struct EquilibriumOptions {
   int memory = 20;              // steps that are remembered
   double least_jacobian = 0.01; // the line search stops short of it
   double penetration = 1e-3;    // of the tool into the middles of shares, and of lips into each other, in spacings
-  double unsettled = 1e-3;      // change of the forces along the tool's surface by a last round, over the acting forces
-  bool fall_back = true;        // whether Newton's method is asked at all
+  /// Change of the forces along the tool's surface by a last round, over the tool's forces; not below the tolerance.
+  double unsettled = 1e-3;
+  bool fall_back = true; // whether Newton's method is asked at all
 };
 
 /// What the body is to be in equilibrium with.

@@ -454,6 +454,35 @@ TEST_CASE("On random ways every step of a tool that rubs, or is bonded, finds it
   }
 }
 
+TEST_CASE("Under loads far larger than its own force a tool grips as exactly as they are balanced") {
+  Problem problem = on_base(0.2);
+  problem.loads.body_force = [](const Vector3&) { return Vector3(0, 0, -0.3); };
+  const FiniteBody body(problem, experiments::neo_hookean(1, 0.45));
+  for (const FiniteContactOptions& contact : {rubbing(0.4), bonded()}) {
+    Vector3 forces[2];
+    for (const bool is_strict : {false, true}) {
+      EquilibriumOptions options = strict(1e-7);
+      if (!is_strict) {
+        options = {};
+        options.tolerance = 1e-4;
+      }
+      Equilibrium equilibrium(body, options);
+      equilibrium.set_contact(SphereTip{1}, top_of(problem, false), contact);
+      static_cast<void>(equilibrium.solve({}));
+      double sag = 0; // of the top's middle
+      for (std::size_t c = 0; c < equilibrium.contact()->candidates().size(); ++c)
+        if (const Vector3 x = equilibrium.contact()->place(static_cast<int>(c), equilibrium.coefficients());
+            std::hypot(x.x() - 0.5, x.y() - 0.5) < 0.2)
+          sag = std::max(sag, x.z());
+      static_cast<void>(equilibrium.solve(at({0.5, 0.5, sag - 0.01})));
+      forces[is_strict ? 1 : 0] = equilibrium.solve(at({0.504, 0.5, sag - 0.01})).tool_force;
+    }
+    INFO(forces[0].transpose() << " for " << forces[1].transpose());
+    CHECK(forces[1].norm() < 0.1 * 0.3);
+    CHECK((forces[0] - forces[1]).norm() < 0.02 * forces[1].norm());
+  }
+}
+
 TEST_CASE("Grips refuse what they cannot use") {
   const Problem problem = on_base(0.25);
   const FiniteBody body(problem, experiments::neo_hookean(1, 0.45));
