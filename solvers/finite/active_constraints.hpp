@@ -18,6 +18,13 @@ struct ActiveConstraint {
 /// K^-1 of unit forces on the means of constraints, by key: three columns each, m/N.
 using ConstraintResponses = std::map<int, MatrixX>;
 
+/// Finds those of `means`, by the key in `keys`, that `responses` lacks.
+void find_responses(const RestOperator& rest, const std::vector<int>& keys,
+                    const std::vector<const DisplacementMean*>& means, ConstraintResponses& responses);
+
+/// Mean of the three columns of a response over the nodes of `mean`, m/N.
+Matrix3 mean_response(const DisplacementMean& mean, const MatrixX& response);
+
 /// Those of one mean stand together. Turns y = K^-1 q into (K + M^T D M)^-1 q, M the means along their directions and D
 /// their stiffness. `responses` keeps what is found anew.
 void correct(const RestOperator& rest, const std::vector<ActiveConstraint>& constraints, ConstraintResponses& responses,

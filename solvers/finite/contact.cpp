@@ -52,8 +52,7 @@ FiniteContact::FiniteContact(const FiniteBody& body, topology::ToolShape tool, c
     const bool on_skin = body_.problem().nodes.kinds[node] != NodeKind::lip;
     rest_.push_back(on_skin ? body_.problem().domain->closest_surface_point(mean.centroid) : mean.centroid);
     const double h = body_.problem().nodes.spacings[node];
-    stiffness_.push_back(options.stiffness * body_.problem().material.young_modulus *
-                         (mean.area > 0 ? mean.area / h : h));
+    stiffness_.push_back(options.stiffness * body_.problem().material.young_modulus * std::max(mean.area / h, h));
   }
 }
 

@@ -54,6 +54,9 @@ class FiniteContact {
   }
   /// Where the tool stands clear of all shares: back along its axis from the pose.
   [[nodiscard]] topology::ToolPose clear_pose(const topology::ToolPose& pose, const VectorX& coefficients) const;
+  /// Of every candidate: the middle of its share at rest, m, and the mean over it.
+  [[nodiscard]] const std::vector<Vector3>& places() const { return rest_; }
+  [[nodiscard]] const std::vector<DisplacementMean>& means() const { return means_; }
   /// The tool is nowhere: nothing touches.
   void release();
 

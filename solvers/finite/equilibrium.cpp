@@ -2,9 +2,12 @@
 
 #include "topology/base/errors.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <utility>
 
 namespace spherecut::solvers {
 
@@ -15,6 +18,7 @@ constexpr int most_trials = 12;                   // of one line search
 constexpr double wanted_decrease = 1e-4;          // of what the slope promises
 constexpr double energy_rounding = 1e-13;         // of an energy
 constexpr double most_extrapolated = 4;           // last steps that are gone once more
+constexpr double left_of_a_rise = 0.1;            // of forces of contact that have risen: what may stay unbalanced
 constexpr int most_contact_rounds = 20;           // updates of the forces of contact in a step
 constexpr int most_newton_iterations = 30;        // of one round
 constexpr int most_times = 20;                    // the iterations of a round, before a solve gives up
@@ -85,6 +89,7 @@ void Equilibrium::take_hold(const topology::ToolShape& tool, const topology::Too
 void Equilibrium::let_go() {
   contact_.reset();
   responses_.clear();
+  rest_compliance_ = {};
   memory_.clear();
   state_.shares.clear();
   state_.tool.reset();
@@ -95,6 +100,7 @@ void Equilibrium::set_lips(std::vector<LipPair> pairs) {
   FiniteLips lips(body_, std::move(pairs));
   lips_.emplace(std::move(lips));
   responses_.clear();
+  rest_compliance_ = {};
   memory_.clear();
   state_.lip_forces.assign(lips_->pairs().size(), 0);
   has_before_ = false;
@@ -123,7 +129,7 @@ void Equilibrium::set_coefficients(const VectorX& coefficients, double load_fact
   state_.prescribed.clear();
   for (const DisplacementMean& mean : body_.held().means())
     state_.prescribed.push_back(mean.of(coefficients));
-  memory_.clear();
+  set_tangent(nullptr);
   has_before_ = false;
 }
 
@@ -240,6 +246,7 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
             : "",
         rest_.condition()));
   }
+  renew_preconditioner(status);
   return status;
 }
 
@@ -251,12 +258,110 @@ bool Equilibrium::go(const State& target, int halvings, EquilibriumStatus& statu
     return false;
   if (step(target, may_go_on ? options_.method : FiniteMethod::newton, status))
     return true;
+  if (tangent_ && may_go_on) { // it may be too far away
+    set_tangent(nullptr);
+    if (step(target, options_.method, status))
+      return true;
+  }
   if (halvings > 0 && motion(state_, target).norm() > 0) {
     ++status.halvings;
     const State middle = between(state_, target, 0.5);
     return go(middle, halvings - 1, status) && go(target, halvings - 1, status);
   }
   return may_go_on && has_newton && step(target, FiniteMethod::newton, status);
+}
+
+std::vector<Matrix3> Equilibrium::carrying(std::vector<Matrix3> maps) const {
+  const Matrix3 prestrained = body_.prestrain() / body_.prestrain().determinant();
+  if (prestrained != Matrix3::Identity())
+    for (Matrix3& map : maps)
+      map *= prestrained;
+  if (tangent_)
+    for (std::size_t i = 0; i < maps.size(); ++i)
+      maps[i] *= tangent_->back[i];
+  return maps;
+}
+
+void Equilibrium::set_tangent(std::unique_ptr<CarriedTangent> tangent) {
+  tangent_ = std::move(tangent);
+  excess_ = 0;
+  memory_.clear();
+  responses_.clear();
+  rest_compliance_ = {};
+}
+
+// What happens depends on counts of iterations alone, so that the bits do not depend on the machine.
+void Equilibrium::renew_preconditioner(const EquilibriumStatus& status) {
+  if (options_.worth_of_tangent == 0 || options_.method != FiniteMethod::quasi_newton)
+    return;
+  excess_ += std::max(0, status.iterations - options_.few_iterations);
+  if (excess_ < options_.worth_of_tangent)
+    return;
+  const std::unique_ptr<CarriedTangent> before = std::exchange(tangent_, nullptr);
+  std::vector<Matrix3> back = carrying(body_.piola_maps(state_.coefficients));
+  for (Matrix3& map : back)
+    map = map.inverse().eval();
+  try {
+    set_tangent(std::make_unique<CarriedTangent>(RestOperator(body_, state_.coefficients), std::move(back)));
+  } catch (const NumericalError&) { // not positive definite: the rest operator is
+    set_tangent(nullptr);
+  }
+}
+
+// C = A C_0 A^T with the maps A at the candidates, less what the lips that touch hold back.
+MatrixX Equilibrium::contact_compliance(const std::vector<int>& chosen) {
+  if (!contact_)
+    throw InputError("the compliance of a contact, but no tool: set_contact comes first");
+  const std::vector<DisplacementMean>& means = contact_->means();
+  const auto size = std::ssize(chosen);
+  std::vector<const DisplacementMean*> of;
+  for (const int c : chosen)
+    of.push_back(&means[static_cast<std::size_t>(c)]);
+  find_responses(preconditioner(), chosen, of, responses_);
+  if (rest_compliance_.chosen != chosen || rest_compliance_.matrix.rows() != 3 * size) {
+    rest_compliance_.chosen = chosen;
+    rest_compliance_.matrix.resize(3 * size, 3 * size);
+    for (Eigen::Index j = 0; j < size; ++j) {
+      const MatrixX& response = responses_.at(chosen[j]);
+      for (Eigen::Index i = 0; i <= j; ++i) {
+        const Matrix3 between = mean_response(*of[i], response);
+        rest_compliance_.matrix.block<3, 3>(3 * i, 3 * j) = between;
+        rest_compliance_.matrix.block<3, 3>(3 * j, 3 * i) = between.transpose();
+      }
+    }
+  }
+  const std::vector<Matrix3> maps = carrying(body_.piola_maps(state_.coefficients));
+  const auto map_of = [&](Eigen::Index i) -> const Matrix3& { return maps[contact_->candidates()[chosen[i]]]; };
+  MatrixX carried(3 * size, 3 * size);
+  for (Eigen::Index j = 0; j < size; ++j)
+    for (Eigen::Index i = 0; i < size; ++i)
+      carried.block<3, 3>(3 * i, 3 * j) =
+          map_of(i) * rest_compliance_.matrix.block<3, 3>(3 * i, 3 * j) * map_of(j).transpose();
+  std::vector<ActiveConstraint> closed;
+  if (lips_)
+    lips_->append_active(maps, closed);
+  if (closed.empty())
+    return carried;
+  const auto count = std::ssize(closed);
+  std::vector<int> keys;
+  std::vector<const DisplacementMean*> apart;
+  for (const ActiveConstraint& constraint : closed) {
+    keys.push_back(constraint.key);
+    apart.push_back(constraint.mean);
+  }
+  find_responses(preconditioner(), keys, apart, responses_);
+  MatrixX to_lips(3 * size, count), between_lips(count, count);
+  for (Eigen::Index l = 0; l < count; ++l) {
+    const MatrixX& response = responses_.at(closed[l].key);
+    for (Eigen::Index i = 0; i < size; ++i)
+      to_lips.block<3, 1>(3 * i, l) = map_of(i) * (mean_response(*of[i], response) * closed[l].direction);
+    for (Eigen::Index k = 0; k <= l; ++k)
+      between_lips(k, l) = between_lips(l, k) =
+          closed[k].direction.dot(mean_response(*closed[k].mean, response) * closed[l].direction);
+    between_lips(l, l) += 1 / closed[l].stiffness;
+  }
+  carried -= to_lips * between_lips.ldlt().solve(to_lips.transpose());
+  return 0.5 * (carried + carried.transpose());
 }
 
 bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStatus& status) {
@@ -277,11 +382,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
 /// A state to iterate from: where the last steps lead to, or nearer where that has no energy. False: there is none.
 bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus& status) {
   const std::vector<Matrix3> maps = body_.piola_maps(state_.coefficients);
-  maps_ = maps;
-  const Matrix3 from_stress_free = body_.prestrain() / body_.prestrain().determinant();
-  if (from_stress_free != Matrix3::Identity())
-    for (Matrix3& map : maps_)
-      map *= from_stress_free;
+  maps_ = carrying(maps);
   const double ahead = extrapolation(target);
   const VectorX prediction =
       ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
@@ -321,7 +422,7 @@ bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus&
 /// then, and friction keeps the limits of the forces as they are then.
 bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
   const bool grips = minds_way() && target.tool;
-  bool converged = iterate(target, method, now, status);
+  bool converged = iterate(target, method, options_.tolerance, now, status);
   for (int round = 0; converged; ++round) {
     std::vector<double> balanced; // forces of the lips along the normals so far
     bool caught = false;
@@ -345,8 +446,11 @@ bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, E
       contact_->accept_forces();
     if (lips_)
       lips_->set_known_forces(balanced);
+    // The forces of contact have risen by what is unbalanced now. Where loads or a pre-strain are much larger, that may
+    // be below the tolerance; the body has to yield to it all the same before they rise again.
     evaluate(now.coefficients, target, now, status);
-    converged = iterate(target, method, now, status);
+    const double risen = now.residual.norm() / now.acting;
+    converged = iterate(target, method, std::min(options_.tolerance, left_of_a_rise * risen), now, status);
   }
   return converged;
 }
@@ -483,12 +587,19 @@ std::vector<ActiveConstraint> Equilibrium::active_constraints(const std::vector<
   return constraints;
 }
 
+std::vector<int> Equilibrium::touching() const {
+  std::vector<int> keys;
+  for (const ActiveConstraint& constraint : active_constraints({}))
+    keys.push_back(constraint.key);
+  return keys;
+}
+
 VectorX Equilibrium::precondition(const VectorX& residual) {
   VectorX carried(residual.size()), answer;
   for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
     carried.segment<3>(3 * i) = maps_[i].transpose() * residual.segment<3>(3 * i);
-  rest_.solve(carried, answer);
-  correct(rest_, active_constraints(maps_), responses_, answer);
+  preconditioner().solve(carried, answer);
+  correct(preconditioner(), active_constraints(maps_), responses_, answer);
   for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
     answer.segment<3>(3 * i) = (maps_[i] * answer.segment<3>(3 * i)).eval();
   body_.held().complete(answer, {});
@@ -515,14 +626,15 @@ VectorX Equilibrium::newton_direction(const Trial& now, EquilibriumStatus& statu
   }
 }
 
-bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
+bool Equilibrium::iterate(const State& target, FiniteMethod method, double tolerance, Trial& now,
+                          EquilibriumStatus& status) {
   Trial next;
   const bool quasi = method == FiniteMethod::quasi_newton;
   const int most = quasi ? options_.maximum_iterations : std::min(options_.maximum_iterations, most_newton_iterations);
   for (int iteration = 0;; ++iteration) {
     const double norm = now.residual.norm();
     status.residual = norm / now.acting;
-    if (status.residual < options_.tolerance)
+    if (status.residual < tolerance)
       return true;
     if (iteration == most || is_spent(method, status, options_))
       return false;
@@ -545,6 +657,7 @@ bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, 
       if (!(slope < 0))
         return false;
     }
+    const std::vector<int> touched = touching();
     double length = 1;
     bool accepted = false;
     int trials = 0;
@@ -572,7 +685,9 @@ bool Equilibrium::iterate(const State& target, FiniteMethod method, Trial& now, 
       }
       return false;
     }
-    if (quasi)
+    if (quasi && touching() != touched) // what is remembered is of other constraints than those that act now
+      memory_.clear();
+    else if (quasi)
       memory_.add(next.coefficients - now.coefficients, next.residual - now.residual);
     std::swap(now, next);
   }

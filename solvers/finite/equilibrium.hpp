@@ -1,7 +1,8 @@
 // Equilibria of a body at finite strain, step by step along a path of prescribed displacements, loads and tool poses.
 //
-// Quasi-Newton: L-BFGS preconditioned by the factor of the stress-free stiffness, carried by nodal Piola maps that are
-// fixed during a solve, with the memory of steps kept from solve to solve. A line search on the energy refuses states
+// Quasi-Newton: L-BFGS preconditioned by the factor of the stress-free stiffness, or of the tangent at a state that has
+// been where that pays, carried by nodal Piola maps that are fixed during a solve, with the memory of steps kept from
+// solve to solve. A line search on the energy refuses states
 // that are inverted. Start: the last two states extrapolated, or the response of the rest operator. A step that does
 // not converge is halved; where that does not help, Newton's method takes over.
 #pragma once
@@ -32,6 +33,10 @@ struct EquilibriumOptions {
   /// Change of the forces along the tool's surface by a last round, over the tool's forces; not below the tolerance.
   double unsettled = 1e-3;
   bool fall_back = true; // whether Newton's method is asked at all
+  /// Iterations beyond `few_iterations` a step, summed over steps, after which the tangent at the present state
+  /// preconditions in place of that at rest: what assembling and factoring it takes, in iterations. 0: never.
+  int worth_of_tangent = 30;
+  int few_iterations = 4;
 };
 
 /// What the body is to be in equilibrium with.
@@ -93,6 +98,11 @@ class Equilibrium {
   /// Force of the constraint of every prescribed entry on the body, N.
   [[nodiscard]] const std::vector<Vector3>& constraint_forces() const { return reactions_; }
   [[nodiscard]] const FiniteContact* contact() const { return contact_ ? &*contact_ : nullptr; }
+  /// Displacements of the middles of candidates' shares to small forces on them in the present state, the tool taken
+  /// away, faces of cuts that touch held together: the response of the rest operator, carried by the deformation.
+  /// `chosen`: places in contact()->candidates(). 3 rows and columns each, symmetric, m/N. Throws InputError without a
+  /// contact.
+  [[nodiscard]] MatrixX contact_compliance(const std::vector<int>& chosen);
   [[nodiscard]] const FiniteLips* lips() const { return lips_ ? &*lips_ : nullptr; }
 
  private:
@@ -105,6 +115,10 @@ class Equilibrium {
     std::vector<double> lip_forces;
     double gripped = 0; // N, norm of the nodal forces of a tool that is not without friction
   };
+  struct CarriedTangent { // at a state that has been
+    RestOperator matrix;
+    std::vector<Matrix3> back; // inverse of the maps from the stress-free body to that state, a node each
+  };
   struct Trial { // an evaluation
     VectorX coefficients, residual;
     double energy = 0, acting = 0, strain_energy = 0, least_jacobian = 0;
@@ -115,18 +129,25 @@ class Equilibrium {
   [[nodiscard]] State between(const State& from, const State& to, double part) const;
   [[nodiscard]] bool minds_way() const; // the contact does: it rubs or bonds
   [[nodiscard]] int strides(const State& target) const;
+  /// Maps that carry the body of the preconditioner to a state, given those of its nodes from rest.
+  [[nodiscard]] std::vector<Matrix3> carrying(std::vector<Matrix3> maps) const;
+  [[nodiscard]] const RestOperator& preconditioner() const { return tangent_ ? tangent_->matrix : rest_; }
+  void renew_preconditioner(const EquilibriumStatus& status);
+  void set_tangent(std::unique_ptr<CarriedTangent> tangent);
   bool go(const State& target, int halvings, EquilibriumStatus& status);
   bool step(const State& target, FiniteMethod method, EquilibriumStatus& status);
   bool begin_step(const State& target, Trial& now, EquilibriumStatus& status);
   bool settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
   void accept_step(const State& target, const Trial& now, EquilibriumStatus& status);
-  /// Iterates with the forces of contact known so far.
-  bool iterate(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status);
+  /// Iterates with the forces of contact known so far, until what is unbalanced is `tolerance` of what acts.
+  bool iterate(const State& target, FiniteMethod method, double tolerance, Trial& now, EquilibriumStatus& status);
   void evaluate(const VectorX& coefficients, const State& target, Trial& trial, EquilibriumStatus& status);
   [[nodiscard]] double extrapolation(const State& target) const;
   [[nodiscard]] VectorX predict(const State& target);
   [[nodiscard]] VectorX precondition(const VectorX& residual);
   [[nodiscard]] std::vector<ActiveConstraint> active_constraints(const std::vector<Matrix3>& maps) const;
+  /// Keys of the constraints that were active at the last evaluation.
+  [[nodiscard]] std::vector<int> touching() const;
   /// Deepest that the tool lies in the body or lips in each other at the last evaluation, spacings.
   [[nodiscard]] double deepest(const State& target) const;
   /// Whether the forces along the tool's surface are those of the places found.
@@ -139,7 +160,14 @@ class Equilibrium {
   RestOperator rest_;
   std::optional<FiniteContact> contact_;
   std::optional<FiniteLips> lips_;
-  ConstraintResponses responses_; // of the rest operator
+  std::unique_ptr<CarriedTangent> tangent_; // null: the rest operator preconditions
+  int excess_ = 0;                          // iterations beyond the few of a step since that was chosen
+  ConstraintResponses responses_;           // of the preconditioner
+  struct RestCompliance {                   // between candidates' shares, of the preconditioner as it is
+    std::vector<int> chosen;
+    MatrixX matrix; // m/N
+  };
+  RestCompliance rest_compliance_;
   StepMemory memory_;
   State state_, before_;
   bool has_before_ = false;

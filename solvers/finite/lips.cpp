@@ -21,7 +21,7 @@ FiniteLips::FiniteLips(const FiniteBody& body, std::vector<LipPair> pairs, doubl
       apart.weights.push_back(-minus.weights[k]);
     }
     const double h = body_.problem().nodes.spacings[pair.plus];
-    stiffness_.push_back(stiffness * body_.problem().material.young_modulus * (apart.area > 0 ? apart.area / h : h));
+    stiffness_.push_back(stiffness * body_.problem().material.young_modulus * std::max(apart.area / h, h));
     apart_.push_back(std::move(apart));
     normals_.push_back(pair.normal);
   }

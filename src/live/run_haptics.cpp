@@ -7,7 +7,7 @@
 #include "src/live/bench.hpp"
 #include "src/live/haptic_report.hpp"
 #include "src/live/replay.hpp"
-#include "src/scenario/law_reader.hpp"
+#include "src/model/finite_model.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/base/interruption.hpp"
 
@@ -231,7 +231,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   if (command.bench)
     return run_bench(command, watch, progress);
   const Scenario scenario = read_scenario(command.scenario);
-  require_linear(scenario.file, scenario.law);
+  require_hand(scenario);
   const HapticSettings& settings = scenario.haptics;
   require_clock(command, settings);
   HapticRun run;

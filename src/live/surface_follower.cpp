@@ -193,22 +193,22 @@ void SurfaceFollower::add_row(const solvers::ShapeFunctions& shape, const std::v
 void SurfaceFollower::take_rows(const Session& session) {
   evaluated_ = 0;
   const BodyModel& model = session.model();
-  if (model.body == nullptr) {
+  if (!model.built()) {
     rows_ = {};
     row_places_.clear();
     return;
   }
-  const int spheres = model.body->sphere_count();
-  const std::vector<Vector3>& all = model.body->problem().nodes.positions;
+  const int spheres = model.sphere_count();
+  const std::vector<Vector3>& all = model.nodes().positions;
   const std::vector<Vector3> nodes(all.begin(), all.begin() + spheres);
   std::vector<double> radii(nodes.size());
   for (std::size_t i = 0; i < nodes.size(); ++i)
-    radii[i] = model.body->sphere_radius(static_cast<int>(i));
+    radii[i] = model.sphere_radius(static_cast<int>(i));
   if (!rows_.rows.empty() && nodes == node_places_ && radii == node_radii_ && kept_incision_ == model.incision &&
       evaluation_ == row_places_)
     return;
 
-  const bool appends = 3 * spheres != model.body->coefficient_count() || !rows_.terms.empty();
+  const bool appends = 3 * spheres != model.coefficient_count() || !rows_.terms.empty();
   ChangedPlaces changed;
   std::vector<int> now(node_places_.size(), -1);
   if (rows_.rows.empty() || appends) // functions of a cut have other numbers after each increment
@@ -264,7 +264,7 @@ void SurfaceFollower::take_rows(const Session& session) {
 void SurfaceFollower::deform(const Session& session, std::vector<Eigen::Vector3f>& vertices) const {
   vertices = topology_->vertices;
   const BodyModel& model = session.model();
-  if (rows_.rows.empty() || !model.state)
+  if (rows_.rows.empty() || !model.solved())
     return;
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     Vector3 displacement = Vector3::Zero();

@@ -19,9 +19,9 @@ double seconds_between(std::chrono::steady_clock::time_point from, std::chrono::
 
 /// u_h of every node of a body that is solved, m.
 std::vector<Vector3> deformed_nodes(const BodyModel& model) {
-  std::vector<Vector3> places = model.body->problem().nodes.positions;
-  if (model.state) {
-    const VectorX displacements = model.body->nodal_displacements(model.field);
+  std::vector<Vector3> places = model.nodes().positions;
+  if (model.solved()) {
+    const VectorX displacements = model.nodal_displacements();
     for (std::size_t i = 0; i < places.size(); ++i)
       places[i] += displacements.segment<3>(3 * static_cast<Eigen::Index>(i));
   }
@@ -29,10 +29,10 @@ std::vector<Vector3> deformed_nodes(const BodyModel& model) {
 }
 
 /// Radius of a node's sphere; of a place without a sphere (on the face of a cut) that of the nearest sphere, m.
-double reach_of(int node, const solvers::Discretisation& body) {
+double reach_of(int node, const BodyModel& body) {
   if (const double radius = body.sphere_radius(node); radius > 0)
     return radius;
-  const std::vector<Vector3>& rest = body.problem().nodes.positions;
+  const std::vector<Vector3>& rest = body.nodes().positions;
   const Vector3& centre = rest[static_cast<std::size_t>(node)];
   double least = std::numeric_limits<double>::infinity(), reach = 0;
   for (int other = 0; other < static_cast<int>(rest.size()); ++other)
@@ -57,13 +57,13 @@ PickedNode picked(const ViewerRequest::Pick& pick, const BodyModel& model, const
         result.node = static_cast<int>(i);
       }
   }
-  const std::vector<Vector3>& rest = model.body->problem().nodes.positions;
+  const std::vector<Vector3>& rest = model.nodes().positions;
   const Vector3& centre = rest[static_cast<std::size_t>(result.node)];
   result.position = deformed[static_cast<std::size_t>(result.node)];
-  result.radius = reach_of(result.node, *model.body);
+  result.radius = reach_of(result.node, model);
   for (std::size_t i = 0; i < rest.size(); ++i) {
     const int node = static_cast<int>(i);
-    if (node == result.node || (rest[i] - centre).norm() >= result.radius || model.body->sphere_radius(node) <= 0)
+    if (node == result.node || (rest[i] - centre).norm() >= result.radius || model.sphere_radius(node) <= 0)
       continue;
     const bool hidden = model.incision != nullptr && model.incision->blocks(centre, rest[i]);
     (hidden ? result.hidden : result.seen).push_back(node);
@@ -174,12 +174,12 @@ void ViewerFeed::add_extras(const HapticSimulation& simulation, ViewerFrame& fra
       frame.displacement.push_back((frame.vertices[v] - frame.topology->vertices[v]).norm());
   for (const ViewerRequest::Slice& slice : request_.slices)
     frame.slices.push_back(sliced(slice, session));
-  if (model.body == nullptr) {
+  if (!model.built()) {
     if (request_.von_mises)
       frame.von_mises.assign(frame.vertices.size(), 0);
     return;
   }
-  const solvers::NodeCloud& nodes = model.body->problem().nodes;
+  const solvers::NodeCloud& nodes = model.nodes();
   if (request_.von_mises) {
     std::vector<double> nodal;
     nodal.reserve(nodes.positions.size());
@@ -192,8 +192,8 @@ void ViewerFeed::add_extras(const HapticSimulation& simulation, ViewerFrame& fra
   const std::vector<Vector3> deformed = deformed_nodes(model);
   if (request_.nodes)
     for (std::size_t i = 0; i < deformed.size(); ++i)
-      frame.node_list.push_back({deformed[i].cast<float>(),
-                                 static_cast<float>(model.body->sphere_radius(static_cast<int>(i))), nodes.kinds[i]});
+      frame.node_list.push_back(
+          {deformed[i].cast<float>(), static_cast<float>(model.sphere_radius(static_cast<int>(i))), nodes.kinds[i]});
   for (const ViewerRequest::Pick& pick : request_.picks)
     frame.picks.push_back(picked(pick, model, deformed));
 }

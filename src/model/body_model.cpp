@@ -23,7 +23,7 @@ constexpr double largest_share = 0.8;  // of the nodes in a window that is worth
 // rebuilt.
 constexpr double long_advance = 0.2, largest_share_of_long = 0.2;
 // Nodes of a body of `collocation` that is followed: the dense L U of its window costs more than the sparse one of the
-// whole body beyond. A run of liver_cut.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with windows
+// whole body beyond. A run of liver_cut_linear.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with windows
 // and takes 27 s without; steps of 0.1 mm at 1000 nodes a third of the rebuild's time with them.
 constexpr int largest_followed_balance = 1200;
 constexpr double crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a fixed region is kept
@@ -144,6 +144,22 @@ int BodyModel::nearest_seen(const Vector3& x) const {
   return static_cast<int>(nearest);
 }
 
+const solvers::NodeCloud& BodyModel::nodes() const {
+  return finite != nullptr ? sprinkling.nodes : body->problem().nodes;
+}
+
+int BodyModel::sphere_count() const {
+  return finite != nullptr ? finite->spheres().size() : body->sphere_count();
+}
+
+double BodyModel::sphere_radius(int node) const {
+  return finite != nullptr ? finite->spheres().radii()[static_cast<std::size_t>(node)] : body->sphere_radius(node);
+}
+
+int BodyModel::coefficient_count() const {
+  return finite != nullptr ? 3 * finite->spheres().size() : body->coefficient_count();
+}
+
 bool BodyModel::solved() const {
   return finite != nullptr ? finite->solved() : state.has_value();
 }
@@ -166,10 +182,13 @@ solvers::PointState BodyModel::at(const Vector3& x) const {
 }
 
 void BodyModel::shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const {
+  const auto find = [&](const Vector3& place) {
+    finite != nullptr ? finite->shape_at(place, shape) : body->shape_at(place, shape);
+  };
   try {
-    body->shape_at(x, shape);
+    find(x);
   } catch (const InputError&) {
-    body->shape_at(sprinkling.nodes.positions[nearest_seen(x)], shape);
+    find(sprinkling.nodes.positions[nearest_seen(x)]);
   }
 }
 

@@ -61,6 +61,14 @@ struct BodyModel {
   mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
   mutable RestMemo rest_memo{};                    // of the solution, likewise
 
+  /// Whether there is a body.
+  [[nodiscard]] bool built() const { return body != nullptr || finite != nullptr; }
+  /// Its nodes, those that have a sphere first; their number; the radius of a node's sphere, m, 0 where it has none;
+  /// and how many coefficients its field has. Of a body that is built.
+  [[nodiscard]] const solvers::NodeCloud& nodes() const;
+  [[nodiscard]] int sphere_count() const;
+  [[nodiscard]] double sphere_radius(int node) const;
+  [[nodiscard]] int coefficient_count() const;
   /// Whether there is a solution.
   [[nodiscard]] bool solved() const;
   /// Displacement of every node, 3 a node, m; of a model that is solved.

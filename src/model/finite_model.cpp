@@ -21,10 +21,15 @@ constexpr double most_unbalanced = 1e-4;
 /// Of the spacing: nodes as near to each other are the same.
 constexpr double same_place = 1e-9;
 
-solvers::EquilibriumOptions equilibrium_options() {
+solvers::EquilibriumOptions equilibrium_options(Patience patience) {
   solvers::EquilibriumOptions options;
   options.penetration = most_penetration;
   options.tolerance = most_unbalanced;
+  if (patience == Patience::of_a_hand) {
+    options.maximum_iterations = 40;
+    options.halvings = 3;
+    options.fall_back = false;
+  }
   return options;
 }
 
@@ -97,15 +102,32 @@ void require_run(const Scenario& scenario) {
                                scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
 }
 
+void require_hand(const Scenario& scenario) {
+  require_run(scenario);
+  if (!is_nonlinear(scenario.law) || !scenario.tool)
+    return;
+  const bool grasps = scenario.tool->grasp.has_value();
+  if (!grasps && scenario.contact.condition == solvers::ContactCondition::frictionless)
+    return;
+  const std::string what =
+      grasps ? "tool.shape = \"grasper\""
+             : fmt::format("contact.condition = \"{}\"",
+                           scenario.contact.condition == solvers::ContactCondition::bonded ? "bonded" : "frictional");
+  throw InputError(fmt::format(
+      "{}:{}: {} does not go with material.law = \"{}\" in a hand; possible there: a tool that "
+      "presses without friction",
+      scenario.file.string(), grasps ? scenario.tool->line : scenario.law.line, what, name_of(scenario.law)));
+}
+
 bool can_run(const Scenario& scenario) {
   return is_nonlinear(scenario.law) ? hindrance_of(scenario).what.empty() : scenario.law.spec.prony.empty();
 }
 
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
-                         const BodyModel& nodes, bool touched)
+                         const BodyModel& nodes, bool touched, Patience patience)
     : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario),
             fibre_field(scenario.law)),
-      equilibrium_(body_, equilibrium_options()), is_prestrained_(!scenario.pretension.isZero(0)),
+      equilibrium_(body_, equilibrium_options(patience)), is_prestrained_(!scenario.pretension.isZero(0)),
       pairs_(body_, nodes.pairs) {
   if (!nodes.pairs.empty() && scenario.cut.lips != solvers::LipCondition::open)
     equilibrium_.set_lips(nodes.pairs);
@@ -337,6 +359,58 @@ solvers::PointState FiniteModel::at(const Vector3& x) const {
   const solvers::FiniteState state = body_.at(x, equilibrium_.coefficients());
   const Matrix3& f = state.deformation;
   return {state.displacement, f - Matrix3::Identity(), 0.5 * (f.transpose() * f - Matrix3::Identity()), state.cauchy};
+}
+
+void FiniteModel::shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const {
+  solvers::require_support(body_.spheres(), x, shape);
+}
+
+std::vector<int> FiniteModel::places_among_candidates(const std::vector<int>& nodes) const {
+  std::vector<int> places;
+  for (const int node : nodes)
+    if (const auto found = std::lower_bound(candidates_.begin(), candidates_.end(), node);
+        found != candidates_.end() && *found == node)
+      places.push_back(static_cast<int>(found - candidates_.begin()));
+  return places;
+}
+
+void FiniteModel::prepare_to_condense(const std::vector<int>& wanted) {
+  static_cast<void>(equilibrium_.contact_compliance(places_among_candidates(wanted)));
+}
+
+void FiniteModel::condense(const std::vector<int>& wanted, solvers::ContactPatch& patch, solvers::ContactState& state) {
+  const solvers::FiniteContact& contact = *equilibrium_.contact();
+  const std::vector<Vector3> forces = contact.forces();
+  std::vector<int> chosen = places_among_candidates(wanted);
+  for (std::size_t c = 0; c < forces.size(); ++c)
+    if (!forces[c].isZero(0))
+      chosen.push_back(static_cast<int>(c));
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  patch = {};
+  state = {};
+  VectorX acting = VectorX::Zero(3 * std::ssize(chosen));
+  state.displacement.resize(acting.size());
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const int c = chosen[k];
+    const int node = candidates_[c];
+    patch.nodes.push_back(node);
+    patch.rest.push_back(contact.places()[c]);
+    patch.spacings.push_back(body_.problem().nodes.spacings[node]);
+    patch.normals.push_back(body_.problem().nodes.normals[node]);
+    state.nodal_forces.push_back(forces[c]);
+    state.active.push_back(forces[c].isZero(0) ? 0 : 1);
+    const auto row = 3 * static_cast<Eigen::Index>(k);
+    acting.segment<3>(row) = forces[c];
+    state.displacement.segment<3>(row) = contact.means()[c].of(equilibrium_.coefficients());
+  }
+  patch.compliance = equilibrium_.contact_compliance(chosen);
+  patch.base_displacement = state.displacement - patch.compliance * acting;
+  state.pose = contact.pose();
+  state.tool_force = last_->force;
+  state.tool_torque = last_->torque;
+  state.active_nodes = last_->active_nodes;
+  state.contact_radius = last_->contact_radius;
 }
 
 VectorX FiniteModel::nodal_displacements() const {

@@ -10,6 +10,8 @@ namespace spherecut::app {
 
 /// Throws InputError naming file, line, what a run cannot compute with the scenario's law and what it can.
 void require_run(const Scenario& scenario);
+/// The same of a session in a hand, which presses without friction alone.
+void require_hand(const Scenario& scenario);
 [[nodiscard]] bool can_run(const Scenario& scenario);
 
 /// One equilibrium.
@@ -26,12 +28,16 @@ struct FiniteStep {
   double penetration = 0; // m, deepest that corners and middles of the surface's triangles lie in the tool
 };
 
+/// How long an equilibrium is looked for that may not be there: a hand would wait for seconds, and its next pose may
+/// have one.
+enum class Patience : std::uint8_t { of_a_run, of_a_hand };
+
 class FiniteModel {
  public:
   /// The body on nodes, cut and lips of `nodes`. `touched`: whether a tool may come to it. Throws as require_run() and
   /// solvers::FiniteBody.
   FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, const BodyModel& nodes,
-              bool touched);
+              bool touched, Patience patience);
 
   /// Begins where another body of the same organ, on other nodes or with less of the cut, has come to. Friction and
   /// bonds go on at the nodes that both have.
@@ -60,13 +66,24 @@ class FiniteModel {
   /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
   /// from the volume ratio there. Throws InputError where no sphere covers it.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const;
+  /// Shape functions there, with which the displacement is a sum over coefficients. Throws as at().
+  void shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const;
+  [[nodiscard]] const solvers::Spheres& spheres() const { return body_.spheres(); }
   [[nodiscard]] bool solved() const { return last_.has_value(); }
-  /// Of the last solution.
+  /// Of the last solution: time, s, pose of the tool, and what else there is to tell.
+  [[nodiscard]] double time() const { return *time_; }
+  [[nodiscard]] const std::optional<topology::ToolPose>& pose() const { return pose_; }
   [[nodiscard]] const FiniteStep& last() const { return *last_; }
   [[nodiscard]] const VectorX& coefficients() const { return equilibrium_.coefficients(); } // 3 a node, m
   /// Gap of every pair of lips along its normal, m.
   [[nodiscard]] std::vector<double> openings() const;
   [[nodiscard]] VectorX nodal_displacements() const; // 3 a node, m
+  /// The last solution as a loop wants it that asks for the force at other poses of the tool: displacements = base +
+  /// compliance * forces, exact at this pose, the compliance that of small motions about it. `wanted`: free nodes of
+  /// the surface; those that touch the tool join them.
+  void condense(const std::vector<int>& wanted, solvers::ContactPatch& patch, solvers::ContactState& state);
+  /// Finds what condense() onto these nodes needs of the body at rest.
+  void prepare_to_condense(const std::vector<int>& wanted);
   [[nodiscard]] int candidates() const { return static_cast<int>(candidates_.size()); }
   [[nodiscard]] int held() const { return held_nodes(body_.problem().prescribed); }
 
@@ -79,6 +96,7 @@ class FiniteModel {
   };
   FiniteStep solve_step(double time, const std::optional<topology::ToolPose>& pose);
   void lay_skin();
+  [[nodiscard]] std::vector<int> places_among_candidates(const std::vector<int>& nodes) const;
   [[nodiscard]] double deepest(const topology::ToolPose& pose) const;
   void summarise_contact(FiniteStep& step) const;
   void set_candidates(std::vector<int> nodes);

@@ -143,7 +143,7 @@ bool is_nonlinear(const LawSettings& law) {
 
 void require_linear(const std::filesystem::path& file, const LawSettings& law) {
   if (is_nonlinear(law))
-    throw InputError(fmt::format("{}:{}: material.law = \"{}\": runs off line alone compute it; possible here: "
+    throw InputError(fmt::format("{}:{}: material.law = \"{}\": this body is of small strain; possible for it: "
                                  "material.law = \"linear\" without material.prony",
                                  file.string(), law.line, name_of(law)));
   if (!law.spec.prony.empty())

@@ -2,6 +2,7 @@
 
 #include "src/base/stage_timer.hpp"
 #include "src/tissue/cut_checks.hpp"
+#include "src/tissue/finite_body.hpp"
 #include "topology/base/errors.hpp"
 
 #include <fmt/format.h>
@@ -20,7 +21,8 @@ bool BladeCutting::ends(const StepSample& sample) const {
 }
 
 bool BladeCutting::makes_in_background(const StepSample& sample) const {
-  return cut_policy(state_.scenario, state_.options) == CutPolicy::in_background && state_.model.state && !ends(sample);
+  return cut_policy(state_.scenario, state_.options) == CutPolicy::in_background && state_.model.solved() &&
+         !ends(sample);
 }
 
 double BladeCutting::advance() const {
@@ -172,6 +174,7 @@ bool BladeCutting::take() {
     state_.profile.sprinkle += report.seconds.sprinkling;
     state_.profile.discretise += report.seconds.assembly + report.seconds.visibility;
     state_.profile.condense += report.seconds.solve;
+    take_over_finite(state_.model, made.model, state_.profile);
     renewal_.drop();
     contact_.keep_grip();
     state_.model = std::move(made.model);

@@ -9,14 +9,16 @@
 
 namespace spherecut::app {
 
-void FiniteStepper::step(const StepSample& sample, bool was_cut, StepResult& result) {
-  const bool begins =
-      has_loads(state_.scenario) || (state_.touch && result.contact.depth > 0) || state_.model.incision != nullptr;
+bool FiniteStepper::solve(const StepSample& sample, bool is_solved) {
+  const bool touches = state_.touch && state_.contact && state_.contact->depth > 0;
+  const bool begins = has_loads(state_.scenario) || touches || state_.model.incision != nullptr;
   if (state_.model.finite == nullptr && !begins) {
     free_pose_ = sample.tool;
     free_time_ = sample.time;
-    return;
+    return false;
   }
+  if (is_solved)
+    return true;
   interruption_point();
   try {
     if (state_.model.finite == nullptr) {
@@ -25,15 +27,15 @@ void FiniteStepper::step(const StepSample& sample, bool was_cut, StepResult& res
           !has_loads(state_.scenario)) // from there a step goes, should it have to be halved
         solve_finite(free_time_, free_pose_, state_.model, state_.profile);
     }
-    if (!was_cut)
-      solve_finite(sample.time, sample.tool, state_.model, state_.profile);
+    contact_.solve(sample, state_.model);
   } catch (const NumericalError& error) {
-    throw NumericalError(fmt::format("t = {:g} s: {}. The rows up to then are kept. What a law cannot bear does that, "
-                                     "or steps too long for it (tool.step), or nodes too coarse for the tool "
-                                     "(nodes.fine_spacing)",
-                                     sample.time, error.what()));
+    const bool is_led = state_.leader == Leader::path;
+    throw NumericalError(fmt::format("t = {:g} s: {}. {}What a law cannot bear does that, or steps too long for it{}, "
+                                     "or nodes too coarse for the tool (nodes.fine_spacing)",
+                                     sample.time, error.what(), is_led ? "The rows up to then are kept. " : "",
+                                     is_led ? " (tool.step)" : ""));
   }
-  report_.tell_finite(result);
+  return true;
 }
 
 std::vector<Vector3> places_of_contact(const SessionState& state) {

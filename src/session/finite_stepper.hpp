@@ -1,22 +1,22 @@
 // Steps of a session whose law is not linear: its body is one at finite strain, on nodes that stay until a blade cuts.
 #pragma once
 
-#include "src/session/step_report.hpp"
+#include "src/tissue/contact_solver.hpp"
 
 namespace spherecut::app {
 
 class FiniteStepper {
  public:
   /// These must outlive it.
-  FiniteStepper(SessionState& state, StepReport& report) : state_(state), report_(report) {}
+  FiniteStepper(SessionState& state, ContactSolver& contact) : state_(state), contact_(contact) {}
 
-  /// Goes on to the step, with the cut that it has made; `was_cut`: the body with that is solved already. Throws
-  /// NumericalError, which says what may help.
-  void step(const StepSample& sample, bool was_cut, StepResult& result);
+  /// Goes on to the step, with the cut that it has made; `is_solved`: the body with that is solved already. False:
+  /// nothing acts on the tissue yet. Throws NumericalError, which says what may help.
+  bool solve(const StepSample& sample, bool is_solved);
 
  private:
   SessionState& state_;
-  StepReport& report_;
+  ContactSolver& contact_;
   std::optional<topology::ToolPose> free_pose_; // of the tool before it touched
   double free_time_ = 0;                        // s, then
 };

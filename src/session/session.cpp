@@ -6,6 +6,7 @@
 #include "src/session/finite_grip.hpp"
 #include "src/session/finite_stepper.hpp"
 #include "src/session/setting_out.hpp"
+#include "src/session/step_report.hpp"
 #include "src/session/tear_propagation.hpp"
 #include "src/session/tool_following.hpp"
 #include "src/tissue/finite_body.hpp"
@@ -24,6 +25,7 @@ struct Session::Parts {
   void step(const StepSample& sample, std::vector<topology::BladePose> passed, StepResult& result);
   void step_linear(const StepSample& sample, std::vector<topology::BladePose> passed, StepResult& result);
   void step_finite(const StepSample& sample, std::vector<topology::BladePose> passed, StepResult& result);
+  [[nodiscard]] bool may_follow_finite();
   [[nodiscard]] topology::SurfaceContact find_contact(const topology::ToolPose& pose) const;
   bool begin(const StepSample& sample, std::vector<topology::BladePose> passed);
   bool grasp(const StepSample& sample);
@@ -46,7 +48,7 @@ struct Session::Parts {
   std::unique_ptr<ResistedBlade> resisted; // null: nothing resists the blade
   std::unique_ptr<TearPropagation> tears;  // null: nothing tears
   StepReport report{state, contact, grasping};
-  FiniteStepper finite{state, report};
+  FiniteStepper finite{state, contact};
   bool has_hung = false; // the body has been built for approach_hanging() alone
 };
 
@@ -134,19 +136,45 @@ void Session::Parts::step_linear(const StepSample& sample, std::vector<topology:
 
 void Session::Parts::step_finite(const StepSample& sample, std::vector<topology::BladePose> passed,
                                  StepResult& result) {
-  bool was_cut = false;
   {
     const StageTimer timer(result.stages.solve);
     follow_grip(sample, state, grasping);
   }
+  const std::optional<CutReport> taken = cutting.take_report();
+  bool is_solved = false;
   if (has_cuts(state.scenario)) {
     const StageTimer timer(result.stages.cut);
+    result.cut = taken.value_or(CutReport{});
     blade.begin_step(sample, std::move(passed), state.zone.fine());
-    was_cut = cutting.move(sample, result.cut.emplace());
+    is_solved = cut_freely(sample, taken.has_value(), result);
     blade.arrive(sample);
   }
-  const StageTimer timer(result.stages.solve);
-  finite.step(sample, was_cut, result);
+  {
+    const StageTimer timer(result.stages.solve);
+    is_solved = finite.solve(sample, is_solved);
+  }
+  if (is_solved && may_follow_finite()) {
+    const StageTimer timer(result.stages.body);
+    follow_tool(sample, result);
+  }
+  if (is_solved)
+    report.tell_finite(result);
+  result.resprinkled = tool.has_taken() || result.resprinkled;
+  result.rebuild = std::exchange(state.rebuild, Rebuild::none);
+}
+
+// Where a path leads the tool, nodes are fine all along it. What has faded of a viscoelastic body is known at the
+// points of its quadrature, and those of other nodes are elsewhere.
+bool Session::Parts::may_follow_finite() {
+  if (state.leader == Leader::path || !state.touch)
+    return false;
+  if (state.scenario.law.spec.prony.empty())
+    return true;
+  const topology::SurfaceContact& contact = *state.contact;
+  if (contact.depth > 0 && state.zone.is_left_by(contact))
+    state.log.warn("faded zone", "the tool has left the place where nodes are fine: with material.prony they do not "
+                                 "follow it, and its force is that of coarse nodes");
+  return false;
 }
 
 topology::SurfaceContact Session::Parts::find_contact(const topology::ToolPose& pose) const {
@@ -222,9 +250,9 @@ bool Session::Parts::cut_freely(const StepSample& sample, bool another_body, Ste
   if (state.incisions == nullptr || resisted)
     return false;
   bool solved = false;
-  if (state.model.body != nullptr && !state.model.state && (sample.blade || another_body)) { // by its field a blade is
-    contact.solve(sample, state.model);                                                      // carried to the tissue at
-    solved = true;                                                                           // rest
+  if (state.model.built() && !state.model.solved() && (sample.blade || another_body)) { // by its field a blade is
+    contact.solve(sample, state.model);                                                 // carried to the tissue at
+    solved = true;                                                                      // rest
   }
   return cutting.move(sample, *result.cut) || solved;
 }
@@ -259,6 +287,8 @@ void Session::prepare(const StepSample& sample) {
   if (is_nonlinear(of.state.scenario.law)) {
     if (computes() && model.finite == nullptr)
       make_finite(of.state, model);
+    if (of.state.touch && of.state.leader == Leader::device)
+      model.finite->prepare_to_condense(of.contact.candidates(model));
     return;
   }
   if (!computes() || (model.body != nullptr && !std::exchange(of.has_hung, false)))

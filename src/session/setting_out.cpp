@@ -81,8 +81,9 @@ void lay_first_nodes(SessionState& state, const BodyUpdater& updater) {
   }
   std::vector<Vector3> places;
   if (state.zone.centre())
-    places =
-        is_nonlinear(state.scenario.law) ? places_of_contact(state) : std::vector<Vector3>{state.zone.centre()->point};
+    places = is_nonlinear(state.scenario.law) && state.leader == Leader::path
+                 ? places_of_contact(state)
+                 : std::vector<Vector3>{state.zone.centre()->point};
   state.zone.lay_out(std::move(places), state.model.incision,
                      state.scenario.precuts.empty() ? nullptr : &state.incisions->wound());
   if (!state.scenario.precuts.empty())

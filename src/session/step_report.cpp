@@ -103,11 +103,12 @@ void StepReport::tell_finite(StepResult& result) {
   const StageTimer timer(state_.profile.evaluate);
   state_.displacements = state_.model.finite->nodal_displacements();
   state_.node_states.clear();
-  for (const Vector3& x : state_.model.sprinkling.nodes.positions) {
-    state_.node_states.push_back(state_.model.at(x));
-    result.rotation_degrees =
-        std::max(result.rotation_degrees, rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
-  }
+  if (!state_.options.force_only)
+    for (const Vector3& x : state_.model.sprinkling.nodes.positions) {
+      state_.node_states.push_back(state_.model.at(x));
+      result.rotation_degrees =
+          std::max(result.rotation_degrees, rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
+    }
   judge_banks(result);
   if (!state_.touch)
     return;

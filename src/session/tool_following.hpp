@@ -24,6 +24,8 @@ class ToolFollowing {
   [[nodiscard]] bool has_taken() { return std::exchange(taken_, false); }
 
  private:
+  void say_not_followed(const std::exception& error);
+
   SessionState& state_;
   ContactSolver& contact_;
   BodyUpdater& updater_;

@@ -22,6 +22,7 @@ namespace {
 // as many updates as fit into its zone: one of a spacing, three of a half, six of a quarter.
 constexpr double largest_share = 0.5;
 constexpr const char* spacing_changed = "the spacing has changed";
+constexpr const char* not_linear = "the law is not linear";
 
 } // namespace
 
@@ -54,6 +55,11 @@ void BodyUpdater::sprinkle(const solvers::NodeCloud* previous, BodyModel& model)
 }
 
 void BodyUpdater::build(BodyModel& model) {
+  if (is_nonlinear(scenario_.law)) {
+    background_.drop_following();
+    make_finite(state_, model, &model_);
+    return;
+  }
   const std::vector<int> near = contact_.candidates_in_reach(model);
   assemble(model, {}, near);
   contact_.condense(near, model);
@@ -154,18 +160,18 @@ void BodyUpdater::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate
 // A body on the nodes of the new cut, which goes on from where the one before has come to.
 void BodyUpdater::build_finite_cut(BodyModel& next, BodyUpdate& report) const {
   report.update = SystemUpdate::rebuilt;
-  report.update_reason = "the law is not linear";
+  report.update_reason = not_linear;
   {
     const StageTimer timer(report.seconds.sprinkling);
     sprinkle(&model_.sprinkling.nodes, next);
   }
-  const StageTimer timer(report.seconds.assembly);
-  make_finite(state_, next, &model_);
-  if (grasping_.holds())
-    next.finite->hold_on(grasping_.nodes(next, state_.zone.fine()), *model_.finite);
-  report.nodes = next.sprinkling.nodes.size();
-  const std::vector<int>& from = next.sprinkling.kept_from;
-  report.kept_nodes = static_cast<int>(std::count_if(from.begin(), from.end(), [](int i) { return i >= 0; }));
+  {
+    const StageTimer timer(report.seconds.assembly);
+    make_finite(state_, next, &model_);
+    if (grasping_.holds())
+      next.finite->hold_on(grasping_.nodes(next, state_.zone.fine()), *model_.finite);
+  }
+  report_body(next, 0, report);
 }
 
 // By an update alone where a replacement is on its way; where that cannot be, the replacement takes over and follows.
@@ -252,6 +258,10 @@ BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContac
     model.coarseness = coarseness;
     model.touched_from = centre.normal;
     const std::vector<int> near = touchable_nodes(scenario, *domain, model.sprinkling.nodes, centre, reach);
+    if (is_nonlinear(scenario.law)) {
+      make_finite_apart(scenario, domain, near, model);
+      return made;
+    }
     app::assemble(scenario, domain, model, {}, near);
     app::condense(without_dropped(near, scenario, *model.body), model);
     find_lips(model);
@@ -262,7 +272,9 @@ BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContac
 // Rebuilt: no window pays that serves one increment.
 BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const topology::Incision>& incision,
                                                   const char* reason) const {
-  const std::string renewed = spacing_stays() ? state_.hindrance() : spacing_changed;
+  const std::string renewed = is_nonlinear(scenario_.law) ? not_linear
+                              : spacing_stays()           ? state_.hindrance()
+                                                          : spacing_changed;
   const FineZoneTracker& zone = state_.zone;
   return [&scenario = scenario_, domain = organ_.domain, how = zone.sprinkle_options(incision, grasping_.kept_nodes()),
           incision_before = model_.incision, sprinkling = model_.sprinkling, renewed, reason,
@@ -290,9 +302,14 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
         const StageTimer timer(update.seconds.assembly);
         const double seen = solvers::sight_seconds();
         near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
-        app::assemble(scenario, domain, model, {}, near);
+        if (is_nonlinear(scenario.law))
+          make_finite_apart(scenario, domain, near, model);
+        else
+          app::assemble(scenario, domain, model, {}, near);
         sight = solvers::sight_seconds() - seen;
       }
+      if (model.finite != nullptr)
+        return;
       const StageTimer timer(condensing);
       app::condense(without_dropped(near, scenario, *model.body), model, true);
       find_lips(model);

@@ -82,6 +82,8 @@ void ContactSolver::condense(const std::vector<int>& candidates, BodyModel& mode
 void ContactSolver::solve(const StepSample& sample, BodyModel& model) {
   if (model.finite != nullptr) {
     solve_finite(sample.time, sample.tool, model, state_.profile);
+    if (state_.leader == Leader::device)
+      condense_finite(model);
     return;
   }
   displaced_body_ = nullptr;
@@ -208,6 +210,16 @@ void ContactSolver::extend_fields(BodyModel& model) const {
     solvers::extend_responses(*model.body, candidates_a_press, model.patch);
   else
     solvers::extend_responses(*model.body, pairs_a_press, *model.lips);
+}
+
+// What a loop gets between two solves.
+void ContactSolver::condense_finite(BodyModel& model) const {
+  model.patch = {};
+  model.state.reset();
+  if (!is_in_reach())
+    return;
+  const StageTimer timer(state_.profile.condense);
+  model.finite->condense(candidates(model), model.patch, model.state.emplace().tool);
 }
 
 const VectorX& ContactSolver::displacements(const BodyModel& model) {

@@ -53,6 +53,7 @@ class ContactSolver {
                                            const BodyModel& model) const;
   [[nodiscard]] std::vector<int> penetrated_outside_patch(const topology::ToolPose& pose, const BodyModel& model);
   void extend_fields(BodyModel& model) const;
+  void condense_finite(BodyModel& model) const;
 
   SessionState& state_;
   const Scenario& scenario_;

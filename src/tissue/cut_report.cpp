@@ -44,7 +44,7 @@ void report_body(const BodyModel& body, double sight, BodyUpdate& report) {
     return part;
   };
   report.seconds.visibility = take(sight);
-  report.seconds.solve = take(body.body->report().factor_seconds);
+  report.seconds.solve = body.body != nullptr ? take(body.body->report().factor_seconds) : 0;
   report.seconds.assembly = left;
   report.nodes = body.sprinkling.nodes.size();
   const std::vector<int>& from = body.sprinkling.kept_from;

@@ -10,6 +10,15 @@ namespace spherecut::app {
 /// Throws as FiniteModel.
 void make_finite(SessionState& state, BodyModel& model, const BodyModel* before = nullptr);
 
+/// The same away from the session, for a body that takes over later and then goes on from the one before it. Nodes and
+/// cut are those of `model`; `wanted`: nodes that a tool may touch there.
+void make_finite_apart(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                       const std::vector<int>& wanted, BodyModel& model);
+
+/// Such a body takes over from the one before, in equilibrium at the time and with the tool of its last solution; it
+/// may be a linear one, and then nothing is done. Throws NumericalError where there is no equilibrium.
+void take_over_finite(const BodyModel& before, BodyModel& next, SessionProfile& profile);
+
 /// Goes on to equilibrium at `time`, s, with the tool at a pose (empty: there is none). Throws NumericalError.
 void solve_finite(double time, const std::optional<topology::ToolPose>& pose, BodyModel& model,
                   SessionProfile& profile);

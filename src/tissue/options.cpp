@@ -1,6 +1,7 @@
 #include "src/tissue/options.hpp"
 
 #include "src/model/body_model.hpp"
+#include "src/scenario/law_reader.hpp"
 
 namespace spherecut::app {
 
@@ -32,7 +33,8 @@ CutPolicy cut_policy(const Scenario& scenario, const SessionOptions& options) {
   if (options.following_in_background && blade_alone && !cut_appends(scenario) &&
       advance.value_or(background_advance) > 0)
     return CutPolicy::in_background;
-  const bool ahead = options.recondensing && !scenario.tearing.enabled && !cut_appends(scenario);
+  const bool ahead = options.recondensing && !scenario.tearing.enabled && !cut_appends(scenario) &&
+                     !is_nonlinear(scenario.law); // its bodies have no window
   return ahead ? CutPolicy::in_step_ahead : CutPolicy::in_step;
 }
 

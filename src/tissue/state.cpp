@@ -2,7 +2,7 @@
 
 #include "src/base/process_settings.hpp"
 #include "src/base/stage_timer.hpp"
-#include "src/scenario/law_reader.hpp"
+#include "src/model/finite_model.hpp"
 #include "src/scenario/region_reader.hpp"
 #include "src/tissue/cut_checks.hpp"
 #include "topology/base/interruption.hpp"
@@ -21,7 +21,7 @@ Organ timed_organ(const OrganSettings& settings, double& seconds) {
 const Scenario& checked(const Scenario& scenario, const Organ& organ, Leader leader, SessionLog& log) {
   interruption_point();
   if (leader == Leader::device)
-    require_linear(scenario.file, scenario.law);
+    require_hand(scenario);
   require_regions_apart(scenario, organ.domain);
   use_one_blas_thread();
   for (const std::string& remark : organ.remarks)
@@ -31,10 +31,10 @@ const Scenario& checked(const Scenario& scenario, const Organ& organ, Leader lea
 
 } // namespace
 
-SessionState::SessionState(Scenario scenario_in, std::function<void(const std::string&)> say, Leader leader)
-    : scenario(std::move(scenario_in)), log(std::move(say)), organ(timed_organ(scenario.organ, profile.organ)),
-      query(organ.domain->surface()), toughness(toughness_field(scenario)),
-      zone(checked(scenario, organ, leader, log), organ.domain) {}
+SessionState::SessionState(Scenario scenario_in, std::function<void(const std::string&)> say, Leader led_by)
+    : leader(led_by), scenario(std::move(scenario_in)), log(std::move(say)),
+      organ(timed_organ(scenario.organ, profile.organ)), query(organ.domain->surface()),
+      toughness(toughness_field(scenario)), zone(checked(scenario, organ, leader, log), organ.domain) {}
 
 void SessionState::check_pieces(double time) {
   require_pieces(incisions->wound(), zone.spacing());

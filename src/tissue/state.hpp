@@ -37,6 +37,7 @@ struct SessionState {
   SessionState& operator=(const SessionState&) = delete;
 
   // The setting: the same in all steps.
+  Leader leader;
   Scenario scenario;
   SessionLog log;
   SessionProfile profile;

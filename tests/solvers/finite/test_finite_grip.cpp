@@ -11,6 +11,7 @@
 #include <catch2/catch.hpp>
 #include <numbers>
 #include <random>
+#include <tuple>
 
 using namespace spherecut;
 using namespace spherecut::solvers;
@@ -416,9 +417,12 @@ TEST_CASE("A step that is halved rubs as one that is not") {
   };
   const auto [whole, none] = force(1, 100);
   const auto [fine, few] = force(8, 100);
-  const auto [halved, some] = force(1, 12);
   CHECK(none == 0);
-  CHECK(some > 0);
+  Vector3 halved;
+  int some = 0;
+  for (int most = 14; some == 0 && most > 5; --most) // so few iterations that a step has to be halved
+    std::tie(halved, some) = force(1, most);
+  REQUIRE(some > 0);
   CHECK((fine - whole).norm() < 0.03 * whole.norm());
   CHECK((halved - whole).norm() < 0.03 * whole.norm());
 }

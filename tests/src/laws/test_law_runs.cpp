@@ -215,9 +215,10 @@ TEST_CASE("What a law other than linear does not go with is refused with its lin
   refused(replaced(block, "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\n[[material.prony]]\nshare = 0.3\ntime = 2\n") +
               incision_at_end,
           "[blade] with material.prony");
-  CHECK_THROWS_WITH(Session(
-                        scenario_of(small), [](const std::string&) {}, Leader::device),
-                    Contains("material.law = \"neo_hookean\": runs off line alone compute it"));
+  CHECK_THROWS_WITH(
+      Session(
+          scenario_of(small + "[method]\nname = \"collocation\"\n"), [](const std::string&) {}, Leader::device),
+      Contains("method.name = \"collocation\" does not go with material.law = \"neo_hookean\""));
 }
 
 TEST_CASE("A confined cube that is held pressed relaxes as its Prony series") {

@@ -139,7 +139,7 @@ TEST_CASE("check tells the law with its moduli, and whether a run of it is refus
              Contains(fmt::format("after a long time E = {:.4g} Pa", 9 * bulk * left / (3 * bulk + left))));
 }
 
-TEST_CASE("What has the linear law alone is refused with its line before anything is written") {
+TEST_CASE("What a law does not go with is refused in a hand with its line before anything is written") {
   const TemporaryFolder folder;
   const std::filesystem::path out = folder.path() / "out";
   const auto program = [&](const std::string& command, const std::string& lines) {
@@ -152,8 +152,11 @@ TEST_CASE("What has the linear law alone is refused with its line before anythin
     CHECK_FALSE(std::filesystem::exists(out));
     return result.err;
   };
-  CHECK_THAT(program("haptics", neo_hookean), Contains("law.toml:7: material.law = \"neo_hookean\": runs off line"));
-  CHECK_THAT(program("haptics", fibres), Contains("law.toml:7: material.law = \"holzapfel_gasser_ogden\""));
+  const std::string bonded = "[contact]\ncondition = \"bonded\"\n";
+  CHECK_THAT(program("haptics", neo_hookean + "\n" + bonded),
+             Contains("law.toml:7: contact.condition = \"bonded\" does not go with material.law = \"neo_hookean\""));
+  CHECK_THAT(program("haptics", elastic + prony),
+             Contains("material.prony does not go with material.law = \"linear\""));
   CHECK_THAT(program("run", elastic + prony), Contains("material.prony does not go with material.law = \"linear\""));
   // A session that another way in has made computes no linear body in its place either.
   Session session(with_material(elastic + prony));

@@ -1,7 +1,7 @@
 // Wavy strokes over the live liver, as a busy machine solves them: seldom, late, with coarser and coarser nodes, bodies
 // made in the background and taken over at some solve. SPHERECUT_STROKES of them (1), from the seed
 // SPHERECUT_STROKES_FIRST (163, which has ten crumbs to leave out) on; SPHERECUT_STROKES_FULL=1: with all triangles and
-// nodes of the scenario.
+// nodes of the scenario; SPHERECUT_STROKES_LAW: of that law, at a Poisson's ratio of 0.49, and not resisted.
 #include "src/live/shown_opening.hpp"
 #include "src/live/simulation.hpp"
 #include "src/live/surface_follower.hpp"
@@ -10,6 +10,7 @@
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
@@ -33,6 +34,8 @@ int from_environment(const char* name, int otherwise) {
 // then, and tissue is stretched more.
 std::string liver(bool resists) {
   std::string text = read_file(std::filesystem::path(SPHERECUT_SOURCE_DIR) / "scenarios/liver_live.toml");
+  if (const char* law = std::getenv("SPHERECUT_STROKES_LAW"); law != nullptr)
+    text = replaced(text, "poisson_ratio = 0.45", "poisson_ratio = 0.49\nlaw = \"" + std::string(law) + "\"");
   if (resists) {
     text = replaced(text, "poisson_ratio = 0.45", "toughness = 10.0\npoisson_ratio = 0.44");
     text = replaced(text, "pretension = [0.0, 0.08, 0.0]", "pretension = [0.0, 0.12, 0.0]");
@@ -88,6 +91,7 @@ struct Outcome {
   double opening = 0;                                        // m, in the end
   double apart = 0;                                          // m, lips at one place at most, along any way
   std::string reason;                                        // of the last refusal or failure
+  std::vector<double> seconds;                               // of every solve, wall clock
 };
 
 Outcome draw(unsigned seed, bool resists) {
@@ -150,6 +154,7 @@ Outcome draw(unsigned seed, bool resists) {
     event.swaps = session.pending().under_way && stroke.between(0, 1) < 0.5;
     const SolveRecord record = solve_recording(simulation, device, event, snapshot);
     out.solves += 1;
+    out.seconds.push_back(record.seconds);
     CAPTURE(tick, event.degradation, record.reason);
     out.failed += record.failed ? 1 : 0;
     if (record.failed) {
@@ -217,12 +222,16 @@ TEST_CASE("A wavy stroke over the live liver leaves no crumbs, and what is told 
   for (int k = 0; k < 2 * count; ++k) {
     const int seed = first + k / 2;
     const bool resists = k % 2 == 1;
-    const Outcome out = draw(static_cast<unsigned>(seed), resists);
+    if (resists && std::getenv("SPHERECUT_STROKES_LAW") != nullptr)
+      continue;
+    Outcome out = draw(static_cast<unsigned>(seed), resists);
+    std::sort(out.seconds.begin(), out.seconds.end());
     std::cout << "seed " << seed << (resists ? ", resisted: " : ": ") << out.solves << " solves, " << out.cuts
               << " cuts, " << out.refused << " refused, " << out.failed << " failed, area " << 1e4 * out.area
               << " cm2, opening " << 1e3 * out.opening << " mm, lips apart " << 1e3 * out.apart
               << " mm, pieces at most " << out.most_pieces << ", crumbs left out " << out.crumbs << ", smallest "
-              << out.smallest << " " << out.reason << "\n"
+              << out.smallest << ", solves " << 1e3 * out.seconds[out.seconds.size() / 2] << " ms (median), "
+              << 1e3 * out.seconds.back() << " ms (longest) " << out.reason << "\n"
               << std::flush;
   }
 }
