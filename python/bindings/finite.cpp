@@ -253,11 +253,27 @@ void bind_equilibrium(py::module_& module) {
            "if fall_back. least_jacobian: where a search stops short. penetration: of the tool, in spacings.")
       .def(
           "set_contact",
-          [](BodyEquilibrium& self, const Tool& tool, const py::array& nodes) {
+          [](BodyEquilibrium& self, const Tool& tool, const py::array& nodes, const std::string& condition,
+             double friction) {
             const std::vector<int> numbers = indices_from(nodes, "nodes", self.body->body->size());
-            with_equilibrium(self, [&](Equilibrium& e) { e.set_contact(tool.shape, numbers); });
+            const solvers::FiniteContactOptions options{.condition = contact_condition_from(condition),
+                                                        .friction = friction};
+            with_equilibrium(self, [&](Equilibrium& e) { e.set_contact(tool.shape, numbers, options); });
           },
-          "tool"_a, "nodes"_a, "The tool that presses without friction, and the surface nodes, (m,), it may touch.")
+          "tool"_a, "nodes"_a, "condition"_a = "frictionless", "friction"_a = 0.0,
+          "The tool that presses, and the surface nodes, (m,), it may touch. condition: 'frictionless', 'frictional' "
+          "with Coulomb's coefficient friction, or 'bonded'.")
+      .def(
+          "take_hold",
+          [](BodyEquilibrium& self, const Tool& tool, const topology::ToolPose& pose, const py::array& nodes) {
+            const std::vector<int> numbers = indices_from(nodes, "nodes", self.body->body->size());
+            with_equilibrium(self, [&](Equilibrium& e) { e.take_hold(tool.shape, pose, numbers); });
+          },
+          "tool"_a, "pose"_a, "nodes"_a,
+          "A tool at that pose holds these surface nodes, (m,), from now on: they move with it as with a rigid body.")
+      .def(
+          "let_go", [](BodyEquilibrium& self) { with_equilibrium(self, [](Equilibrium& e) { e.let_go(); }); },
+          "There is no tool any more.")
       .def(
           "solve", &solve, "pose"_a = py::none(), "load_factor"_a = 1.0, "prescribed"_a = py::none(),
           "Goes from the present state to equilibrium. pose: of the tool. load_factor: of the body's loads. "

@@ -160,8 +160,9 @@ void bind_scenario(py::module_& module) {
             return copy;
           },
           "law"_a,
-          "The same scenario with another law, a Law, at finite strain: sessions press it without friction, under its "
-          "weight, and raise InputError for a scenario that asks for more. Its text stays what it was, and it cannot "
+          "The same scenario with another law, a Law, at finite strain: sessions press, grasp and cut it, under "
+          "its weight, and raise InputError for a scenario that asks for more. Its text stays what it was, and it "
+          "cannot "
           "be pickled.")
       .def(py::pickle(
           [](const Scenario& self) {

@@ -696,8 +696,14 @@ class Equilibrium:
         maximum_iterations: of a step, which is then halved. halvings: of a step, before Newton's method is asked,
         if fall_back. least_jacobian: where a search stops short. penetration: of the tool, in spacings.
         """
-    def set_contact(self, tool: Tool, nodes: npt.NDArray[Any]) -> None:
-        """The tool that presses without friction, and the surface nodes, (m,), it may touch."""
+    def set_contact(self, tool: Tool, nodes: npt.NDArray[Any], condition: str = 'frictionless', friction: float = 0.0) -> None:
+        """The tool that presses, and the surface nodes, (m,), it may touch. condition: 'frictionless', 'frictional'
+        with Coulomb's coefficient friction, or 'bonded'.
+        """
+    def take_hold(self, tool: Tool, pose: ToolPose, nodes: npt.NDArray[Any]) -> None:
+        """A tool at that pose holds these surface nodes, (m,), from now on: they move with it as with a rigid body."""
+    def let_go(self) -> None:
+        """There is no tool any more."""
     def solve(self, pose: Optional[ToolPose] = None, load_factor: float = 1.0, prescribed: Optional[npt.ArrayLike] = None) -> EquilibriumStatus:
         """Goes from the present state to equilibrium. pose: of the tool. load_factor: of the body's loads. prescribed:
         (k, 3), m, of every entry that is held; None: the body's own. Raises NumericalError where there is none to
@@ -958,7 +964,7 @@ class Scenario:
         text stays what it was, and it cannot be pickled.
         """
     def with_law(self, law: Law) -> Scenario:
-        """The same scenario with another law, a Law, at finite strain: sessions press it without friction, under its
+        """The same scenario with another law, a Law, at finite strain: sessions press, grasp and cut it, under its
         weight, and raise InputError for a scenario that asks for more. Its text stays what it was, and it cannot be
         pickled.
         """

@@ -36,29 +36,46 @@ void correct(const RestOperator& rest, const std::vector<ActiveConstraint>& cons
   const auto count = std::ssize(constraints);
   if (count == 0)
     return;
+  struct Springs { // of one mean
+    const DisplacementMean* mean;
+    const MatrixX* columns;
+    Eigen::Index begin, end; // constraints
+  };
+  std::vector<Springs> sprung;
+  VectorX gaps(count);
   std::vector<int> keys;
   std::vector<const DisplacementMean*> means;
-  for (const ActiveConstraint& constraint : constraints) {
-    keys.push_back(constraint.key);
-    means.push_back(constraint.mean);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const DisplacementMean& mean = *constraints[i].mean;
+    gaps[i] = constraints[i].direction.dot(mean.of(y));
+    if (!sprung.empty() && sprung.back().mean == &mean) {
+      sprung.back().end = i + 1;
+      continue;
+    }
+    keys.push_back(constraints[i].key);
+    means.push_back(&mean);
+    sprung.push_back({&mean, nullptr, i, i + 1});
   }
   find_responses(rest, keys, means, responses);
-  std::vector<const MatrixX*> columns(constraints.size());
-  VectorX gaps(count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    columns[i] = &responses.at(constraints[i].key);
-    gaps[i] = constraints[i].direction.dot(constraints[i].mean->of(y));
-  }
+  for (std::size_t a = 0; a < sprung.size(); ++a)
+    sprung[a].columns = &responses.at(keys[a]);
   MatrixX compliance(count, count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j)
-      compliance(i, j) = compliance(j, i) =
-          constraints[i].direction.dot(mean_response(*constraints[i].mean, *columns[j]) * constraints[j].direction);
-    compliance(i, i) += 1 / constraints[i].stiffness;
-  }
-  const VectorX forces = compliance.ldlt().solve(gaps);
+  for (std::size_t a = 0; a < sprung.size(); ++a)
+    for (std::size_t b = 0; b <= a; ++b) {
+      const Matrix3 between = mean_response(*sprung[a].mean, *sprung[b].columns);
+      for (Eigen::Index i = sprung[a].begin; i < sprung[a].end; ++i)
+        for (Eigen::Index j = sprung[b].begin; j < sprung[b].end; ++j)
+          compliance(i, j) = compliance(j, i) = constraints[i].direction.dot(between * constraints[j].direction);
+    }
   for (Eigen::Index i = 0; i < count; ++i)
-    y -= *columns[i] * (forces[i] * constraints[i].direction);
+    compliance(i, i) += 1 / constraints[i].stiffness;
+  const VectorX forces = compliance.ldlt().solve(gaps);
+  for (const Springs& springs : sprung) {
+    Vector3 force = Vector3::Zero();
+    for (Eigen::Index i = springs.begin; i < springs.end; ++i)
+      force += forces[i] * constraints[i].direction;
+    y -= *springs.columns * force;
+  }
 }
 
 } // namespace spherecut::solvers

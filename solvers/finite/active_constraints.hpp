@@ -9,7 +9,7 @@
 namespace spherecut::solvers {
 
 struct ActiveConstraint {
-  int key = 0;                            // the same of one constraint whenever it is active
+  int key = 0;                            // of its mean, the same whenever it is active
   const DisplacementMean* mean = nullptr; // of the body; outlives this
   Vector3 direction = Vector3::Zero();    // along which the mean is sprung
   double stiffness = 0;                   // N/m
@@ -25,8 +25,8 @@ void find_responses(const RestOperator& rest, const std::vector<int>& keys,
 /// Mean of the three columns of a response over the nodes of `mean`, m/N.
 Matrix3 mean_response(const DisplacementMean& mean, const MatrixX& response);
 
-/// Turns y = K^-1 q into (K + M^T D M)^-1 q, M the means along their directions and D their stiffness. `responses`
-/// keeps what is found anew.
+/// Those of one mean stand together. Turns y = K^-1 q into (K + M^T D M)^-1 q, M the means along their directions and D
+/// their stiffness. `responses` keeps what is found anew.
 void correct(const RestOperator& rest, const std::vector<ActiveConstraint>& constraints, ConstraintResponses& responses,
              VectorX& y);
 

@@ -23,6 +23,8 @@ constexpr int most_contact_rounds = 20;           // updates of the forces of co
 constexpr int most_newton_iterations = 30;        // of one round
 constexpr int most_times = 20;                    // the iterations of a round, before a solve gives up
 constexpr int most_factorisations = 200;          // before a solve gives up
+constexpr double stride_of_friction = 0.1;        // of the tool's tip radius, at most, in one step
+constexpr double stride_of_bonding = 0.5;         // likewise
 constexpr double floor_of_forces = 1e-8;          // mu h^2 of it: forces below are none
 
 /// Whether a solve has taken all that it may by this method.
@@ -54,6 +56,8 @@ Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& optio
                                  options.maximum_iterations, options.halvings, options.memory));
   if (!(options.penetration > 0))
     throw InputError(fmt::format("penetration {} spacings; it must be positive", options.penetration));
+  if (!(options.unsettled > 0))
+    throw InputError(fmt::format("{} of the acting forces unsettled; it must be positive", options.unsettled));
   set_coefficients(VectorX::Zero(3 * static_cast<Eigen::Index>(body.size())));
   if (body.prestrain() != Matrix3::Identity()) {
     body.evaluate(state_.coefficients, forces_);
@@ -66,13 +70,28 @@ Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& optio
   }
 }
 
-void Equilibrium::set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates) {
-  FiniteContact contact(body_, tool, candidates);
+void Equilibrium::set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates,
+                              const FiniteContactOptions& options) {
+  FiniteContact contact(body_, tool, candidates, options);
+  let_go();
   contact_.emplace(std::move(contact));
+  state_.shares.resize(candidates.size());
+}
+
+void Equilibrium::take_hold(const topology::ToolShape& tool, const topology::ToolPose& pose,
+                            const std::vector<int>& nodes) {
+  topology::check(pose);
+  set_contact(tool, nodes, {.condition = ContactCondition::bonded});
+  state_.shares = contact_->held(state_.coefficients);
+  state_.tool = pose;
+}
+
+void Equilibrium::let_go() {
+  contact_.reset();
   responses_.clear();
   rest_compliance_ = {};
   memory_.clear();
-  state_.contact_forces.assign(candidates.size(), 0);
+  state_.shares.clear();
   state_.tool.reset();
   has_before_ = false;
 }
@@ -88,7 +107,7 @@ void Equilibrium::set_lips(std::vector<LipPair> pairs) {
 }
 
 void Equilibrium::set_coefficients(const VectorX& coefficients, double load_factor,
-                                   const std::optional<topology::ToolPose>& tool) {
+                                   const std::optional<topology::ToolPose>& tool, std::vector<ContactShare> shares) {
   if (coefficients.size() != 3 * static_cast<Eigen::Index>(body_.size()) || !coefficients.allFinite())
     throw InputError(fmt::format("{} coefficients for {} nodes; 3 finite numbers a node are wanted",
                                  coefficients.size(), body_.size()));
@@ -96,10 +115,15 @@ void Equilibrium::set_coefficients(const VectorX& coefficients, double load_fact
     throw InputError(fmt::format("load factor {} is not finite", load_factor));
   if (tool)
     topology::check(*tool);
+  const std::size_t candidates = contact_ ? contact_->candidates().size() : 0;
+  if (!shares.empty() && shares.size() != candidates)
+    throw InputError(fmt::format("{} shares of a contact with {} candidates", shares.size(), candidates));
+  shares.resize(candidates);
   state_.coefficients = coefficients;
   state_.load_factor = load_factor;
   state_.tool = tool;
-  std::fill(state_.contact_forces.begin(), state_.contact_forces.end(), 0.0);
+  state_.shares = std::move(shares);
+  state_.gripped = 0;
   std::fill(state_.lip_forces.begin(), state_.lip_forces.end(), 0.0);
   reactions_.assign(body_.held().entries().size(), Vector3::Zero());
   state_.prescribed.clear();
@@ -127,7 +151,7 @@ Equilibrium::State Equilibrium::target_of(const FiniteLoading& loading) const {
     topology::check(*loading.tool);
     target.tool = loading.tool;
   }
-  target.contact_forces = state_.contact_forces;
+  target.shares = state_.shares;
   target.lip_forces = state_.lip_forces;
   return target;
 }
@@ -161,12 +185,26 @@ VectorX Equilibrium::motion(const State& from, const State& to) const {
   return way;
 }
 
+/// Steps of a solve before any is halved: more than one where friction or bonding minds the way.
+int Equilibrium::strides(const State& target) const {
+  const auto is_held = [](const ContactShare& share) { return share.touches; };
+  const bool bonds = contact_ && contact_->options().condition == ContactCondition::bonded;
+  if (!minds_way() || !target.tool || (bonds && std::all_of(state_.shares.begin(), state_.shares.end(), is_held)))
+    return 1;
+  const topology::ToolPose from = state_.tool.value_or(contact_->clear_pose(*target.tool, state_.coefficients));
+  const double radius = topology::tip_radius(contact_->tool());
+  const double part = bonds ? stride_of_bonding : stride_of_friction;
+  const double way = (target.tool->point - from.point).norm() + radius * (target.tool->axis - from.axis).norm();
+  return std::max(1, static_cast<int>(std::ceil(way / (part * radius))));
+}
+
 EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
   const State target = target_of(loading), begin = state_, before = before_;
   const bool had_before = has_before_;
   const std::vector<Vector3> reactions = reactions_;
   EquilibriumStatus status;
   least_seen_ = last_residual_ = 1;
+  last_unsettled_ = 0;
   const auto go_back = [&] {
     state_ = begin;
     before_ = before;
@@ -174,9 +212,15 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
     reactions_ = reactions;
     memory_.clear();
   };
-  bool found = false;
+  bool found = true;
   try {
-    found = go(target, options_.halvings, status);
+    const int steps = strides(target);
+    if (minds_way() && target.tool && !state_.tool)
+      state_.tool = contact_->clear_pose(*target.tool, state_.coefficients);
+    const State start = state_;
+    for (int k = 1; found && k <= steps; ++k)
+      found =
+          go(k < steps ? between(start, target, static_cast<double>(k) / steps) : target, options_.halvings, status);
   } catch (...) { // of a law that is a function, or an interruption
     go_back();
     throw;
@@ -187,7 +231,7 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
     go_back();
     throw NumericalError(fmt::format(
         "no equilibrium found: {:.3g} of the step was reached in {} iterations and {} halvings; the unbalanced force "
-        "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}{}; the condition of the rest "
+        "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}{}{}; the condition of the rest "
         "stiffness is {:.3g}",
         reached, status.iterations, status.halvings, last_residual_, options_.tolerance, least_seen_,
         least_seen_ <= options_.least_jacobian ? ": the body is about to be inverted" : "",
@@ -196,6 +240,9 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
                           contact_ && target.tool && contact_->deepest() > options_.penetration ? "the tool"
                                                                                                 : "itself at a cut",
                           options_.penetration)
+            : "",
+        last_residual_ < options_.tolerance && last_unsettled_ > 0
+            ? fmt::format(", friction or bonds still change by {:.3g} of the acting forces a round", last_unsettled_)
             : "",
         rest_.condition()));
   }
@@ -323,6 +370,7 @@ bool Equilibrium::step(const State& target, FiniteMethod method, EquilibriumStat
     return false;
   const bool converged = settle(target, method, now, status);
   last_residual_ = status.residual;
+  last_unsettled_ = is_settled(target, now) ? 0 : contact_->unsettled() / now.acting;
   if (!converged)
     return false;
   if (method == FiniteMethod::newton)
@@ -338,17 +386,24 @@ bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus&
   const double ahead = extrapolation(target);
   const VectorX prediction =
       ahead != 0 ? VectorX(ahead * (state_.coefficients - before_.coefficients)) : predict(target);
-  const auto expected = [ahead](std::vector<double> known, const std::vector<double>& before) {
-    if (ahead != 0 && before.size() == known.size())
-      for (std::size_t c = 0; c < known.size(); ++c)
-        known[c] = std::max(0.0, known[c] + ahead * (known[c] - before[c]));
-    return known;
-  };
-  if (contact_)
-    contact_->set_known_forces(expected(state_.contact_forces, before_.contact_forces));
+  if (contact_ && target.tool) {
+    std::vector<ContactShare> shares = state_.shares;
+    if (ahead != 0 && before_.shares.size() == shares.size())
+      for (std::size_t c = 0; c < shares.size(); ++c) {
+        const ContactShare& before = before_.shares[c];
+        shares[c].pressing = std::max(0.0, shares[c].pressing + ahead * (shares[c].pressing - before.pressing));
+        if (shares[c].touches && before.touches)
+          shares[c].along += ahead * (shares[c].along - before.along);
+      }
+    contact_->begin_step(state_.tool, *target.tool, std::move(shares), state_.coefficients);
+  }
   if (lips_) {
     lips_->turn(maps);
-    lips_->set_known_forces(expected(state_.lip_forces, before_.lip_forces));
+    std::vector<double> forces = state_.lip_forces;
+    if (ahead != 0 && before_.lip_forces.size() == forces.size())
+      for (std::size_t p = 0; p < forces.size(); ++p)
+        forces[p] = std::max(0.0, forces[p] + ahead * (forces[p] - before_.lip_forces[p]));
+    lips_->set_known_forces(forces);
   }
   double part = 1;
   for (int trial = 0; trial < 7; ++trial, part *= 0.5) {
@@ -357,26 +412,37 @@ bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus&
     if (now.usable && (!body_.minds_volume() || now.least_jacobian > least_predicted_jacobian))
       break;
   }
+  if (now.usable && target.tool && contact_ && contact_->options().condition == ContactCondition::bonded &&
+      contact_->renew()) // what the tool has overtaken is held from the start
+    evaluate(VectorX(now.coefficients), target, now, status);
   return now.usable;
 }
 
 /// Rounds of iterations, until forces balance and nothing lies in the tool or in itself along the normals as they are
-/// then.
+/// then, and friction keeps the limits of the forces as they are then.
 bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
+  const bool grips = minds_way() && target.tool;
   bool converged = iterate(target, method, options_.tolerance, now, status);
   for (int round = 0; converged; ++round) {
     std::vector<double> balanced; // forces of the lips along the normals so far
+    bool caught = false;
     if (lips_) {
       balanced = lips_->forces();
       lips_->turn(body_.piola_maps(now.coefficients));
+    }
+    if (grips)
+      caught = contact_->renew();
+    if (lips_ || grips) {
       evaluate(now.coefficients, target, now, status);
       status.residual = now.residual.norm() / now.acting;
     }
-    if (status.residual < options_.tolerance && deepest(target) <= options_.penetration)
+    if (status.residual < options_.tolerance && deepest(target) <= options_.penetration && is_settled(target, now))
       break;
     if (round == most_contact_rounds)
       return false;
-    if (contact_)
+    if (caught) // a new node is a new problem; there are only so many
+      --round;
+    else if (contact_)
       contact_->accept_forces();
     if (lips_)
       lips_->set_known_forces(balanced);
@@ -389,13 +455,29 @@ bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, E
   return converged;
 }
 
+bool Equilibrium::minds_way() const {
+  return contact_ && contact_->options().condition != ContactCondition::frictionless;
+}
+
+bool Equilibrium::is_settled(const State& target, const Trial& now) const {
+  if (!contact_ || !target.tool)
+    return true;
+  const double gripping = std::max(contact_->force_norm(), state_.gripped); // loads may be far larger
+  return contact_->unsettled() <= std::max(options_.unsettled * gripping, options_.tolerance * now.acting);
+}
+
 /// The state becomes that of the trial, which is in equilibrium.
 void Equilibrium::accept_step(const State& target, const Trial& now, EquilibriumStatus& status) {
   State next = target;
   next.coefficients = now.coefficients;
+  next.shares.assign(state_.shares.size(), {});
+  next.gripped = 0;
   if (contact_ && target.tool) {
-    contact_->accept_forces();
-    next.contact_forces = contact_->known_forces();
+    next.shares = contact_->end_step();
+    if (minds_way())
+      next.gripped = contact_->force_norm();
+    status.friction = contact_->friction_force();
+    status.friction_work += contact_->friction_work();
     status.touching = contact_->touching();
     status.tool_force = contact_->tool_force();
     status.tool_torque = contact_->tool_torque();
@@ -433,9 +515,8 @@ void Equilibrium::evaluate(const VectorX& coefficients, const State& target, Tri
   VectorX& residual = trial.residual;
   residual = forces_.forces;
   trial.energy = forces_.energy;
-  trial.acting = prestrain_forces_;
+  trial.acting = std::max(prestrain_forces_, state_.gripped);
   if (contact_ && target.tool) {
-    contact_->set_pose(*target.tool);
     trial.energy += contact_->add(trial.coefficients, residual);
     trial.acting = std::max(trial.acting, contact_->force_norm());
   } else if (contact_) {

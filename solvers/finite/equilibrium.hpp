@@ -22,14 +22,17 @@ FiniteMethod finite_method_from_string(std::string_view name);
 
 struct EquilibriumOptions {
   FiniteMethod method = FiniteMethod::quasi_newton;
-  /// Norm of the unbalanced forces over that of the forces that act: of loads, pre-strain, held surface and tool.
+  /// Norm of the unbalanced forces over that of the forces that act: of loads, pre-strain, held surface and tool, and
+  /// that of a tool with friction, or bonded, at the end of the step before: it may pass through zero, or let go.
   double tolerance = 1e-3;
   int maximum_iterations = 100; // of one step; then it is halved
   int halvings = 6;             // of a step, before Newton's method is asked
   int memory = 20;              // steps that are remembered
   double least_jacobian = 0.01; // the line search stops short of it
   double penetration = 1e-3;    // of the tool into the middles of shares, and of lips into each other, in spacings
-  bool fall_back = true;        // whether Newton's method is asked at all
+  /// Change of the forces along the tool's surface by a last round, over the tool's forces; not below the tolerance.
+  double unsettled = 1e-3;
+  bool fall_back = true; // whether Newton's method is asked at all
   /// Iterations beyond `few_iterations` a step, summed over steps, after which the tangent at the present state
   /// preconditions in place of that at rest: what assembling and factoring it takes, in iterations. 0: never.
   int worth_of_tangent = 30;
@@ -52,9 +55,11 @@ struct EquilibriumStatus {
   double energy = 0;                     // J, strain energy
   int touching = 0;                      // shares that touch the tool
   int closed = 0;                        // pairs of lips that touch each other
-  double penetration = 0;                // in spacings, of the tool or of lips
+  double penetration = 0;                // in spacings, of the tool or of lips, or of what is bonded off its place
   Vector3 tool_force = Vector3::Zero();  // N, of the body on the tool
   Vector3 tool_torque = Vector3::Zero(); // N m, of the same about the tool's point
+  Vector3 friction = Vector3::Zero();    // N, the part of tool_force that friction exerts along the tool's surface
+  double friction_work = 0;              // J, taken by friction on the way
 };
 
 class Equilibrium {
@@ -62,8 +67,16 @@ class Equilibrium {
   /// The body outlives it, and is used by one of these at a time.
   explicit Equilibrium(const FiniteBody& body, const EquilibriumOptions& options = {});
 
-  /// The tool that presses, and the nodes that it may touch; as FiniteContact.
-  void set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates);
+  /// The tool that presses, and the nodes that it may touch; as FiniteContact. With friction, or bonded, what happens
+  /// depends on the way: a solve then goes there in strides of a tenth, or half, of the tool's tip radius, and where
+  /// the tool was nowhere it comes back along its axis from where it is clear of all candidates.
+  void set_contact(const topology::ToolShape& tool, const std::vector<int>& candidates,
+                   const FiniteContactOptions& options = {});
+  /// A tool at that pose holds the shares of these nodes from now on, in place of any other tool: they move with it as
+  /// with a rigid body.
+  void take_hold(const topology::ToolShape& tool, const topology::ToolPose& pose, const std::vector<int>& nodes);
+  /// There is no tool any more.
+  void let_go();
   /// Faces of a cut that do not go through each other; as FiniteLips.
   void set_lips(std::vector<LipPair> pairs);
 
@@ -75,9 +88,13 @@ class Equilibrium {
 
   [[nodiscard]] const VectorX& coefficients() const { return state_.coefficients; } // m, 3 a node
   /// Begins from these, as from a state with that part of the loads and the tool there (empty: nowhere), to which a
-  /// halved step goes back. Nothing is remembered of the way, nor of forces of contact.
+  /// halved step goes back. Nothing is remembered of the way, nor of forces of contact, but `shares`, one a candidate
+  /// (empty: nothing touches).
   void set_coefficients(const VectorX& coefficients, double load_factor = 0,
-                        const std::optional<topology::ToolPose>& tool = std::nullopt);
+                        const std::optional<topology::ToolPose>& tool = std::nullopt,
+                        std::vector<ContactShare> shares = {});
+  /// Of every candidate of the contact, as the last solve has left them.
+  [[nodiscard]] const std::vector<ContactShare>& contact_shares() const { return state_.shares; }
   /// Force of the constraint of every prescribed entry on the body, N.
   [[nodiscard]] const std::vector<Vector3>& constraint_forces() const { return reactions_; }
   [[nodiscard]] const FiniteContact* contact() const { return contact_ ? &*contact_ : nullptr; }
@@ -94,7 +111,9 @@ class Equilibrium {
     std::vector<Vector3> prescribed;
     double load_factor = 0;
     std::optional<topology::ToolPose> tool;
-    std::vector<double> contact_forces, lip_forces;
+    std::vector<ContactShare> shares; // of the contact
+    std::vector<double> lip_forces;
+    double gripped = 0; // N, norm of the nodal forces of a tool that is not without friction
   };
   struct CarriedTangent { // at a state that has been
     RestOperator matrix;
@@ -108,6 +127,8 @@ class Equilibrium {
   };
   [[nodiscard]] State target_of(const FiniteLoading& loading) const;
   [[nodiscard]] State between(const State& from, const State& to, double part) const;
+  [[nodiscard]] bool minds_way() const; // the contact does: it rubs or bonds
+  [[nodiscard]] int strides(const State& target) const;
   /// Maps that carry the body of the preconditioner to a state, given those of its nodes from rest.
   [[nodiscard]] std::vector<Matrix3> carrying(std::vector<Matrix3> maps) const;
   [[nodiscard]] const RestOperator& preconditioner() const { return tangent_ ? tangent_->matrix : rest_; }
@@ -129,6 +150,8 @@ class Equilibrium {
   [[nodiscard]] std::vector<int> touching() const;
   /// Deepest that the tool lies in the body or lips in each other at the last evaluation, spacings.
   [[nodiscard]] double deepest(const State& target) const;
+  /// Whether the forces along the tool's surface are those of the places found.
+  [[nodiscard]] bool is_settled(const State& target, const Trial& now) const;
   [[nodiscard]] VectorX newton_direction(const Trial& now, EquilibriumStatus& status);
   [[nodiscard]] VectorX motion(const State& from, const State& to) const;
 
@@ -151,7 +174,7 @@ class Equilibrium {
   std::vector<Matrix3> maps_; // from the stress-free state, a node each
   FiniteForces forces_;
   std::vector<Vector3> reactions_;
-  double least_seen_ = 1, last_residual_ = 0;
+  double least_seen_ = 1, last_residual_ = 0, last_unsettled_ = 0;
   double prestrain_forces_ = 0; // N, norm of those that the pre-strain of the body at rest exerts
 };
 

@@ -231,7 +231,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   if (command.bench)
     return run_bench(command, watch, progress);
   const Scenario scenario = read_scenario(command.scenario);
-  require_run(scenario);
+  require_hand(scenario);
   const HapticSettings& settings = scenario.haptics;
   require_clock(command, settings);
   HapticRun run;

@@ -441,6 +441,7 @@ namespace {
 /// is.
 void bond(const std::vector<Vector3>& displacements, const topology::ToolPose& pose, solvers::ContactState& state) {
   state.bond = displacements;
+  state.tool_torque = solvers::torque_about(state, pose.point); // so far about the origin
   state.pose = pose;
 }
 

@@ -1,7 +1,9 @@
 #include "src/model/finite_model.hpp"
 
+#include "solvers/contact/friction.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "topology/base/errors.hpp"
+#include "topology/search/point_tree.hpp"
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -16,6 +18,8 @@ namespace {
 constexpr double most_penetration = 1e-3;
 /// Of the acting forces, gravity among them: a small force of contact is to be told from what is left.
 constexpr double most_unbalanced = 1e-4;
+/// Of the spacing: nodes as near to each other are the same.
+constexpr double same_place = 1e-9;
 
 solvers::EquilibriumOptions equilibrium_options(Patience patience) {
   solvers::EquilibriumOptions options;
@@ -56,12 +60,6 @@ Hindrance hindrance_of(const Scenario& scenario) {
     return {"cut.sight = \"appended\"", line};
   if (scenario.tearing.enabled)
     return {"[tearing]", line};
-  if (scenario.tool && scenario.tool->grasp)
-    return {"tool.shape = \"grasper\"", scenario.tool->line};
-  if (scenario.contact.condition != solvers::ContactCondition::frictionless)
-    return {fmt::format("contact.condition = \"{}\"",
-                        scenario.contact.condition == solvers::ContactCondition::bonded ? "bonded" : "frictional"),
-            line};
   return {};
 }
 
@@ -99,9 +97,26 @@ void require_run(const Scenario& scenario) {
   if (hindrance.what.empty())
     return;
   throw InputError(fmt::format("{}:{}: {} does not go with material.law = \"{}\"; possible with it: fixed regions, "
-                               "gravity, pre-tension, precuts, a blade that nothing resists, and a tool that presses "
-                               "without friction, by method galerkin",
+                               "gravity, pre-tension, precuts, a blade that nothing resists, and a tool that presses, "
+                               "rubs, bonds or grasps, by method galerkin",
                                scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
+}
+
+void require_hand(const Scenario& scenario) {
+  require_run(scenario);
+  if (!is_nonlinear(scenario.law) || !scenario.tool)
+    return;
+  const bool grasps = scenario.tool->grasp.has_value();
+  if (!grasps && scenario.contact.condition == solvers::ContactCondition::frictionless)
+    return;
+  const std::string what =
+      grasps ? "tool.shape = \"grasper\""
+             : fmt::format("contact.condition = \"{}\"",
+                           scenario.contact.condition == solvers::ContactCondition::bonded ? "bonded" : "frictional");
+  throw InputError(fmt::format(
+      "{}:{}: {} does not go with material.law = \"{}\" in a hand; possible there: a tool that "
+      "presses without friction",
+      scenario.file.string(), grasps ? scenario.tool->line : scenario.law.line, what, name_of(scenario.law)));
 }
 
 bool can_run(const Scenario& scenario) {
@@ -119,11 +134,59 @@ FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const t
   if (!touched)
     return;
   tool_ = scenario.tool->shape;
-  candidates_ = free_surface(body_.problem());
-  equilibrium_.set_contact(*tool_, candidates_);
+  if (scenario.tool->grasp) // it presses on nothing
+    return;
+  set_candidates(free_surface(body_.problem()));
+  equilibrium_.set_contact(*tool_, candidates_,
+                           {.condition = scenario.contact.condition, .friction = scenario.contact.friction});
+  lay_skin();
+}
+
+void FiniteModel::set_candidates(std::vector<int> nodes) {
+  candidates_ = std::move(nodes);
+  rest_.clear();
   for (const int node : candidates_)
     rest_.push_back(body_.contact_mean(node).centroid);
-  lay_skin();
+}
+
+void FiniteModel::take_hold(const std::vector<int>& nodes, const topology::ToolPose& pose) {
+  equilibrium_.take_hold(*tool_, pose, nodes);
+  set_candidates(nodes);
+  pose_ = pose;
+}
+
+void FiniteModel::hold_on(const std::vector<int>& nodes, const FiniteModel& before) {
+  take_hold(nodes, *before.pose_);
+  std::vector<solvers::ContactShare> shares(nodes.size());
+  for (std::size_t c = 0; c < nodes.size(); ++c) {
+    std::size_t nearest = 0;
+    for (std::size_t k = 0; k < before.rest_.size(); ++k)
+      if ((before.rest_[k] - rest_[c]).squaredNorm() < (before.rest_[nearest] - rest_[c]).squaredNorm())
+        nearest = k;
+    shares[c] = before.equilibrium_.contact_shares()[nearest];
+    shares[c].anchor += rest_[c] - before.rest_[nearest];
+  }
+  equilibrium_.set_coefficients(equilibrium_.coefficients(), 1, before.pose_, std::move(shares));
+}
+
+// What is let go may be far from where it comes to rest, and the way there is no equilibrium: it is found from the body
+// at rest.
+void FiniteModel::let_go() {
+  equilibrium_.let_go();
+  begin_anew();
+  set_candidates({});
+  pose_.reset();
+}
+
+std::vector<FiniteModel::Touch> FiniteModel::touches() const {
+  std::vector<Touch> touching;
+  if (equilibrium_.contact() == nullptr || !pose_)
+    return touching;
+  const std::vector<Vector3> forces = equilibrium_.contact()->forces();
+  for (std::size_t c = 0; c < forces.size(); ++c)
+    if (!forces[c].isZero(0))
+      touching.push_back({rest_[c], body_.problem().nodes.spacings[candidates_[c]]});
+  return touching;
 }
 
 void FiniteModel::lay_skin() {
@@ -171,12 +234,67 @@ void FiniteModel::summarise_contact(FiniteStep& step) const {
                                                               0.5 * body_.problem().nodes.spacings[candidates_[c]]);
 }
 
+// Of what is bonded or held, what does not act along the normals of the deformed surface.
+Vector3 FiniteModel::force_along_surface() const {
+  const std::vector<Vector3> forces = equilibrium_.contact()->forces();
+  const std::vector<Matrix3> maps = body_.piola_maps(equilibrium_.coefficients());
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t c = 0; c < forces.size(); ++c) {
+    const int node = candidates_[c];
+    const Vector3 normal = (maps[node].inverse().transpose() * body_.problem().nodes.normals[node]).normalized();
+    sum -= solvers::along_surface(forces[c], normal);
+  }
+  return sum;
+}
+
 void FiniteModel::go_on_from(const BodyModel& before) {
   const solvers::NodeCloud& nodes = body_.problem().nodes;
   VectorX start(3 * static_cast<Eigen::Index>(nodes.size()));
   for (int i = 0; i < nodes.size(); ++i)
     start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(nodes.positions[i]).displacement;
-  equilibrium_.set_coefficients(start, 1, before.finite != nullptr && tool_ ? before.finite->pose_ : std::nullopt);
+  if (before.finite == nullptr || equilibrium_.contact() == nullptr) {
+    equilibrium_.set_coefficients(start, 1);
+    return;
+  }
+  const FiniteModel& old = *before.finite;
+  std::vector<solvers::ContactShare> shares;
+  if (!old.may_begin_anew())
+    shares = shares_from(old, start);
+  equilibrium_.set_coefficients(start, 1, old.pose_, std::move(shares));
+}
+
+// A node that both bodies have keeps its place on the tool. One that is new where the tool touches sticks where it is
+// now, with the force of the nearest share that was there, by their areas.
+std::vector<solvers::ContactShare> FiniteModel::shares_from(const FiniteModel& before, const VectorX& start) const {
+  const std::vector<solvers::ContactShare>& old = before.equilibrium_.contact_shares();
+  const solvers::NodeCloud& nodes = body_.problem().nodes;
+  std::vector<Vector3> places;
+  for (const int node : before.candidates_)
+    places.push_back(before.body_.problem().nodes.positions[node]);
+  const topology::PointTree tree(places);
+  std::vector<solvers::ContactShare> shares(candidates_.size());
+  for (std::size_t c = 0; c < candidates_.size(); ++c) {
+    const topology::PointTree::Found nearest = tree.nearest(nodes.positions[candidates_[c]]);
+    const double spacing = nodes.spacings[candidates_[c]];
+    if (nearest.index < 0 || !old[nearest.index].touches || nearest.squared_distance > spacing * spacing)
+      continue;
+    shares[c] = old[nearest.index];
+    if (nearest.squared_distance < same_place * same_place * spacing * spacing) {
+      shares[c].anchor += rest_[c] - before.rest_[nearest.index];
+      continue;
+    }
+    const double area = before.body_.contact_mean(before.candidates_[nearest.index]).area;
+    const double ratio = area > 0 ? body_.contact_mean(candidates_[c]).area / area : 1;
+    shares[c].pressing *= ratio;
+    shares[c].along *= ratio;
+    shares[c].anchor = equilibrium_.contact()->place(static_cast<int>(c), start);
+  }
+  return shares;
+}
+
+bool FiniteModel::may_begin_anew() const {
+  const std::vector<solvers::ContactShare>& shares = equilibrium_.contact_shares();
+  return std::none_of(shares.begin(), shares.end(), [](const auto& share) { return share.touches; });
 }
 
 void FiniteModel::begin_anew() {
@@ -212,7 +330,7 @@ FiniteStep FiniteModel::solve(double time, const std::optional<topology::ToolPos
 
 FiniteStep FiniteModel::solve_step(double time, const std::optional<topology::ToolPose>& pose) {
   solvers::FiniteLoading loading;
-  if (tool_)
+  if (equilibrium_.contact() != nullptr)
     loading.tool = pose;
   const solvers::EquilibriumStatus status = equilibrium_.solve(loading);
   body_.accept_step(equilibrium_.coefficients());
@@ -227,6 +345,9 @@ FiniteStep FiniteModel::solve_step(double time, const std::optional<topology::To
   step.residual = status.residual;
   step.least_jacobian = status.least_jacobian;
   if (loading.tool) {
+    step.tangential = equilibrium_.contact()->options().condition == solvers::ContactCondition::bonded
+                          ? force_along_surface()
+                          : status.friction;
     summarise_contact(step);
     step.penetration = deepest(*pose);
   }

@@ -1,5 +1,6 @@
 // The body of a scenario whose law is not linear: at finite strain, in equilibrium with its weight, its pre-strain, the
-// pressure in its cuts and a tool that presses without friction. The faces of its cuts do not go through each other.
+// pressure in its cuts and a tool that presses, rubs, bonds or holds. The faces of its cuts do not go through each
+// other.
 #pragma once
 
 #include "solvers/finite/equilibrium.hpp"
@@ -9,11 +10,15 @@ namespace spherecut::app {
 
 /// Throws InputError naming file, line, what a run cannot compute with the scenario's law and what it can.
 void require_run(const Scenario& scenario);
+/// The same of a session in a hand, which presses without friction alone.
+void require_hand(const Scenario& scenario);
 [[nodiscard]] bool can_run(const Scenario& scenario);
 
 /// One equilibrium.
 struct FiniteStep {
-  Vector3 force = Vector3::Zero();  // N, of the body on the tool
+  Vector3 force = Vector3::Zero(); // N, of the body on the tool
+  /// N, the part of it along the surface: with friction that of the tool, bonded or held that of the deformed body.
+  Vector3 tangential = Vector3::Zero();
   Vector3 torque = Vector3::Zero(); // N m, of the same about the tool's point
   double contact_radius = 0;        // m, as ContactState::contact_radius
   int active_nodes = 0, iterations = 0;
@@ -34,10 +39,24 @@ class FiniteModel {
   FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, const BodyModel& nodes,
               bool touched, Patience patience);
 
-  /// Begins where another body of the same organ, on other nodes or with less of the cut, has come to.
+  /// Begins where another body of the same organ, on other nodes or with less of the cut, has come to. Friction and
+  /// bonds go on at the nodes that both have.
   void go_on_from(const BodyModel& before);
-  /// Begins at rest again.
+  /// Begins at rest again, where nothing is lost by that: friction, bonds and a grasper remember their way.
   void begin_anew();
+  [[nodiscard]] bool may_begin_anew() const;
+
+  /// The tool, a grasper at that pose, takes hold of these nodes, where they are now.
+  void take_hold(const std::vector<int>& nodes, const topology::ToolPose& pose);
+  /// It holds these, of this body, as it held those nearest to them of the body before.
+  void hold_on(const std::vector<int>& nodes, const FiniteModel& before);
+  void let_go();
+  /// A share that touches the tool: its middle at rest, and the nodes' spacing there, m.
+  struct Touch {
+    Vector3 place;
+    double spacing;
+  };
+  [[nodiscard]] std::vector<Touch> touches() const;
 
   /// Goes on to equilibrium at `time`, s, with the loads and the tool, which is nowhere when it has no pose. Throws
   /// NumericalError: the state is then what it was before, but that a viscoelastic body may have come to rest under its
@@ -80,10 +99,13 @@ class FiniteModel {
   [[nodiscard]] std::vector<int> places_among_candidates(const std::vector<int>& nodes) const;
   [[nodiscard]] double deepest(const topology::ToolPose& pose) const;
   void summarise_contact(FiniteStep& step) const;
+  void set_candidates(std::vector<int> nodes);
+  [[nodiscard]] Vector3 force_along_surface() const;
+  [[nodiscard]] std::vector<solvers::ContactShare> shares_from(const FiniteModel& before, const VectorX& start) const;
 
   solvers::FiniteBody body_;
   solvers::Equilibrium equilibrium_;
-  std::vector<int> candidates_;            // free nodes of the surface
+  std::vector<int> candidates_;            // free nodes of the surface; of a grasper those that it holds
   std::vector<Vector3> rest_;              // m, of each the middle of its share
   std::optional<double> time_;             // s, of the last solution
   std::optional<topology::ToolPose> pose_; // of the tool then

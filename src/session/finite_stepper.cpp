@@ -40,6 +40,8 @@ bool FiniteStepper::solve(const StepSample& sample, bool is_solved) {
 
 std::vector<Vector3> places_of_contact(const SessionState& state) {
   std::vector<Vector3> places{state.zone.centre()->point};
+  if (state.scenario.tool->grasp) // it touches where it takes hold
+    return places;
   const double pitch = state.scenario.contact.follow_fraction * state.zone.spacing().radius;
   for (const StepSample& sample : state.steps) {
     if (!sample.tool)

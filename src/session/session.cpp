@@ -3,6 +3,7 @@
 #include "src/base/stage_timer.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "src/session/blade_cutting.hpp"
+#include "src/session/finite_grip.hpp"
 #include "src/session/finite_stepper.hpp"
 #include "src/session/setting_out.hpp"
 #include "src/session/step_report.hpp"
@@ -12,7 +13,6 @@
 #include "topology/base/errors.hpp"
 
 #include <algorithm>
-#include <fmt/format.h>
 #include <utility>
 
 namespace spherecut::app {
@@ -136,6 +136,10 @@ void Session::Parts::step_linear(const StepSample& sample, std::vector<topology:
 
 void Session::Parts::step_finite(const StepSample& sample, std::vector<topology::BladePose> passed,
                                  StepResult& result) {
+  {
+    const StageTimer timer(result.stages.solve);
+    follow_grip(sample, state, grasping);
+  }
   const std::optional<CutReport> taken = cutting.take_report();
   bool is_solved = false;
   if (has_cuts(state.scenario)) {
@@ -224,12 +228,8 @@ bool Session::Parts::take_hold(const StepSample& sample) {
   } catch (const NumericalError&) { // in front of the surface
   }
   Grasp grasp = grasping.reach_for(at_rest, *sample.tool, model, state.zone.fine());
-  const double away = (grasp.place + model.at(grasp.place).displacement - sample.tool->point).norm();
-  if (const double reach = topology::tip_radius(state.scenario.tool->shape); away > reach) { // led by a hand
-    state.log.warn(
-        "grip", fmt::format("t = {:g} s: the grasper holds nothing, it is {:.3g} m from the surface; allowed: within "
-                            "tool.radius = {:g} m",
-                            sample.time, away, reach));
+  if (const std::optional<std::string> miss = grasping.miss(grasp, sample, model)) { // led by a hand
+    state.log.warn("grip", *miss);
     return false;
   }
   const std::vector<int> nodes = grasping.nodes_between(grasp, model, state.zone.fine());

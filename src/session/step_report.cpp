@@ -91,6 +91,7 @@ void StepReport::tell_finite(StepResult& result) {
   const FiniteStep& step = state_.model.finite->last();
   result.force = step.force;
   result.torque = step.torque;
+  result.tangential = step.tangential;
   result.contact_radius = step.contact_radius;
   result.active_nodes = step.active_nodes;
   result.candidates = state_.model.finite->candidates();

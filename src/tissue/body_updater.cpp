@@ -168,6 +168,8 @@ void BodyUpdater::build_finite_cut(BodyModel& next, BodyUpdate& report) const {
   {
     const StageTimer timer(report.seconds.assembly);
     make_finite(state_, next, &model_);
+    if (grasping_.holds())
+      next.finite->hold_on(grasping_.nodes(next, state_.zone.fine()), *model_.finite);
   }
   report_body(next, 0, report);
 }

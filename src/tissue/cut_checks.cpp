@@ -103,17 +103,19 @@ std::vector<int> unheld_pieces(const topology::Wound& wound, const std::vector<F
 
 void require_clear_of_tool(const topology::Incision& incision, const BodyModel& before,
                            solvers::ContactCondition condition) {
-  if (!before.state || before.state->tool.active_nodes == 0)
+  std::vector<FiniteModel::Touch> touches;
+  if (before.finite != nullptr && condition != solvers::ContactCondition::frictionless)
+    touches = before.finite->touches();
+  for (std::size_t c = 0; before.state && c < before.patch.nodes.size(); ++c)
+    if (before.state->tool.active[c] != 0)
+      touches.push_back({before.patch.rest[c], before.patch.spacings[c]});
+  if (touches.empty())
     return;
   if (condition == solvers::ContactCondition::bonded)
     throw InputError(
         "the tool sticks to the tissue (contact.condition = bonded), and a cut would forget where; allowed: "
         "a frictionless tool, or cutting while the tool is away");
-  for (std::size_t c = 0; c < before.patch.nodes.size(); ++c) {
-    if (before.state->tool.active[c] == 0)
-      continue;
-    const Vector3& x = before.patch.rest[c];
-    const double reach = before.patch.spacings[c];
+  for (const auto& [x, reach] : touches) {
     if (incision.closest(x, reach) && !(before.incision != nullptr && before.incision->closest(x, reach)))
       throw InputError(
           fmt::format("the blade cuts where the tool is pressing: within {:.3g} m of the contact at [{:.4g}, "

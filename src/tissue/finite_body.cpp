@@ -47,7 +47,7 @@ void solve_finite(double time, const std::optional<topology::ToolPose>& pose, Bo
   try {
     model.finite->solve(time, pose);
   } catch (const NumericalError&) {
-    if (model.finite->coefficients().isZero(0)) // it has begun there
+    if (model.finite->coefficients().isZero(0) || !model.finite->may_begin_anew()) // it has begun there
       throw;
     model.finite->begin_anew();
     model.finite->solve(time, pose);

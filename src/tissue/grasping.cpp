@@ -68,6 +68,16 @@ Grasp Grasping::reach_for(const Vector3& at_rest, const topology::ToolPose& pose
   return grasp;
 }
 
+std::optional<std::string> Grasping::miss(const Grasp& grasp, const StepSample& sample, const BodyModel& model) const {
+  const double away = (grasp.place + model.at(grasp.place).displacement - sample.tool->point).norm();
+  const double reach = topology::tip_radius(scenario_.tool->shape);
+  if (away <= reach)
+    return std::nullopt;
+  return fmt::format("t = {:g} s: the grasper holds nothing, it is {:.3g} m from the surface; allowed: within "
+                     "tool.radius = {:g} m",
+                     sample.time, away, reach);
+}
+
 std::vector<Vector3> Grasping::displacements(const topology::ToolPose& pose, const BodyModel& model) const {
   std::vector<Vector3> given;
   for (const Vector3& x : model.patch.rest) {

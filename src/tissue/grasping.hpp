@@ -40,6 +40,9 @@ class Grasping {
   /// The place of the surface at rest nearest to `at_rest`, and the nodes there that will stay.
   [[nodiscard]] Grasp reach_for(const Vector3& at_rest, const topology::ToolPose& pose, const BodyModel& model,
                                 double fine) const;
+  /// Why jaws about this place, which has moved with the model, would hold nothing: the tool is too far from it.
+  [[nodiscard]] std::optional<std::string> miss(const Grasp& grasp, const StepSample& sample,
+                                                const BodyModel& model) const;
   void take(Grasp grasp) { grasp_ = std::move(grasp); }
   void let_go() { grasp_.reset(); }
 

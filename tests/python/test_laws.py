@@ -98,6 +98,33 @@ def pressed(law, *, nodes=None, tolerance=1e-11, **options):
     return body, state, status
 
 
+def test_a_tool_rubs_sticks_and_holds():
+    """Friction keeps Coulomb's limit and pulls against the way; what is held goes along and comes back when let go."""
+    domain, cloud = block_nodes(0.009)
+    base = sc.Held(sc.Region.half_space([0, 0, 0], [0, 0, 1]))
+    body = sc.FiniteBody(domain, cloud, sc.Law.neo_hookean(MU, LOOSE), [base])
+    x = cloud.positions
+    top = np.flatnonzero(cloud.on_surface() & (x[:, 2] > 0.02 - 1e-9) & (np.hypot(x[:, 0], x[:, 1]) < 0.014))
+    state = sc.Equilibrium(body)
+    ball = sc.Tool.sphere_tip(0.03)
+    drawn = {}
+    for condition, friction in [("frictionless", 0.0), ("frictional", 0.2), ("bonded", 0.0)]:
+        state.set_coefficients(np.zeros_like(state.coefficients))
+        state.set_contact(ball, top, condition, friction)
+        state.solve(ball.pose_at([0, 0, 0.017]))
+        drawn[condition] = -state.solve(ball.pose_at([0.002, 0, 0.017])).tool_force[0]
+    assert drawn["bonded"] > drawn["frictional"] > drawn["frictionless"]
+    state.set_coefficients(np.zeros_like(state.coefficients))
+    state.take_hold(ball, ball.pose_at([0, 0, 0.02]), top)
+    assert state.solve(ball.pose_at([0, 0, 0.022])).tool_force[2] < 0
+    assert np.abs(body.nodal_displacements(state.coefficients)[top, 2] - 0.002).max() < 6e-4
+    state.let_go()
+    state.solve()
+    assert np.abs(state.coefficients).max() < 1e-5
+    with pytest.raises(ValueError, match="coefficient of friction"):
+        state.set_contact(ball, top, "frictional", -1.0)
+
+
 @pytest.fixture(scope="module", params=[LOOSE, NEARLY_RIGID], ids=["nu 0.3", "nu 0.49"])
 def press(request):
     kappa = request.param
@@ -196,9 +223,9 @@ def test_a_scenario_with_a_law_of_functions(own, tmp_path):
         import pickle
 
         pickle.dumps(scenario.with_law(law))
-    rubbing = text.replace('law = "neo_hookean"\n', "") + '\n[contact]\ncondition = "frictional"\nfriction = 0.3\n'
-    with pytest.raises(sc.InputError, match='contact.condition = "frictional" does not go with material.law = "functions"'):
-        sc.run(sc.Scenario.from_text(rubbing).with_law(law))
+    collocated = text.replace('law = "neo_hookean"\n', "") + '\n[method]\nname = "collocation"\n'
+    with pytest.raises(sc.InputError, match='method.name = "collocation" does not go with material.law = "functions"'):
+        sc.run(sc.Scenario.from_text(collocated).with_law(law))
 
 
 def test_an_anisotropic_law_of_functions():

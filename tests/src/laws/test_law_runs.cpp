@@ -208,8 +208,6 @@ TEST_CASE("What a law other than linear does not go with is refused with its lin
   };
   const std::string small = with_law(small_scenario), block = with_law(cut_block);
   refused(small + "[method]\nname = \"collocation\"\n", "method.name = \"collocation\"");
-  refused(small + "[contact]\ncondition = \"bonded\"\n", "contact.condition = \"bonded\"");
-  refused(small + "[contact]\ncondition = \"frictional\"\nfriction = 0.3\n", "contact.condition = \"frictional\"");
   refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 100") + incision_at_end,
           "[blade] with material.toughness");
   refused(block + disc_precut + "[cut]\nlips = \"sticking\"\n", "cut.lips = \"sticking\"");
