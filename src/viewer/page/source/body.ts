@@ -4,28 +4,27 @@ import {
   BufferGeometry,
   Color,
   DynamicDrawUsage,
-  FrontSide,
   Group,
   LineBasicMaterial,
   LineSegments,
   Mesh,
-  MeshPhongMaterial,
+  type ShaderMaterial,
 } from 'three';
 import { linearTable, sequential } from './colours';
 import { Part, type Scalars, type Topology, type Vec3 } from './protocol';
-import { castRay, frontEdges, frontFaces, type Hit, lipDistance, lipEdges, trianglesOf, vertexNormals } from './surface';
+import { belowLips, castRay, frontEdges, frontFaces, type Hit, lipDistance, lipEdges, onLips, trianglesOf, vertexNormals } from './surface';
+import { Lighting, tissueMaterial } from './tissue';
 
-const tissueColour = new Color('#9a4b45');
-const wallColour = new Color('#84191f');
-const wallGlow = 0.15; // of their own: walls that face each other get little light
-const lipColour = new Color('#ffe3c2');
-const frontColour = new Color('#ffd24d');
+const surfaceColours = { dark: new Color('#4a1714'), light: new Color('#80302a'), deep: new Color('#5c0d0f') };
+const wallColours = { dark: new Color('#6b1013'), light: new Color('#9c2023'), deep: new Color('#240305') };
+const lipColour = new Color('#f0c49a');
+const frontColour = new Color('#d9a441');
 const tableSize = 256;
 const table = linearTable(sequential, tableSize);
 
 /** One of the two shaded parts: shares positions with the other, has normals of its own. */
 interface Skin {
-  mesh: Mesh<BufferGeometry, MeshPhongMaterial>;
+  mesh: Mesh<BufferGeometry, ShaderMaterial>;
   triangles: Uint32Array;
   drawn: BufferAttribute; // those of them that are drawn, in front of the geometry's index
   normals: BufferAttribute;
@@ -40,6 +39,7 @@ export interface Snapshot {
 
 export class Body {
   readonly group = new Group();
+  readonly lighting = new Lighting();
   topology: Topology | null = null;
   private positions: BufferAttribute | null = null;
   private colours: BufferAttribute | null = null;
@@ -58,33 +58,27 @@ export class Body {
     colours.setUsage(DynamicDrawUsage);
     this.positions = positions;
     this.colours = colours;
-    const skin = (triangles: Uint32Array, colour: Color, shininess: number, glow: number): Skin => {
+    const rest = new BufferAttribute(topology.rest, 3);
+    const skin = (triangles: Uint32Array, rim: Float32Array, material: ShaderMaterial): Skin => {
       const geometry = new BufferGeometry();
       const normals = new BufferAttribute(new Float32Array(3 * topology.vertexCount), 3);
       normals.setUsage(DynamicDrawUsage);
       geometry.setAttribute('position', positions);
       geometry.setAttribute('normal', normals);
       geometry.setAttribute('color', colours);
+      geometry.setAttribute('rest', rest);
+      geometry.setAttribute('rim', new BufferAttribute(rim, 1));
       const drawn = new BufferAttribute(triangles.slice(), 1);
       drawn.setUsage(DynamicDrawUsage);
       geometry.setIndex(drawn);
-      const material = new MeshPhongMaterial({
-        color: colour,
-        emissive: colour.clone().multiplyScalar(glow),
-        specular: new Color('#1c1716'),
-        shininess,
-        side: FrontSide,
-        polygonOffset: true,
-        polygonOffsetFactor: 1,
-        polygonOffsetUnits: 1,
-      });
       const mesh = new Mesh(geometry, material);
       mesh.frustumCulled = false;
       this.group.add(mesh);
       return { mesh, triangles, drawn, normals };
     };
-    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), tissueColour, 26, 0);
-    this.wall = skin(trianglesOf(topology, (part) => part !== Part.organ), wallColour, 8, wallGlow);
+    const walls = trianglesOf(topology, (part) => part !== Part.organ);
+    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), onLips(topology), tissueMaterial(this.lighting, surfaceColours, false));
+    this.wall = skin(walls, belowLips(topology, walls), tissueMaterial(this.lighting, wallColours, true));
     const lines = (edges: Uint32Array, colour: Color): void => {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', positions);
@@ -125,13 +119,9 @@ export class Body {
       }
       this.colours.needsUpdate = true;
     }
-    for (const [skin, own, glow] of [[this.organ, tissueColour, 0], [this.wall, wallColour, wallGlow]] as const) {
-      const material = skin.mesh.material;
-      if (material.vertexColors !== coloured) material.needsUpdate = true;
-      material.vertexColors = coloured;
-      if (coloured) material.color.set(0xffffff);
-      else material.color.copy(own);
-      material.emissive.copy(own).multiplyScalar(coloured ? 0 : glow);
+    for (const { mesh } of [this.organ, this.wall]) {
+      if (mesh.material.vertexColors !== coloured) mesh.material.needsUpdate = true;
+      mesh.material.vertexColors = coloured;
     }
   }
 
@@ -143,7 +133,7 @@ export class Body {
       if (!skin) continue;
       const material = skin.mesh.material;
       material.transparent = transparent;
-      material.opacity = transparent ? 0.28 : 1;
+      material.uniforms['opacity']!.value = transparent ? 0.28 : 1;
       material.depthWrite = !transparent;
       material.wireframe = wireframe;
       material.needsUpdate = true;
@@ -164,6 +154,16 @@ export class Body {
       skin.mesh.geometry.setDrawRange(0, count);
       skin.drawn.needsUpdate = true;
     }
+  }
+
+  /** The organ's own surface, as it is now; not to be kept. */
+  surface(): Snapshot | null {
+    if (!this.positions || !this.organ) return null;
+    return {
+      positions: this.positions.array as Float32Array,
+      triangles: this.organ.triangles,
+      normals: this.organ.normals.array as Float32Array,
+    };
   }
 
   /** What rays can be cast at, as it is now. */
@@ -208,7 +208,7 @@ export class Body {
       this.group.remove(child);
       if (child instanceof Mesh || child instanceof LineSegments) {
         (child.geometry as BufferGeometry).dispose();
-        (child.material as LineBasicMaterial | MeshPhongMaterial).dispose();
+        (child.material as LineBasicMaterial | ShaderMaterial).dispose();
       }
     }
   }
