@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The page of `spherecut serve` under test: run.sh BUILD_FOLDER KIND [ARGUMENTS]
-#   unit             the protocol's decoder and the surface, under node
+#   unit             the protocol's decoder, the surface, what shading is computed from, words of the server, under node
 #   browser [FOLDER] the page in Chromium against the server; pictures of it into a folder
 #   seen             likewise: what it composites, however it draws, after resizing, hiding, a lost context
 #   look             likewise: how it looks at first, tissue, wound, shadow, force, hint
@@ -26,7 +26,7 @@ skip() {
 node=$(command -v node || command -v nodejs) || skip "nodejs is not installed"
 [ -e "$build/page/index.html" ] || skip "the page is not built; that needs nodejs, npm and, once, the network"
 if [ "$kind" = unit ]; then
-  exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs" "$build/page-tests/trace.test.mjs" "$build/page-tests/advice.test.mjs"
+  exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs" "$build/page-tests/trace.test.mjs" "$build/page-tests/advice.test.mjs" "$build/page-tests/shading.test.mjs"
 fi
 command -v chromium >/dev/null || skip "the Debian package chromium is not installed"
 case $kind in browser | seen | look | controls | tear) kind=$kind.test ;; esac

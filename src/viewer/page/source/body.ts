@@ -12,7 +12,7 @@ import {
 } from 'three';
 import { linearTable, sequential } from './colours';
 import { Part, type Scalars, type Topology, type Vec3 } from './protocol';
-import { belowLips, castRay, frontEdges, frontFaces, type Hit, lipDistance, lipEdges, onLips, trianglesOf, vertexNormals } from './surface';
+import { belowLips, castRay, frontEdges, frontFaces, type Hit, isSmooth, lipDistance, lipEdges, onLips, trianglesOf, vertexNormals } from './surface';
 import { Lighting, tissueMaterial } from './tissue';
 
 const surfaceColours = { dark: new Color('#4a1714'), light: new Color('#80302a'), deep: new Color('#5c0d0f') };
@@ -46,6 +46,8 @@ export class Body {
   private organ: Skin | null = null;
   private wall: Skin | null = null;
   transparent = false; // as it is drawn
+  coloured = false; // by values
+  private epoch = -1; // of the surface
   private wireframe = false;
 
   /** Another surface; it is at rest until the first vertices come. */
@@ -92,6 +94,10 @@ export class Body {
     lines(frontEdges(topology), frontColour);
     this.setLook(this.transparent, this.wireframe);
     this.moved();
+    if (topology.epoch === this.epoch) return;
+    // Where a surface has edges the normals between its corners say nothing about its outline.
+    this.epoch = topology.epoch;
+    this.lighting.outline.value = Number(isSmooth(topology.rest, this.organ.triangles, this.organ.normals.array as Float32Array));
   }
 
   /** False: they are where they were. A tool that hovers is solved for too. */
@@ -106,8 +112,8 @@ export class Body {
   /** Colours by value between `low` and `high`; null: the tissue's own. */
   setScalars(scalars: Scalars | null, low: number, high: number): void {
     if (!this.colours || !this.organ || !this.wall) return;
-    const coloured = scalars !== null && scalars.values.length === this.colours.count;
-    if (coloured) {
+    const coloured = (this.coloured = scalars !== null && scalars.values.length === this.colours.count);
+    if (scalars && coloured) {
       const span = high > low ? (tableSize - 1) / (high - low) : 0;
       const target = this.colours.array as Float32Array;
       for (let i = 0; i < scalars.values.length; ++i) {

@@ -48,7 +48,8 @@ export function grainField(count: number): Float32Array {
   const field = new Float32Array(count ** 3);
   const next = numbers(7);
   for (const [cells, weight] of [[count / 8, 0.5], [count / 4, 0.35], [count / 2, 0.15]] as const) addNoise(field, count, cells, weight, next);
-  return field;
+  const mean = field.reduce((sum, height) => sum + height, 0) / field.length;
+  return field.map((height) => height - mean);
 }
 
 /** Red, green and blue: slope of the height along x, y, z; alpha: the height; each 0.5 at zero. */

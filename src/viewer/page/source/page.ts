@@ -17,7 +17,7 @@ import { savePicture } from './screenshot';
 import { castRay, type Hit } from './surface';
 import { type Ray, Stylus } from './stylus';
 import { nodeAlong } from './overlays';
-import { View } from './view';
+import { type Shading, View } from './view';
 
 const button = (id: string): HTMLButtonElement => element(id, HTMLButtonElement);
 const byId = (id: string): HTMLElement => element(id, HTMLElement);
@@ -318,6 +318,7 @@ export class Page {
     this.view.body.setLook(inside || this.panels.slice.value !== 'none', this.panels.wire.checked);
     this.view.tool.showSpring = this.panels.spring.checked;
     this.view.showPlan = this.panels.plan.checked;
+    this.view.shading = this.panels.shading.value as Shading;
     if (this.frame) this.view.tool.update(this.frame);
     if (!this.panels.supports.checked) this.support = null;
     if (this.panels.slice.value === 'none') this.slice = null;

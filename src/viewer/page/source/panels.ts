@@ -38,6 +38,7 @@ export class Panels {
   readonly plan = check('show-plan');
   readonly spring = check('show-spring');
   readonly colours = select('colours');
+  readonly shading = select('shading');
   readonly slice = select('slice');
   readonly sliceAxis = select('slice-axis');
   readonly slicePlace = check('slice-place');
@@ -54,7 +55,7 @@ export class Panels {
       input.addEventListener('change', ask);
     }
     this.slicePlace.addEventListener('input', ask);
-    for (const input of [this.wire, this.spring, this.plan]) input.addEventListener('change', () => host.look());
+    for (const input of [this.wire, this.spring, this.plan, this.shading]) input.addEventListener('change', () => host.look());
     this.scenario.addEventListener('change', () => host.scenario(this.scenario.value));
     element('modes', HTMLFieldSetElement).addEventListener('change', (event) => {
       if (event.target instanceof HTMLInputElement) host.mode(event.target.value as Mode);

@@ -74,9 +74,20 @@ export class Still {
    * first: a copy alone does not count as drawing, and the canvas would be cleared after it.
    */
   show(window: Window): void {
+    this.seen(true);
     this.renderer.setClearColor(0x000000, 0);
     this.renderer.clear(true, true, false);
     this.copyDepth(this.framebuffer, null, window);
+  }
+
+  /** What is kept is not seen: the whole picture is drawn over it. */
+  hide(): void {
+    this.seen(false);
+  }
+
+  private seen(shown: boolean): void {
+    const wanted = shown ? 'visible' : 'hidden';
+    if (this.under.style.visibility !== wanted) this.under.style.visibility = wanted;
   }
 
   /** Forgets what was lost with the context. */

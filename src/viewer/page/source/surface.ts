@@ -54,6 +54,22 @@ export function vertexNormals(positions: Float32Array, triangles: Uint32Array, n
   }
 }
 
+/** Whether a surface is smooth: its triangles turn as the normals of their corners do, but for one corner in fifty. */
+export function isSmooth(positions: Float32Array, triangles: Uint32Array, normals: Float32Array): boolean {
+  let sharp = 0;
+  const corner = (i: number, d: number): number => positions[3 * triangles[i]! + d]!;
+  for (let i = 0; i < triangles.length; i += 3) {
+    const [ux, uy, uz, vx, vy, vz] = [1, 2].flatMap((k) => [0, 1, 2].map((d) => corner(i + k, d) - corner(i, d))) as [number, number, number, number, number, number];
+    const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+    const length = Math.hypot(x, y, z);
+    for (let k = 0; k < 3; ++k) {
+      const at = 3 * triangles[i + k]!;
+      if (x * normals[at]! + y * normals[at + 1]! + z * normals[at + 2]! < 0.8 * length) sharp += 1;
+    }
+  }
+  return 50 * sharp <= triangles.length;
+}
+
 /** Writes the triangles that turn their front to `eye` into `front`; how many indices that is. */
 export function frontFaces(positions: Float32Array, triangles: Uint32Array, eye: Vec3, front: Uint32Array): number {
   const p = positions as ArrayLike<number> as number[];

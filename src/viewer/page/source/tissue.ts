@@ -7,6 +7,7 @@ import { grainTexture } from './grain';
 export class Lighting {
   readonly lamp = { value: new Vector3(0, 0, 1) }; // unit, towards the lamp
   readonly fine = { value: 1 }; // 1: the grain in every pixel; 0: not
+  readonly outline = { value: 0 }; // 1: outlines are smoothed, which takes a surface without edges
   readonly grain: { value: Texture } = { value: grainTexture() };
 }
 
@@ -41,6 +42,7 @@ const fragmentShader = `
   uniform sampler3D grain;
   uniform vec3 lamp;
   uniform float fine;
+  uniform float outline;
   uniform float opacity;
   uniform vec3 dark;
   uniform vec3 light;
@@ -94,8 +96,10 @@ const fragmentShader = `
     #endif
     #ifndef WALL
     // At the outline the last pixel lets the drape through: a smooth edge, for a derivative's price.
-    float turned = dot(normalize(facing), v);
-    gl_FragColor *= clamp(turned / max(1.5 * fwidth(turned), 1e-4), 0.0, 1.0);
+    if (outline > 0.5) {
+      float turned = dot(normalize(facing), v);
+      gl_FragColor *= clamp(turned / max(1.5 * fwidth(turned), 1e-4), 0.0, 1.0);
+    }
     #endif
   }`;
 
@@ -111,6 +115,7 @@ export function tissueMaterial(lighting: Lighting, colours: Colours, wall: boole
     uniforms: {
       lamp: lighting.lamp,
       fine: lighting.fine,
+      outline: lighting.outline,
       grain: lighting.grain,
       opacity: { value: 1 },
       dark: { value: colours.dark },

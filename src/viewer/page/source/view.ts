@@ -23,13 +23,13 @@ import { ToolModel } from './tool_model';
 import { ToolShadow } from './tool_shadow';
 import { crossing, Trace } from './trace';
 
-/** What pictures are drawn with where the processor draws, the slower the machine the farther down. */
-const qualities = [
-  { fine: 1, sharpness: 1 }, // grain in every pixel
-  { fine: 0, sharpness: 1 },
-  { fine: 0, sharpness: 0.75 },
-  { fine: 0, sharpness: 0.5 },
-];
+/** Of tissue: chosen by what pictures take, or one of the two. */
+export type Shading = 'auto' | 'fine' | 'plain';
+
+// Where the processor draws: s that a picture drawn as a whole may take. Above the one tissue is shaded plainly, below the other
+// with its grain, which takes half as much again at most.
+const slowest = 0.07;
+const quickest = 0.03;
 const leastInterval = 30; // ms between two pictures, where the processor draws
 
 export class View {
@@ -56,9 +56,11 @@ export class View {
   private readonly gl: WebGL2RenderingContext;
   private stale: 'no' | 'tool' | 'all' = 'all'; // what has to be drawn again
   private sharpness = 1; // drawn pixels per pixel of the page, where the processor draws
-  private quality = 0; // of these
+  private fineEnough = true; // the grain, for what pictures take
+  private wanted: Shading = 'auto';
   private drawSeconds = 0; // of a picture, smoothed
-  private ordered: { done: WebGLSync; since: number } | null = null; // the picture that the processor is at
+  private wholeSeconds = 0; // of a picture in which more than the tool was drawn, smoothed
+  private ordered: { done: WebGLSync; since: number; whole: boolean } | null = null; // the picture that the processor is at
 
   /** Throws Error in words when the browser has no WebGL 2. */
   constructor(readonly canvas: HTMLCanvasElement) {
@@ -128,9 +130,10 @@ export class View {
   }
 
   /** The shadow of the tool, as the lamp stands. */
-  private shade(): void {
+  private darken(): void {
     const surface = this.body.surface();
-    if (!surface || this.body.transparent) return this.shadow.hide();
+    // Colours that stand for values are not darkened.
+    if (!surface || this.body.transparent || this.body.coloured) return this.shadow.hide();
     this.shadow.fall(this.tool.rods(), this.body.lighting.lamp.value, surface.positions, surface.normals, surface.triangles);
   }
 
@@ -163,7 +166,7 @@ export class View {
     const { gl } = this;
     const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
-    if (done) this.ordered = { done, since };
+    if (done) this.ordered = { done, since, whole: this.same < 2 };
     return true;
   }
 
@@ -171,11 +174,13 @@ export class View {
   busy(): boolean {
     if (!this.ordered) return false;
     const { gl } = this;
-    const { done, since } = this.ordered;
+    const { done, since, whole } = this.ordered;
     if (gl.clientWaitSync(done, 0, 0) === gl.TIMEOUT_EXPIRED) return true;
     gl.deleteSync(done);
     this.ordered = null;
-    this.drawSeconds += 0.2 * ((performance.now() - since) / 1000 - this.drawSeconds);
+    const seconds = (performance.now() - since) / 1000;
+    this.drawSeconds += 0.2 * (seconds - this.drawSeconds);
+    if (whole) this.wholeSeconds += 0.2 * (seconds - this.wholeSeconds);
     this.adapt();
     return false;
   }
@@ -183,6 +188,13 @@ export class View {
   /** Where the processor draws it has more to do than pictures: the solver is on the same machine. */
   get resting(): boolean {
     return this.software && performance.now() - this.since < leastInterval;
+  }
+
+  /** The shading that is asked for. */
+  set shading(wanted: Shading) {
+    if (wanted === this.wanted) return;
+    this.wanted = wanted;
+    this.shade();
   }
 
   /** Whether the grain is in every pixel. */
@@ -199,7 +211,7 @@ export class View {
     const { camera } = this.orbit;
     this.light(camera);
     this.plot();
-    this.shade();
+    this.darken();
     // Keeping costs as much as drawing: it pays from the second picture of the same organ on.
     this.same = this.stale === 'all' ? 0 : this.same + 1;
     this.kept = this.kept && this.same > 0;
@@ -241,6 +253,7 @@ export class View {
   }
 
   private drawAll(camera: PerspectiveCamera): void {
+    this.still?.hide();
     this.drape.draw(camera, this.gl.drawingBufferWidth, this.gl.drawingBufferHeight);
     this.renderer.setClearColor(0x000000, clearAlpha);
     if (this.software) this.body.leaveOutBacks(camera.position.toArray() as Vec3);
@@ -268,23 +281,25 @@ export class View {
 
   /** The plain shading, then coarser pixels where the processor cannot keep up, the fine ones where it can. */
   private adapt(): void {
-    let wanted = this.quality;
-    if (this.drawSeconds > 0.07) wanted = Math.min(wanted + 1, qualities.length - 1);
-    else if (this.drawSeconds < 0.02) wanted = Math.max(wanted - 1, 0);
-    if (wanted === this.quality) return;
-    this.quality = wanted;
+    const fine = this.wholeSeconds > slowest ? false : this.wholeSeconds < quickest ? true : this.fineEnough;
+    if (fine !== this.fineEnough) {
+      this.fineEnough = fine;
+      this.wholeSeconds = this.drawSeconds = 0.5 * (slowest + quickest);
+      this.shade();
+      return;
+    }
+    let wanted = this.sharpness;
+    if (this.drawSeconds > slowest) wanted = Math.max(0.5, wanted - 0.25);
+    else if (this.drawSeconds < 0.02) wanted = Math.min(1, wanted + 0.25);
+    if (wanted === this.sharpness) return;
     this.drawSeconds = 0.045;
-    this.applyQuality();
+    this.sharpness = wanted;
+    this.resize();
   }
 
-  /** How fine pictures are where the processor draws: which of `qualities`. */
-  private applyQuality(): void {
-    const { fine, sharpness } = qualities[this.quality]!;
-    this.body.lighting.fine.value = fine;
+  private shade(): void {
+    this.body.lighting.fine.value = Number(this.wanted === 'auto' ? this.fineEnough : this.wanted === 'fine');
     this.change();
-    if (sharpness === this.sharpness) return;
-    this.sharpness = sharpness;
-    this.resize();
   }
 
   private resize(): void {
