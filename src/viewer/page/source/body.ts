@@ -41,12 +41,18 @@ export class Body {
   readonly group = new Group();
   readonly lighting = new Lighting();
   topology: Topology | null = null;
+  // They outlive a surface: with the last material of its kind the program that draws it goes, and making it anew takes long.
+  private readonly organMaterial = tissueMaterial(this.lighting, surfaceColours, false);
+  private readonly wallMaterial = tissueMaterial(this.lighting, wallColours, true);
+  private readonly lipMaterial = new LineBasicMaterial({ color: lipColour });
+  private readonly frontMaterial = new LineBasicMaterial({ color: frontColour });
   private positions: BufferAttribute | null = null;
   private colours: BufferAttribute | null = null;
   private organ: Skin | null = null;
   private wall: Skin | null = null;
   transparent = false; // as it is drawn
   coloured = false; // by values
+  smooth = false; // the surface has no edges: normals between its corners tell where its outline is
   private epoch = -1; // of the surface
   private wireframe = false;
 
@@ -61,6 +67,7 @@ export class Body {
     this.positions = positions;
     this.colours = colours;
     const rest = new BufferAttribute(topology.rest, 3);
+    const tone = new BufferAttribute(this.lighting.blotches(topology.rest), 1);
     const skin = (triangles: Uint32Array, rim: Float32Array, material: ShaderMaterial): Skin => {
       const geometry = new BufferGeometry();
       const normals = new BufferAttribute(new Float32Array(3 * topology.vertexCount), 3);
@@ -69,6 +76,7 @@ export class Body {
       geometry.setAttribute('normal', normals);
       geometry.setAttribute('color', colours);
       geometry.setAttribute('rest', rest);
+      geometry.setAttribute('tone', tone);
       geometry.setAttribute('rim', new BufferAttribute(rim, 1));
       const drawn = new BufferAttribute(triangles.slice(), 1);
       drawn.setUsage(DynamicDrawUsage);
@@ -79,25 +87,24 @@ export class Body {
       return { mesh, triangles, drawn, normals };
     };
     const walls = trianglesOf(topology, (part) => part !== Part.organ);
-    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), onLips(topology), tissueMaterial(this.lighting, surfaceColours, false));
-    this.wall = skin(walls, belowLips(topology, walls), tissueMaterial(this.lighting, wallColours, true));
-    const lines = (edges: Uint32Array, colour: Color): void => {
+    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), onLips(topology), this.organMaterial);
+    this.wall = skin(walls, belowLips(topology, walls), this.wallMaterial);
+    const lines = (edges: Uint32Array, material: LineBasicMaterial): void => {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', positions);
       geometry.setIndex(new BufferAttribute(edges, 1));
-      const segments = new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
+      const segments = new LineSegments(geometry, material);
       segments.frustumCulled = false;
       segments.visible = edges.length > 0;
       this.group.add(segments);
     };
-    lines(lipEdges(topology), lipColour);
-    lines(frontEdges(topology), frontColour);
+    lines(lipEdges(topology), this.lipMaterial);
+    lines(frontEdges(topology), this.frontMaterial);
     this.setLook(this.transparent, this.wireframe);
     this.moved();
     if (topology.epoch === this.epoch) return;
-    // Where a surface has edges the normals between its corners say nothing about its outline.
     this.epoch = topology.epoch;
-    this.lighting.outline.value = Number(isSmooth(topology.rest, this.organ.triangles, this.organ.normals.array as Float32Array));
+    this.smooth = isSmooth(topology.rest, this.organ.triangles, this.organ.normals.array as Float32Array);
   }
 
   /** False: they are where they were. A tool that hovers is solved for too. */
@@ -139,7 +146,7 @@ export class Body {
       if (!skin) continue;
       const material = skin.mesh.material;
       material.transparent = transparent;
-      material.uniforms['opacity']!.value = transparent ? 0.28 : 1;
+      material.uniforms['opacity']!.value = transparent ? 0.45 : 1;
       material.depthWrite = !transparent;
       material.wireframe = wireframe;
       material.needsUpdate = true;
@@ -212,10 +219,7 @@ export class Body {
   private clear(): void {
     for (const child of [...this.group.children]) {
       this.group.remove(child);
-      if (child instanceof Mesh || child instanceof LineSegments) {
-        (child.geometry as BufferGeometry).dispose();
-        (child.material as LineBasicMaterial | ShaderMaterial).dispose();
-      }
+      if (child instanceof Mesh || child instanceof LineSegments) (child.geometry as BufferGeometry).dispose();
     }
   }
 }

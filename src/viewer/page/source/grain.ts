@@ -52,9 +52,31 @@ export function grainField(count: number): Float32Array {
   return field.map((height) => height - mean);
 }
 
-/** Red, green and blue: slope of the height along x, y, z; alpha: the height; each 0.5 at zero. */
-export function grainTexture(count = 32): Data3DTexture {
-  const field = grainField(count);
+/** Light and dark of the grain at `places` (x, y, z of each, m), coarser than vertices are apart; about 0.5. */
+export function blotches(field: Float32Array, count: number, places: Float32Array): Float32Array {
+  const most = count - 1;
+  const tone = new Float32Array(places.length / 3).fill(0.5);
+  for (const [scale, weight] of [[5, 0.45], [17, 0.25]] as const) {
+    for (let v = 0; v < tone.length; ++v) {
+      const x = places[3 * v]! * scale * count;
+      const y = places[3 * v + 1]! * scale * count;
+      const z = places[3 * v + 2]! * scale * count;
+      const [i, j, k] = [Math.floor(x), Math.floor(y), Math.floor(z)];
+      const [fx, fy, fz] = [x - i, y - j, z - k];
+      let sum = 0;
+      for (let corner = 0; corner < 8; ++corner) {
+        const [a, b, c] = [corner & 1, (corner >> 1) & 1, corner >> 2];
+        const part = (a ? fx : 1 - fx) * (b ? fy : 1 - fy) * (c ? fz : 1 - fz);
+        sum += part * field[((((k + c) & most) * count + ((j + b) & most)) * count) + ((i + a) & most)]!;
+      }
+      tone[v]! += weight * sum;
+    }
+  }
+  return tone;
+}
+
+/** Red, green and blue: slope of a height along x, y, z; alpha: the height; each 0.5 at zero. */
+export function grainTexture(field: Float32Array, count: number): Data3DTexture {
   const bytes = new Uint8Array(4 * field.length);
   const at = (x: number, y: number, z: number): number => field[((z & (count - 1)) * count + (y & (count - 1))) * count + (x & (count - 1))]!;
   const byte = (value: number): number => Math.min(Math.max(Math.round(127.5 + 127.5 * value), 0), 255);

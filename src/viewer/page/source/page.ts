@@ -127,6 +127,8 @@ export class Page {
         if (message.about === 'scenario' && this.session) this.panels.scenario.value = this.session.scenario;
         return this.messages.say('error', saying(message.text, advice(message.code, message.about)));
       case 'log':
+        // What the session does by itself is for who looks at its rates.
+        if (message.level !== 'warning' && !this.panels.shown) return;
         return this.messages.say(message.level === 'warning' ? 'warning' : 'info', saying(message.text, adviceOnLog(message.text)));
       case 'tear':
         return this.showTear(message);

@@ -1,21 +1,33 @@
 // How tissue looks: an organ's moist surface and the walls of a wound, under one lamp. Two shadings: the fine one adds the
 // grain in every pixel and the highlights that it breaks; the plain one has what vertices know, for slow pictures.
 import { Color, FrontSide, ShaderMaterial, type Texture, Vector3 } from 'three';
-import { grainTexture } from './grain';
+import { blotches, grainField, grainTexture } from './grain';
+
+const samples = 32; // of the grain a side
 
 /** What all tissue of a picture has in common; directions in the room's frame. */
 export class Lighting {
   readonly lamp = { value: new Vector3(0, 0, 1) }; // unit, towards the lamp
   readonly fine = { value: 1 }; // 1: the grain in every pixel; 0: not
   readonly outline = { value: 0 }; // 1: outlines are smoothed, which takes a surface without edges
-  readonly grain: { value: Texture } = { value: grainTexture() };
+  readonly grain: { value: Texture };
+  private readonly field = grainField(samples);
+
+  constructor() {
+    this.grain = { value: grainTexture(this.field, samples) };
+  }
+
+  /** Light and dark of vertices that are at `rest` without a load. */
+  blotches(rest: Float32Array): Float32Array {
+    return blotches(this.field, samples, rest);
+  }
 }
 
 // Organs stand in the room without a transformation: normals and places are the room's.
 const vertexShader = `
-  uniform highp sampler3D grain;
   attribute vec3 rest;
   attribute float rim;
+  attribute float tone;
   varying vec3 at;
   varying vec3 facing;
   varying vec3 towards;
@@ -30,7 +42,7 @@ const vertexShader = `
     facing = normal;
     at = rest * GRAIN;
     edge = rim;
-    blotch = 0.5 + 0.9 * (textureLod(grain, rest * 5.0, 0.0).a - 0.5) + 0.5 * (textureLod(grain, rest * 17.0, 0.0).a - 0.5);
+    blotch = tone;
     #ifdef USE_COLOR
     tint = color;
     #endif
@@ -95,8 +107,8 @@ const fragmentShader = `
     gl_FragColor = vec4(sqrt(colour), opacity); // nearly sRGB, at a third of its cost
     #endif
     #ifndef WALL
-    // At the outline the last pixel lets the drape through: a smooth edge, for a derivative's price.
-    if (outline > 0.5) {
+    // At the outline the last pixel lets the drape through: a smooth edge for the price of a derivative.
+    if (outline > 0.5 && opacity == 1.0) {
       float turned = dot(normalize(facing), v);
       gl_FragColor *= clamp(turned / max(1.5 * fwidth(turned), 1e-4), 0.0, 1.0);
     }

@@ -220,7 +220,10 @@ export class View {
     if (!this.still || this.still.fails || this.body.transparent || this.same < 2) return this.drawAll(camera);
     if (!this.kept || !this.still.kept) {
       this.showing(true, false);
+      // Of a picture that is drawn once for many the outline may cost what it does.
+      this.body.lighting.outline.value = Number(this.body.smooth);
       this.drawAll(camera);
+      this.body.lighting.outline.value = 0;
       this.kept = this.still.keep();
       this.showing(true, true);
       if (!this.kept) return this.drawAll(camera);

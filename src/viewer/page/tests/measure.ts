@@ -253,7 +253,8 @@ async function pictures(): Promise<void> {
     });
     const size = await tab.evaluate(() => `${globalThis.spherecut!.view.canvas.width} x ${globalThis.spherecut!.view.canvas.height}`);
     const count = 100;
-    for (const [what, alone] of [['as a whole', false], ['tool alone', true]] as const) {
+    for (const [what, shading, alone] of [['as a whole, with grain', 'fine', false], ['as a whole, plain', 'plain', false], ['tool alone', 'fine', true]] as const) {
+      await tab.selectOption('#shading', shading);
       await pictureTimes(tab, alone, 8);
       const before = browserTime(served.process.pid!);
       const times = await pictureTimes(tab, alone, count);

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { Vector3 } from 'three';
-import { grainField } from '../source/grain';
+import { blotches, grainField } from '../source/grain';
 import { planned } from '../source/plan';
 import { Part, Tag, type Topology, type Vec3 } from '../source/protocol';
 import { belowLips, onLips, trianglesOf } from '../source/surface';
@@ -33,6 +33,18 @@ test('The grain is the same every time, has no mean and repeats without a seam',
   const within = apart(at(7), at(8));
   assert.ok(apart(at(count - 1), at(0)) < 2 * within, 'the first sample does not follow the last one');
   assert.ok(apart(at(0), at(8)) > within);
+});
+
+test('Blotches go on from place to place and repeat with the grain', () => {
+  const count = 16;
+  const field = grainField(count);
+  const along = Float32Array.from({ length: 300 }, (_, i) => (i % 3 === 0 ? i * 1e-4 : 0.003));
+  const tones = blotches(field, count, along);
+  assert.ok(Math.max(...tones) - Math.min(...tones) > 0.02);
+  for (let i = 1; i < tones.length; ++i) assert.ok(Math.abs(tones[i]! - tones[i - 1]!) < 0.05);
+  // 5 and 17 repeats a metre have 1 m in common.
+  const [here, there] = blotches(field, count, Float32Array.from([0.01, 0.02, 0.03, 1.01, 0.02, -0.97]));
+  assert.ok(Math.abs(here! - there!) < 1e-3);
 });
 
 test('A rod shades what lies away from the lamp behind it, and nothing far from that', () => {
