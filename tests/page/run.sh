@@ -26,7 +26,7 @@ skip() {
 node=$(command -v node || command -v nodejs) || skip "nodejs is not installed"
 [ -e "$build/page/index.html" ] || skip "the page is not built; that needs nodejs, npm and, once, the network"
 if [ "$kind" = unit ]; then
-  exec "$node" --test "$build/page-tests/protocol.test.mjs" "$build/page-tests/surface.test.mjs" "$build/page-tests/trace.test.mjs" "$build/page-tests/advice.test.mjs" "$build/page-tests/shading.test.mjs"
+  exec "$node" --test "$build"/page-tests/{protocol,surface,trace,shading,advice}.test.mjs
 fi
 command -v chromium >/dev/null || skip "the Debian package chromium is not installed"
 case $kind in browser | seen | look | controls | tear) kind=$kind.test ;; esac

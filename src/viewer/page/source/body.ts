@@ -17,7 +17,7 @@ import { Lighting, tissueMaterial } from './tissue';
 
 const surfaceColours = { dark: new Color('#4a1714'), light: new Color('#80302a'), deep: new Color('#5c0d0f') };
 const wallColours = { dark: new Color('#6b1013'), light: new Color('#9c2023'), deep: new Color('#240305') };
-const lipColour = new Color('#f0c49a');
+const lipColour = new Color('#d8a684');
 const frontColour = new Color('#d9a441');
 const tableSize = 256;
 const table = linearTable(sequential, tableSize);

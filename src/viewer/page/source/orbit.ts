@@ -26,7 +26,7 @@ export class Orbit {
   home(): void {
     this.target.copy(this.start.target);
     this.azimuth = -0.35;
-    this.elevation = 0.85;
+    this.elevation = 0.95;
     const narrow = Math.min(1, this.camera.aspect / 1.1);
     this.distance = this.start.distance / narrow;
     this.place();
