@@ -68,7 +68,7 @@ const look = (tab: Tab, turn: readonly [number, number], zoom: number, pan: read
   );
 
 async function pressAndCut(tab: Tab): Promise<Shot[][]> {
-  await look(tab, [0, 0.12], 1.8, [0.12, -0.14]);
+  await look(tab, [0, 0.02], 1.8, [0.12, -0.14]);
   await hover(tab, -0.03, -0.004);
   const press = await filmed(tab, async () => {
     await tab.mouse.down();
@@ -102,7 +102,7 @@ async function tear(tab: Tab): Promise<Shot[]> {
   await until(tab, 'the hand is far up', () => (document.getElementById('press-depth') as HTMLInputElement).valueAsNumber <= -12);
   return filmed(tab, async () => {
     await tab.waitForFunction((area) => globalThis.spherecut!.frame!.cutArea > 1.02 * area, before, { timeout: 1000 * patience });
-    await tab.waitForTimeout(600);
+    await tab.waitForTimeout(1200);
     await tab.keyboard.up(',');
   });
 }
