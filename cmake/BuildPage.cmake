@@ -50,7 +50,7 @@ elseif(step STREQUAL "page")
   run("Type check of the page" "${NODE}" node_modules/typescript/bin/tsc --noEmit)
   run("Bundling of the page" "${NODE}" node_modules/vite/bin/vite.js build --outDir "${BUILD}/page" --emptyOutDir --logLevel warn)
   file(GLOB tests "${PAGE}/tests/*.test.ts")
-  list(APPEND tests "${PAGE}/tests/measure.ts" "${PAGE}/tests/pictures.ts" "${PAGE}/tests/soak.ts")
+  list(APPEND tests "${PAGE}/tests/measure.ts" "${PAGE}/tests/moving_picture.ts" "${PAGE}/tests/pictures.ts" "${PAGE}/tests/soak.ts")
   run("Bundling of the page's tests" "${NODE}" node_modules/esbuild/bin/esbuild ${tests} --bundle --platform=node
     --target=node18 --format=esm --packages=external --out-extension:.js=.mjs --outdir=${BUILD}/page-tests --log-level=warning)
   file(CREATE_LINK "${PAGE}/node_modules" "${BUILD}/page-tests/node_modules" SYMBOLIC)

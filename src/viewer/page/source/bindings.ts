@@ -62,7 +62,7 @@ function viewKeys(page: Page, orbit: Orbit): Binding[] {
 }
 
 function showKeys(page: Page, panels: Panels): Binding[] {
-  const { nodes, spheres, supports, wire, spring, colours, slice, sliceAxis } = panels;
+  const { nodes, spheres, supports, wire, plan, spring, colours, slice, sliceAxis } = panels;
   const flip = (input: HTMLInputElement) => (): void => input.click();
   const next = (list: HTMLSelectElement) => (): void => {
     list.selectedIndex = (list.selectedIndex + 1) % list.length;
@@ -82,6 +82,7 @@ function showKeys(page: Page, panels: Panels): Binding[] {
     { keys: ['z'], shown: 'Z', does: 'slice across the next axis', press: next(sliceAxis) },
     { keys: ['['], shown: '[', does: 'slice back', press: () => slide(-0.04) },
     { keys: [']'], shown: ']', does: 'slice forth', press: () => slide(0.04) },
+    { keys: ['4'], shown: '4', does: 'way ahead of the blade', press: flip(plan) },
     { keys: ['g'], shown: 'G', does: 'triangles', press: flip(wire) },
     { keys: ['u'], shown: 'U', does: 'spring between hand and tip', press: flip(spring) },
   ];

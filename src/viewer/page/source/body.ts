@@ -4,28 +4,27 @@ import {
   BufferGeometry,
   Color,
   DynamicDrawUsage,
-  FrontSide,
   Group,
   LineBasicMaterial,
   LineSegments,
   Mesh,
-  MeshPhongMaterial,
+  type ShaderMaterial,
 } from 'three';
 import { linearTable, sequential } from './colours';
 import { Part, type Scalars, type Topology, type Vec3 } from './protocol';
-import { castRay, frontEdges, frontFaces, type Hit, lipDistance, lipEdges, trianglesOf, vertexNormals } from './surface';
+import { belowLips, castRay, frontEdges, frontFaces, type Hit, isSmooth, lipDistance, lipEdges, onLips, trianglesOf, vertexNormals } from './surface';
+import { Lighting, tissueMaterial } from './tissue';
 
-const tissueColour = new Color('#9a4b45');
-const wallColour = new Color('#84191f');
-const wallGlow = 0.15; // of their own: walls that face each other get little light
-const lipColour = new Color('#ffe3c2');
-const frontColour = new Color('#ffd24d');
+const surfaceColours = { dark: new Color('#4a1714'), light: new Color('#80302a'), deep: new Color('#5c0d0f') };
+const wallColours = { dark: new Color('#6b1013'), light: new Color('#9c2023'), deep: new Color('#240305') };
+const lipColour = new Color('#d8a684');
+const frontColour = new Color('#d9a441');
 const tableSize = 256;
 const table = linearTable(sequential, tableSize);
 
 /** One of the two shaded parts: shares positions with the other, has normals of its own. */
 interface Skin {
-  mesh: Mesh<BufferGeometry, MeshPhongMaterial>;
+  mesh: Mesh<BufferGeometry, ShaderMaterial>;
   triangles: Uint32Array;
   drawn: BufferAttribute; // those of them that are drawn, in front of the geometry's index
   normals: BufferAttribute;
@@ -40,12 +39,21 @@ export interface Snapshot {
 
 export class Body {
   readonly group = new Group();
+  readonly lighting = new Lighting();
   topology: Topology | null = null;
+  // They outlive a surface: with the last material of its kind the program that draws it goes, and making it anew takes long.
+  private readonly organMaterial = tissueMaterial(this.lighting, surfaceColours, false);
+  private readonly wallMaterial = tissueMaterial(this.lighting, wallColours, true);
+  private readonly lipMaterial = new LineBasicMaterial({ color: lipColour });
+  private readonly frontMaterial = new LineBasicMaterial({ color: frontColour });
   private positions: BufferAttribute | null = null;
   private colours: BufferAttribute | null = null;
   private organ: Skin | null = null;
   private wall: Skin | null = null;
   transparent = false; // as it is drawn
+  coloured = false; // by values
+  smooth = false; // the surface has no edges: normals between its corners tell where its outline is
+  private epoch = -1; // of the surface
   private wireframe = false;
 
   /** Another surface; it is at rest until the first vertices come. */
@@ -58,46 +66,45 @@ export class Body {
     colours.setUsage(DynamicDrawUsage);
     this.positions = positions;
     this.colours = colours;
-    const skin = (triangles: Uint32Array, colour: Color, shininess: number, glow: number): Skin => {
+    const rest = new BufferAttribute(topology.rest, 3);
+    const tone = new BufferAttribute(this.lighting.blotches(topology.rest), 1);
+    const skin = (triangles: Uint32Array, rim: Float32Array, material: ShaderMaterial): Skin => {
       const geometry = new BufferGeometry();
       const normals = new BufferAttribute(new Float32Array(3 * topology.vertexCount), 3);
       normals.setUsage(DynamicDrawUsage);
       geometry.setAttribute('position', positions);
       geometry.setAttribute('normal', normals);
       geometry.setAttribute('color', colours);
+      geometry.setAttribute('rest', rest);
+      geometry.setAttribute('tone', tone);
+      geometry.setAttribute('rim', new BufferAttribute(rim, 1));
       const drawn = new BufferAttribute(triangles.slice(), 1);
       drawn.setUsage(DynamicDrawUsage);
       geometry.setIndex(drawn);
-      const material = new MeshPhongMaterial({
-        color: colour,
-        emissive: colour.clone().multiplyScalar(glow),
-        specular: new Color('#1c1716'),
-        shininess,
-        side: FrontSide,
-        polygonOffset: true,
-        polygonOffsetFactor: 1,
-        polygonOffsetUnits: 1,
-      });
       const mesh = new Mesh(geometry, material);
       mesh.frustumCulled = false;
       this.group.add(mesh);
       return { mesh, triangles, drawn, normals };
     };
-    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), tissueColour, 26, 0);
-    this.wall = skin(trianglesOf(topology, (part) => part !== Part.organ), wallColour, 8, wallGlow);
-    const lines = (edges: Uint32Array, colour: Color): void => {
+    const walls = trianglesOf(topology, (part) => part !== Part.organ);
+    this.organ = skin(trianglesOf(topology, (part) => part === Part.organ), onLips(topology), this.organMaterial);
+    this.wall = skin(walls, belowLips(topology, walls), this.wallMaterial);
+    const lines = (edges: Uint32Array, material: LineBasicMaterial): void => {
       const geometry = new BufferGeometry();
       geometry.setAttribute('position', positions);
       geometry.setIndex(new BufferAttribute(edges, 1));
-      const segments = new LineSegments(geometry, new LineBasicMaterial({ color: colour }));
+      const segments = new LineSegments(geometry, material);
       segments.frustumCulled = false;
       segments.visible = edges.length > 0;
       this.group.add(segments);
     };
-    lines(lipEdges(topology), lipColour);
-    lines(frontEdges(topology), frontColour);
+    lines(lipEdges(topology), this.lipMaterial);
+    lines(frontEdges(topology), this.frontMaterial);
     this.setLook(this.transparent, this.wireframe);
     this.moved();
+    if (topology.epoch === this.epoch) return;
+    this.epoch = topology.epoch;
+    this.smooth = isSmooth(topology.rest, this.organ.triangles, this.organ.normals.array as Float32Array);
   }
 
   /** False: they are where they were. A tool that hovers is solved for too. */
@@ -112,8 +119,8 @@ export class Body {
   /** Colours by value between `low` and `high`; null: the tissue's own. */
   setScalars(scalars: Scalars | null, low: number, high: number): void {
     if (!this.colours || !this.organ || !this.wall) return;
-    const coloured = scalars !== null && scalars.values.length === this.colours.count;
-    if (coloured) {
+    const coloured = (this.coloured = scalars !== null && scalars.values.length === this.colours.count);
+    if (scalars && coloured) {
       const span = high > low ? (tableSize - 1) / (high - low) : 0;
       const target = this.colours.array as Float32Array;
       for (let i = 0; i < scalars.values.length; ++i) {
@@ -125,13 +132,9 @@ export class Body {
       }
       this.colours.needsUpdate = true;
     }
-    for (const [skin, own, glow] of [[this.organ, tissueColour, 0], [this.wall, wallColour, wallGlow]] as const) {
-      const material = skin.mesh.material;
-      if (material.vertexColors !== coloured) material.needsUpdate = true;
-      material.vertexColors = coloured;
-      if (coloured) material.color.set(0xffffff);
-      else material.color.copy(own);
-      material.emissive.copy(own).multiplyScalar(coloured ? 0 : glow);
+    for (const { mesh } of [this.organ, this.wall]) {
+      if (mesh.material.vertexColors !== coloured) mesh.material.needsUpdate = true;
+      mesh.material.vertexColors = coloured;
     }
   }
 
@@ -143,7 +146,7 @@ export class Body {
       if (!skin) continue;
       const material = skin.mesh.material;
       material.transparent = transparent;
-      material.opacity = transparent ? 0.28 : 1;
+      material.uniforms['opacity']!.value = transparent ? 0.45 : 1;
       material.depthWrite = !transparent;
       material.wireframe = wireframe;
       material.needsUpdate = true;
@@ -164,6 +167,16 @@ export class Body {
       skin.mesh.geometry.setDrawRange(0, count);
       skin.drawn.needsUpdate = true;
     }
+  }
+
+  /** The organ's own surface, as it is now; not to be kept. */
+  surface(): Snapshot | null {
+    if (!this.positions || !this.organ) return null;
+    return {
+      positions: this.positions.array as Float32Array,
+      triangles: this.organ.triangles,
+      normals: this.organ.normals.array as Float32Array,
+    };
   }
 
   /** What rays can be cast at, as it is now. */
@@ -206,10 +219,7 @@ export class Body {
   private clear(): void {
     for (const child of [...this.group.children]) {
       this.group.remove(child);
-      if (child instanceof Mesh || child instanceof LineSegments) {
-        (child.geometry as BufferGeometry).dispose();
-        (child.material as LineBasicMaterial | MeshPhongMaterial).dispose();
-      }
+      if (child instanceof Mesh || child instanceof LineSegments) (child.geometry as BufferGeometry).dispose();
     }
   }
 }

@@ -50,7 +50,7 @@ export class ForceChart {
       context.moveTo(left, y(part * peak));
       context.lineTo(right, y(part * peak));
       context.stroke();
-      context.fillText(`${(part * peak).toPrecision(2)} N`, left - 6 * ratio, y(part * peak));
+      context.fillText(part * peak > 0 ? `${Number((1000 * part * peak).toPrecision(3))} mN` : '0', left - 6 * ratio, y(part * peak));
     }
     context.textAlign = 'left';
     context.fillText(`-${this.seconds} s`, left, height - 7 * ratio);

@@ -32,6 +32,19 @@ export const diverging = through([
   [164, 72, 38],
 ]);
 
+const forceStops = through([
+  [255, 226, 122],
+  [255, 193, 61],
+  [255, 141, 38],
+  [255, 84, 32],
+]);
+
+/** Colour of a force in newtons: pale yellow up to 30 mN, orange at 300 mN, red from 3 N on. */
+export function forceColour(newtons: number): string {
+  const [r, g, b] = forceStops(Math.log10(Math.max(newtons, 1e-6) / 0.03) / 2).map(Math.round) as [number, number, number];
+  return `rgb(${r}, ${g}, ${b})`;
+}
+
 /** sRGB byte to the linear light that the renderer computes with, 0 to 1. */
 export function linear(byte: number): number {
   const c = byte / 255;
@@ -57,6 +70,13 @@ export function drawBar(canvas: HTMLCanvasElement, map: ColourMap): void {
     context.fillStyle = `rgb(${r} ${g} ${b})`;
     context.fillRect(x, 0, 1, canvas.height);
   }
+}
+
+/** A force as the readout has it: in mN below 1 N, to a tenth of one below 100 mN. */
+export function forceInWords(newtons: number): string {
+  const milli = 1000 * newtons;
+  if (milli >= 999.5) return `${newtons.toFixed(3)} N`;
+  return `${milli.toFixed(milli < 99.95 ? 1 : 0)} mN`;
 }
 
 /** Three significant digits and an SI prefix: (0.00123, 'm') is '1.23 mm'. */

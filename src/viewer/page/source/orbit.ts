@@ -19,17 +19,18 @@ export class Orbit {
     const low = new Vector3(...lower);
     const high = new Vector3(...upper);
     this.start.target.copy(low).add(high).multiplyScalar(0.5);
-    this.start.distance = low.distanceTo(high) * 1.5;
+    this.start.distance = low.distanceTo(high) * 1.4;
     this.home();
   }
 
   home(): void {
     this.target.copy(this.start.target);
     this.azimuth = -0.35;
-    this.elevation = 0.75;
+    this.elevation = 0.95;
     const narrow = Math.min(1, this.camera.aspect / 1.1);
     this.distance = this.start.distance / narrow;
     this.place();
+    this.pan(0, 0.045); // the chart lies over the foot of the picture
   }
 
   /** By angles in radians. */

@@ -1,20 +1,23 @@
-import { withUnit } from './colours';
+import { advice, adviceOnLog, saying } from './advice';
+import { forceColour, forceInWords, withUnit } from './colours';
 import { ForceChart } from './chart';
 import { Connection, type LinkState } from './connection';
 import { element, write } from './element';
 import { attachPointer } from './input';
 import { bindings, gestures } from './bindings';
+import { Hint } from './hint';
 import { Keyboard } from './keys';
 import { Latency } from './latency';
 import { Messages } from './messages';
 import type { Snapshot } from './body';
 import { Panels, tearInWords } from './panels';
 import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Tear, Topology, Welcome } from './protocol';
+import { remember, remembered } from './remembered';
 import { savePicture } from './screenshot';
 import { castRay, type Hit } from './surface';
 import { type Ray, Stylus } from './stylus';
 import { nodeAlong } from './overlays';
-import { View } from './view';
+import { type Shading, View } from './view';
 
 const button = (id: string): HTMLButtonElement => element(id, HTMLButtonElement);
 const byId = (id: string): HTMLElement => element(id, HTMLElement);
@@ -31,6 +34,7 @@ export class Page {
   tear: Tear | null = null; // null: nothing tears here
   holder: number | null = null;
   id = -1;
+  private readonly hint = new Hint();
   private readonly messages = new Messages(byId('messages'));
   private readonly chart = new ForceChart(element('chart', HTMLCanvasElement));
   private readonly panels: Panels;
@@ -121,9 +125,11 @@ export class Page {
       case 'error':
         if (message.about === 'mode') this.panels.setMode(this.stylus.mode);
         if (message.about === 'scenario' && this.session) this.panels.scenario.value = this.session.scenario;
-        return this.messages.say('error', message.text);
+        return this.messages.say('error', saying(message.text, advice(message.code, message.about)));
       case 'log':
-        return this.messages.say(message.level === 'warning' ? 'warning' : 'info', message.text);
+        // What the session does by itself is for who looks at its rates.
+        if (message.level !== 'warning' && !this.panels.shown) return;
+        return this.messages.say(message.level === 'warning' ? 'warning' : 'info', saying(message.text, adviceOnLog(message.text)));
       case 'tear':
         return this.showTear(message);
       case 'recording':
@@ -193,7 +199,7 @@ export class Page {
     this.id = -1;
     this.pending = [];
     this.showRole();
-    if (state === 'closed') this.messages.say('error', `The connection to the server has ended${reason ? `: ${reason}` : ''}.`);
+    if (state === 'closed') this.messages.say('error', saying(`The connection to the server has ended${reason ? `: ${reason}` : ''}`, 'The page comes back by itself; if not, start spherecut serve again.'));
   }
 
   private showLive(): void {
@@ -280,8 +286,7 @@ export class Page {
     if (frame.scalars) this.colour();
     if (frame.nodes || frame.support) this.showNodes();
     if (frame.slice) this.showSlice();
-    this.view.tool.update(frame);
-    if (frame.mode === 'blade') this.view.follow(frame, this.session.blade?.edge ?? []);
+    this.view.follow(frame, this.session.blade?.edge ?? []);
     this.chart.add(frame.tickTime, Math.hypot(...frame.force));
     this.panels.showFrame(frame);
     if (bodyMoved || frame.scalars || frame.nodes || frame.support || frame.slice) this.view.change();
@@ -291,11 +296,13 @@ export class Page {
   private showNumbers(now: number): void {
     const frame = this.frame;
     if (!frame) return;
-    write(byId('force'), Math.hypot(...frame.force).toFixed(3));
+    const force = byId('force');
+    write(force, forceInWords(Math.hypot(...frame.force)));
+    force.style.color = forceColour(Math.hypot(...frame.force));
     write(byId('torque'), withUnit(Math.hypot(...frame.torque), 'N m'));
-    write(byId('depth'), (1000 * Math.max(frame.depth, 0)).toFixed(1));
+    write(byId('depth'), `${(1000 * Math.max(frame.depth, 0)).toFixed(1)} mm`);
     const lag = Math.hypot(...frame.hand.map((x, d) => x - (frame.tip[d] ?? x)));
-    write(byId('lag'), (1000 * lag).toFixed(1));
+    write(byId('lag'), `${(1000 * lag).toFixed(1)} mm`);
     // What the processor draws beside the picture it does not draw for the picture.
     if (now - this.chartShown > (this.view.software ? 125 : 0)) {
       this.chartShown = now;
@@ -312,6 +319,8 @@ export class Page {
     const inside = this.panels.nodes.checked || this.panels.spheres.checked || this.panels.supports.checked;
     this.view.body.setLook(inside || this.panels.slice.value !== 'none', this.panels.wire.checked);
     this.view.tool.showSpring = this.panels.spring.checked;
+    this.view.showPlan = this.panels.plan.checked;
+    this.view.shading = this.panels.shading.value as Shading;
     if (this.frame) this.view.tool.update(this.frame);
     if (!this.panels.supports.checked) this.support = null;
     if (this.panels.slice.value === 'none') this.slice = null;
@@ -388,7 +397,10 @@ export class Page {
 
   private showPress(pressing: boolean): void {
     button('press-hold').setAttribute('aria-pressed', String(pressing));
-    if (pressing) this.view.setMark(null);
+    if (pressing) {
+      this.view.setMark(null);
+      this.hint.close();
+    }
   }
 
   chooseMode(mode: Mode): void {
@@ -436,7 +448,8 @@ export class Page {
       this.stylus.setDepth(Number((event.target as HTMLInputElement).value) / 1000);
       this.showDepth();
     });
-    if (matchMedia('(max-width: 760px)').matches) this.togglePanels();
+    // Folded at first: the picture is what one comes for.
+    this.panels.show(remembered('panels') === 'yes');
     this.showDepth();
     this.showRole();
   }
@@ -489,17 +502,18 @@ export class Page {
   screenshot(): void {
     this.view.drawWhole();
     const { frame, session } = this;
-    const force = frame ? `${Math.hypot(...frame.force).toFixed(3)} N, ` : '';
+    const force = frame ? `${forceInWords(Math.hypot(...frame.force))}, ` : '';
     const { canvas } = this.view;
     const gl = canvas.getContext('webgl2');
     if (!gl) return;
-    savePicture(gl, canvas.width / Math.max(canvas.clientWidth, 1), `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);
+    savePicture(gl, this.view.drape.canvas, canvas.width / Math.max(canvas.clientWidth, 1), `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);
   }
 
   togglePanels(): void {
-    const panels = byId('panels');
-    const shown = panels.dataset['shown'] === 'no';
-    panels.dataset['shown'] = shown ? 'yes' : 'no';
-    button('panels-toggle').setAttribute('aria-expanded', String(shown));
+    const shown = !this.panels.shown;
+    this.panels.show(shown);
+    remember('panels', shown ? 'yes' : 'no');
+    this.ratesShown = 0;
+    this.showNumbers(performance.now());
   }
 }

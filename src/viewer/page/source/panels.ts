@@ -35,8 +35,10 @@ export class Panels {
   readonly spheres = check('show-spheres');
   readonly supports = check('show-supports');
   readonly wire = check('show-wire');
+  readonly plan = check('show-plan');
   readonly spring = check('show-spring');
   readonly colours = select('colours');
+  readonly shading = select('shading');
   readonly slice = select('slice');
   readonly sliceAxis = select('slice-axis');
   readonly slicePlace = check('slice-place');
@@ -53,7 +55,7 @@ export class Panels {
       input.addEventListener('change', ask);
     }
     this.slicePlace.addEventListener('input', ask);
-    for (const input of [this.wire, this.spring]) input.addEventListener('change', () => host.look());
+    for (const input of [this.wire, this.spring, this.plan, this.shading]) input.addEventListener('change', () => host.look());
     this.scenario.addEventListener('change', () => host.scenario(this.scenario.value));
     element('modes', HTMLFieldSetElement).addEventListener('change', (event) => {
       if (event.target instanceof HTMLInputElement) host.mode(event.target.value as Mode);
@@ -64,6 +66,15 @@ export class Panels {
         this.apply();
       });
     }
+  }
+
+  get shown(): boolean {
+    return element('panels', HTMLElement).dataset['shown'] === 'yes';
+  }
+
+  show(shown: boolean): void {
+    element('panels', HTMLElement).dataset['shown'] = shown ? 'yes' : 'no';
+    element('panels-toggle', HTMLButtonElement).setAttribute('aria-expanded', String(shown));
   }
 
   get sliceShows(): SliceShows {
@@ -186,6 +197,11 @@ export class Panels {
   }
 
   showRates(frame: Frame, display: number, tool: Latency, body: Latency, stages: Float32Array | null): void {
+    write(
+      element('rate-line', HTMLElement),
+      `${frame.hapticRate.toFixed(0)} Hz felt, ${frame.solveRate.toFixed(0)} Hz solved, ${display.toFixed(0)} Hz drawn`,
+    );
+    if (!this.shown) return;
     const share = frame.ticks > 0 ? ` (${((100 * frame.misses) / frame.ticks).toFixed(2)} %)` : '';
     const p95 = (latency: Latency): string => {
       const seconds = latency.quantile(0.95);

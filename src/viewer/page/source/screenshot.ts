@@ -1,7 +1,10 @@
 import { drawnPixels } from './pixels';
 
-/** Saves what has just been drawn with `gl` as a PNG with a line of text below; `ratio`: its pixels per pixel of the page. */
-export function savePicture(gl: WebGL2RenderingContext, ratio: number, caption: string): void {
+/**
+ * Saves what has just been drawn with `gl` over `drape` as a PNG with a line of text below; `ratio`: its pixels per pixel of
+ * the page.
+ */
+export function savePicture(gl: WebGL2RenderingContext, drape: HTMLCanvasElement, ratio: number, caption: string): void {
   const picture = drawnPixels(gl);
   const foot = Math.round(26 * ratio);
   const canvas = document.createElement('canvas');
@@ -11,7 +14,11 @@ export function savePicture(gl: WebGL2RenderingContext, ratio: number, caption: 
   if (!context) return;
   context.fillStyle = '#151c22';
   context.fillRect(0, 0, canvas.width, canvas.height);
-  context.putImageData(picture, 0, 0);
+  const drawn = document.createElement('canvas');
+  [drawn.width, drawn.height] = [picture.width, picture.height];
+  drawn.getContext('2d')?.putImageData(picture, 0, 0);
+  context.drawImage(drape, 0, 0, picture.width, picture.height);
+  context.drawImage(drawn, 0, 0);
   context.fillStyle = '#dbe4ea';
   context.font = `${13 * ratio}px system-ui, 'DejaVu Sans', sans-serif`;
   context.textBaseline = 'middle';

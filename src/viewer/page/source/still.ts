@@ -5,6 +5,9 @@
 import { Box3, type Camera, Material, Mesh, type Object3D, Vector3, type WebGLRenderer } from 'three';
 import { drawnPixels } from './pixels';
 
+/** Alpha of a picture where nothing stands, seen by nobody. */
+export const clearAlpha = 1 / 255;
+
 /** A rectangle of the drawn canvas, px from its lower left corner: [left, bottom, right, top]. */
 export type Window = readonly [number, number, number, number];
 
@@ -50,7 +53,7 @@ export class Still {
   keep(): boolean {
     const { gl } = this;
     // In memory, where no process that dies takes it away.
-    const context = this.under.getContext('2d', { alpha: false, willReadFrequently: true });
+    const context = this.under.getContext('2d', { willReadFrequently: true });
     if (this.cannot || !context || context.isContextLost() || gl.isContextLost()) return false;
     const first = this.framebuffer === null;
     if (first) while (gl.getError() !== gl.NO_ERROR); // those of others
@@ -60,9 +63,8 @@ export class Still {
     if (first) this.cannot = gl.getError() !== gl.NO_ERROR;
     if (this.cannot) return false;
     const picture = drawnPixels(gl);
-    // Black is no colour of a picture: while a process that draws is started again nothing is read, and nobody says so.
-    const [red, green, blue] = picture.data;
-    if (red === 0 && green === 0 && blue === 0) return false;
+    // No pixel of a picture is without any alpha: while a process that draws is started again nothing is read, and nobody says so.
+    if (picture.data[3] === 0) return false;
     context.putImageData(picture, 0, 0);
     return true;
   }
@@ -72,9 +74,20 @@ export class Still {
    * first: a copy alone does not count as drawing, and the canvas would be cleared after it.
    */
   show(window: Window): void {
+    this.seen(true);
     this.renderer.setClearColor(0x000000, 0);
     this.renderer.clear(true, true, false);
     this.copyDepth(this.framebuffer, null, window);
+  }
+
+  /** What is kept is not seen: the whole picture is drawn over it. */
+  hide(): void {
+    this.seen(false);
+  }
+
+  private seen(shown: boolean): void {
+    const wanted = shown ? 'visible' : 'hidden';
+    if (this.under.style.visibility !== wanted) this.under.style.visibility = wanted;
   }
 
   /** Forgets what was lost with the context. */
@@ -120,7 +133,7 @@ export function windowOf(object: Object3D, camera: Camera, width: number, height
   object.traverseVisible((part) => {
     const { geometry, material } = part as Mesh;
     if (!geometry || !(material instanceof Material) || !material.depthTest) return;
-    geometry.computeBoundingBox();
+    if (!geometry.boundingBox) geometry.computeBoundingBox();
     box.copy(geometry.boundingBox!);
     if (box.isEmpty()) return;
     for (let i = 0; i < 8; ++i) {

@@ -1,6 +1,8 @@
 // The streamed surface as plain arrays: normals, edges to draw, rays against it. No drawing here.
 import { Part, Tag, type Topology, type Vec3 } from './protocol';
 
+const mostPairs = 1_000_000; // of a vertex of a wall and one of a lip, that are compared for one surface
+
 export interface Hit {
   point: Vec3; // m
   normal: Vec3; // unit, outward, smooth over the surface
@@ -52,6 +54,22 @@ export function vertexNormals(positions: Float32Array, triangles: Uint32Array, n
   }
 }
 
+/** Whether a surface is smooth: its triangles turn as the normals of their corners do, but for one corner in fifty. */
+export function isSmooth(positions: Float32Array, triangles: Uint32Array, normals: Float32Array): boolean {
+  let sharp = 0;
+  const corner = (i: number, d: number): number => positions[3 * triangles[i]! + d]!;
+  for (let i = 0; i < triangles.length; i += 3) {
+    const [ux, uy, uz, vx, vy, vz] = [1, 2].flatMap((k) => [0, 1, 2].map((d) => corner(i + k, d) - corner(i, d))) as [number, number, number, number, number, number];
+    const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+    const length = Math.hypot(x, y, z);
+    for (let k = 0; k < 3; ++k) {
+      const at = 3 * triangles[i + k]!;
+      if (x * normals[at]! + y * normals[at + 1]! + z * normals[at + 2]! < 0.8 * length) sharp += 1;
+    }
+  }
+  return 50 * sharp <= triangles.length;
+}
+
 /** Writes the triangles that turn their front to `eye` into `front`; how many indices that is. */
 export function frontFaces(positions: Float32Array, triangles: Uint32Array, eye: Vec3, front: Uint32Array): number {
   const p = positions as ArrayLike<number> as number[];
@@ -101,6 +119,35 @@ export function frontEdges(topology: Topology): Uint32Array {
     if (part === Part.wallPlus && topology.tags[a] === Tag.front && topology.tags[b] === Tag.front) edges.push(a, b);
   });
   return Uint32Array.from(edges);
+}
+
+/** 1 at vertices of lips, 0 elsewhere. */
+export function onLips(topology: Topology): Float32Array {
+  return Float32Array.from({ length: topology.vertexCount }, (_, v) => (topology.tags[v] === Tag.lip ? 1 : 0));
+}
+
+/** How far the vertices of `walls` are from the nearest vertex of a lip at rest, m; of others 0, and without lips everywhere. */
+export function belowLips(topology: Topology, walls: Uint32Array): Float32Array {
+  const { rest, tags, vertexCount } = topology;
+  const below = new Float32Array(vertexCount);
+  const vertices = [...new Set(walls)];
+  let lips = vertices.filter((v) => tags[v] === Tag.lip);
+  if (lips.length === 0) return below;
+  // Of a long wound every second or third lip will do.
+  const step = Math.ceil((lips.length * vertices.length) / mostPairs);
+  if (step > 1) lips = lips.filter((_, i) => i % step === 0);
+  const places = Float32Array.from(lips.flatMap((v) => [rest[3 * v]!, rest[3 * v + 1]!, rest[3 * v + 2]!]));
+  for (const v of vertices) {
+    if (tags[v] === Tag.lip) continue;
+    const [x, y, z] = [rest[3 * v]!, rest[3 * v + 1]!, rest[3 * v + 2]!];
+    let least = Infinity;
+    for (let k = 0; k < places.length; k += 3) {
+      const square = (places[k]! - x) ** 2 + (places[k + 1]! - y) ** 2 + (places[k + 2]! - z) ** 2;
+      if (square < least) least = square;
+    }
+    below[v] = Math.sqrt(least);
+  }
+  return below;
 }
 
 function onRim(topology: Topology, vertex: number): boolean {

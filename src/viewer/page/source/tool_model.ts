@@ -6,23 +6,22 @@ import {
   Color,
   ConeGeometry,
   CylinderGeometry,
-  DoubleSide,
   Group,
   Line,
   LineBasicMaterial,
   Material,
   Mesh,
   MeshBasicMaterial,
-  MeshPhongMaterial,
   Object3D,
   Quaternion,
   SphereGeometry,
   Vector3,
 } from 'three';
+import { forceColour } from './colours';
 import type { Frame, Mode, SessionStart, Vec3 } from './protocol';
+import { metal } from './steel';
+import type { Rod } from './tool_shadow';
 
-const steel = new Color('#b9c4cc');
-const forceColour = new Color('#f2c14e');
 const handColour = new Color('#62b6cb');
 const up = new Vector3(0, 0, 1);
 const along = new Vector3(0, 1, 0); // axis of three's cylinders
@@ -32,6 +31,7 @@ export class ToolModel {
   readonly group = new Group();
   showSpring = true;
   private tools: Partial<Record<Mode, Group>> = {};
+  private shapes: Partial<Record<Mode, Rod[]>> = {}; // of their shadows, in the tools' frames
   private readonly ghost: Mesh;
   private readonly spring: Line;
   private readonly arrow = new Group();
@@ -51,8 +51,8 @@ export class ToolModel {
     this.spring = new Line(geometry, new LineBasicMaterial({ color: handColour, depthTest: false, transparent: true }));
     this.spring.frustumCulled = false;
     this.spring.renderOrder = 6;
-    this.shaft = new Mesh(new CylinderGeometry(1, 1, 1, 14), overlay(forceColour, 0.95));
-    this.head = new Mesh(new ConeGeometry(1, 1, 18), overlay(forceColour, 0.95));
+    this.shaft = new Mesh(new CylinderGeometry(1, 1, 1, 14), overlay(new Color(), 0.95));
+    this.head = new Mesh(new ConeGeometry(1, 1, 18), overlay(new Color(), 0.95));
     this.shaft.renderOrder = this.head.renderOrder = 7;
     this.arrow.add(this.shaft, this.head);
     this.group.add(this.ghost, this.spring, this.arrow);
@@ -76,6 +76,7 @@ export class ToolModel {
     this.tools.probe = probe(session, this.size);
     this.tools.grasper = grasper(session, this.size);
     if (session.blade) this.tools.blade = blade(session.blade.edge, this.size);
+    this.shapes = toolRods(session, this.size);
     for (const tool of Object.values(this.tools)) this.group.add(tool);
     this.group.visible = false;
   }
@@ -102,6 +103,16 @@ export class ToolModel {
     this.point(tip, new Vector3(...frame.force));
   }
 
+  /** What throws the tool's shadow, where the tool is. */
+  rods(): Rod[] {
+    for (const [mode, tool] of Object.entries(this.tools) as [Mode, Group][]) {
+      if (!tool.visible || !this.group.visible) continue;
+      const place = (point: Vector3): Vector3 => point.clone().applyQuaternion(tool.quaternion).add(tool.position);
+      return (this.shapes[mode] ?? []).map(({ from, to, radius }) => ({ from: place(from), to: place(to), radius }));
+    }
+    return [];
+  }
+
   /** The arrow: linear in the force, its scale a step of 1, 2, 5 so that the recent peak has about a quarter of the organ. */
   private point(tip: Vector3, force: Vector3): void {
     const newtons = force.length();
@@ -114,6 +125,7 @@ export class ToolModel {
     const length = newtons / this.newtonsPerMetre;
     this.arrow.visible = length > 0.004 * this.size;
     if (!this.arrow.visible) return;
+    for (const { material } of [this.shaft, this.head]) (material as MeshBasicMaterial).color.set(forceColour(newtons));
     const headLength = Math.min(0.4 * length, 0.04 * this.size);
     const radius = 0.006 * this.size;
     this.arrow.position.copy(tip);
@@ -149,10 +161,6 @@ export class ToolModel {
     }
     place.needsUpdate = true;
   }
-}
-
-function metal(colour = steel): MeshPhongMaterial {
-  return new MeshPhongMaterial({ color: colour, emissive: colour.clone().multiplyScalar(0.16), specular: new Color('#50585e'), shininess: 50, side: DoubleSide });
 }
 
 /** A solid of revolution along +z from `from`, m. */
@@ -237,17 +245,40 @@ function blade(edge: readonly Vec3[], size: number): Group {
   geometry.setAttribute('position', new BufferAttribute(Float32Array.from(corners), 3));
   geometry.setIndex(index);
   geometry.computeVertexNormals();
-  group.add(new Mesh(geometry, metal()));
+  group.add(new Mesh(geometry, metal(new Color().setRGB(2, 2, 2)))); // polished
   const cutting = new BufferGeometry();
   cutting.setAttribute('position', new BufferAttribute(Float32Array.from(edge.flat()), 3));
   group.add(new Line(cutting, new LineBasicMaterial({ color: '#ffffff' })));
   const top = rises ? height : Math.max(first[2], last[2]) + lift;
-  const handle = rod(0.014 * size, top, 0.45 * size, metal(new Color('#76848e')));
+  const handle = rod(0.014 * size, top, 0.45 * size, metal(new Color('#a9b4bd')));
   const foot = rises ? first : mid(first, last);
   handle.position.x = foot[0];
   handle.position.y = foot[1];
   group.add(handle);
   return group;
+}
+
+/** The tools as rods with round ends; the reference point is the origin, the axis +z, a blade's way +x. */
+function toolRods(session: SessionStart, size: number): Partial<Record<Mode, Rod[]>> {
+  const along = (from: number, to: number, radius: number, x = 0, y = 0): Rod => ({ from: new Vector3(x, y, from), to: new Vector3(x, y, to), radius });
+  const { tool, blade: knife } = session;
+  const radius = tool?.radius ?? 0.02 * size;
+  const shapes: Partial<Record<Mode, Rod[]>> = { grasper: [along(0, 3 * radius, 0.6 * radius), along(2.7 * radius, 0.5 * size, 0.6 * radius)] };
+  if (tool?.shape === 'punch') shapes.probe = [along(tool.radius, tool.length, tool.radius)];
+  else if (tool?.shape === 'sphere') shapes.probe = [along(radius, radius + 1e-4, radius), along(radius, 0.5 * size, 0.45 * radius)];
+  else if (tool) shapes.probe = [along(radius, radius + 1e-4, radius), along(radius, tool.shaft_length, tool.shaft_radius)];
+  const [first, last] = [knife?.edge[0], knife?.edge[knife.edge.length - 1]];
+  if (first && last) {
+    const thick = 0.004 * size;
+    const rises = Math.abs(last[2] - first[2]) > 0.25 * distance(first, last);
+    const [top, foot] = rises ? [Math.max(first[2], last[2]), first] : [Math.max(first[2], last[2]) + 0.5 * distance(first, last), mid(first, last)];
+    shapes.blade = [
+      { from: new Vector3(...first), to: new Vector3(...last), radius: thick },
+      along(first[2], top, 2 * thick, foot[0], foot[1]),
+      along(top, top + 0.45 * size, 0.014 * size, foot[0], foot[1]),
+    ];
+  }
+  return shapes;
 }
 
 function distance(a: Vec3, b: Vec3): number {

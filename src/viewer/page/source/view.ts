@@ -1,9 +1,6 @@
 // The picture: renderer, lights and what stands in it. Draws when something has changed.
 import {
-  Color,
-  DirectionalLight,
   Group,
-  HemisphereLight,
   Mesh,
   MeshBasicMaterial,
   type PerspectiveCamera,
@@ -15,15 +12,24 @@ import {
 } from 'three';
 import { Body } from './body';
 import { Orbit } from './orbit';
+import { Plan, planned } from './plan';
 import { Overlays } from './overlays';
 import type { Frame, SessionStart, Vec3 } from './protocol';
-import { Still, windowOf } from './still';
+import { Drape } from './room';
+import { clearAlpha, Still, windowOf } from './still';
 import type { Ray } from './stylus';
 import type { Hit } from './surface';
 import { ToolModel } from './tool_model';
+import { ToolShadow } from './tool_shadow';
 import { crossing, Trace } from './trace';
 
-const backdrop = new Color('#10171c');
+/** Of tissue: chosen by what pictures take, or one of the two. */
+export type Shading = 'auto' | 'fine' | 'plain';
+
+// Where the processor draws: s that a picture drawn as a whole may take. Above the one tissue is shaded plainly, below the other
+// with its grain, which takes half as much again at most.
+const slowest = 0.07;
+const quickest = 0.03;
 const leastInterval = 30; // ms between two pictures, where the processor draws
 
 export class View {
@@ -32,46 +38,47 @@ export class View {
   readonly tool = new ToolModel();
   readonly overlays = new Overlays();
   readonly trace = new Trace();
+  readonly plan = new Plan();
+  readonly shadow = new ToolShadow();
+  readonly drape: Drape; // below the picture, which is drawn over it
+  showPlan = false; // where the blade would go
   readonly software: boolean; // drawn by the processor
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly standing = new Group(); // while the tool moves
   private readonly moving = new Group();
+  private frame: Frame | null = null; // whose tool is shown
   private since = 0; // ms, the last picture was ordered
   private same = 0; // pictures in which the tool alone has changed
   kept = false; // the last picture without the tool
-  private readonly lamp = new DirectionalLight('#fff4ea', 2.3);
   private readonly mark: Mesh;
   private readonly still: Still | null; // the picture without the tool, where the processor draws
   private readonly gl: WebGL2RenderingContext;
   private stale: 'no' | 'tool' | 'all' = 'all'; // what has to be drawn again
   private sharpness = 1; // drawn pixels per pixel of the page, where the processor draws
+  private fineEnough = true; // the grain, for what pictures take
+  private wanted: Shading = 'auto';
   private drawSeconds = 0; // of a picture, smoothed
-  private ordered: { done: WebGLSync; since: number } | null = null; // the picture that the processor is at
+  private wholeSeconds = 0; // of a picture in which more than the tool was drawn, smoothed
+  private ordered: { done: WebGLSync; since: number; whole: boolean } | null = null; // the picture that the processor is at
 
   /** Throws Error in words when the browser has no WebGL 2. */
   constructor(readonly canvas: HTMLCanvasElement) {
     this.software = drawsInSoftware();
-    // What is kept of a picture lies below the canvas and is seen through it.
-    this.renderer = new WebGLRenderer({ canvas, alpha: this.software, antialias: !this.software, powerPreference: 'high-performance' });
+    // The drape, and what is kept of a picture, lie below the canvas and are seen through it.
+    this.drape = new Drape(canvas);
+    this.renderer = new WebGLRenderer({ canvas, alpha: true, antialias: !this.software, powerPreference: 'high-performance' });
     this.gl = this.renderer.getContext() as WebGL2RenderingContext;
     this.still = this.software ? new Still(this.renderer, canvas, () => this.change()) : null;
-    this.scene.background = backdrop;
     this.mark = new Mesh(
       new RingGeometry(0.72, 1, 32),
       new MeshBasicMaterial({ color: '#62b6cb', transparent: true, opacity: 0.8, depthTest: false }),
     );
     this.mark.visible = false;
     this.mark.renderOrder = 4;
-    this.scene.add(
-      new HemisphereLight('#e4ecf2', '#8a7672', 1.25),
-      this.lamp,
-      this.lamp.target,
-      this.standing,
-      this.moving,
-    );
+    this.scene.add(this.standing, this.moving);
     this.standing.add(this.body.group, this.overlays.group);
-    this.moving.add(this.trace.mesh, this.tool.group, this.mark);
+    this.moving.add(this.trace.mesh, this.plan.mesh, this.shadow.mesh, this.tool.group, this.mark);
     new ResizeObserver(() => this.resize()).observe(canvas);
     // What a browser does with the canvas of a window that is not seen is its own affair.
     document.addEventListener('visibilitychange', () => this.change());
@@ -100,13 +107,34 @@ export class View {
     this.mark.scale.setScalar(0.018 * size);
     this.tool.setSession(session);
     this.trace.clear(size);
+    this.plan.setSize(size);
+    this.drape.lay(lower, upper);
     this.change();
   }
 
-  /** The way of the blade since the solve that is shown; `edge` in the blade's frame. */
+  /** The tool of a frame, and, with the blade's `edge` in its frame, its way since the solve that is shown. */
   follow(frame: Frame, edge: readonly Vec3[]): void {
+    this.frame = frame;
+    this.tool.update(frame);
+    if (frame.mode !== 'blade') return;
     const cast = (origin: Vec3, direction: Vec3): Hit | null => this.body.cast(origin, direction);
     this.trace.note(crossing(edge, frame.tip, frame.orientation, cast), frame.poseInTick, frame.poseInSolve);
+  }
+
+  /** Where the blade would go; of another tool nothing. */
+  private plot(): void {
+    const frame = this.frame;
+    const surface = this.body.surface();
+    if (!this.showPlan || frame?.mode !== 'blade' || !surface) return this.plan.hide();
+    this.plan.show(planned(frame.tip, frame.orientation, surface.positions, surface.triangles));
+  }
+
+  /** The shadow of the tool, as the lamp stands. */
+  private darken(): void {
+    const surface = this.body.surface();
+    // Colours that stand for values are not darkened.
+    if (!surface || this.body.transparent || this.body.coloured) return this.shadow.hide();
+    this.shadow.fall(this.tool.rods(), this.body.lighting.lamp.value, surface.positions, surface.normals, surface.triangles);
   }
 
   /** Where the stylus is on the surface; null: nowhere. */
@@ -138,7 +166,7 @@ export class View {
     const { gl } = this;
     const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
-    if (done) this.ordered = { done, since };
+    if (done) this.ordered = { done, since, whole: this.same < 2 };
     return true;
   }
 
@@ -146,11 +174,13 @@ export class View {
   busy(): boolean {
     if (!this.ordered) return false;
     const { gl } = this;
-    const { done, since } = this.ordered;
+    const { done, since, whole } = this.ordered;
     if (gl.clientWaitSync(done, 0, 0) === gl.TIMEOUT_EXPIRED) return true;
     gl.deleteSync(done);
     this.ordered = null;
-    this.drawSeconds += 0.2 * ((performance.now() - since) / 1000 - this.drawSeconds);
+    const seconds = (performance.now() - since) / 1000;
+    this.drawSeconds += 0.2 * (seconds - this.drawSeconds);
+    if (whole) this.wholeSeconds += 0.2 * (seconds - this.wholeSeconds);
     this.adapt();
     return false;
   }
@@ -160,6 +190,18 @@ export class View {
     return this.software && performance.now() - this.since < leastInterval;
   }
 
+  /** The shading that is asked for. */
+  set shading(wanted: Shading) {
+    if (wanted === this.wanted) return;
+    this.wanted = wanted;
+    this.shade();
+  }
+
+  /** Whether the grain is in every pixel. */
+  get fine(): boolean {
+    return this.body.lighting.fine.value > 0;
+  }
+
   /** Wall clock of a picture, s; 0 where graphics hardware draws and does not tell. */
   get pictureSeconds(): number {
     return this.drawSeconds;
@@ -167,6 +209,9 @@ export class View {
 
   drawNow(): void {
     const { camera } = this.orbit;
+    this.light(camera);
+    this.plot();
+    this.darken();
     // Keeping costs as much as drawing: it pays from the second picture of the same organ on.
     this.same = this.stale === 'all' ? 0 : this.same + 1;
     this.kept = this.kept && this.same > 0;
@@ -175,7 +220,10 @@ export class View {
     if (!this.still || this.still.fails || this.body.transparent || this.same < 2) return this.drawAll(camera);
     if (!this.kept || !this.still.kept) {
       this.showing(true, false);
+      // Of a picture that is drawn once for many the outline may cost what it does.
+      this.body.lighting.outline.value = Number(this.body.smooth);
       this.drawAll(camera);
+      this.body.lighting.outline.value = 0;
       this.kept = this.still.keep();
       this.showing(true, true);
       if (!this.kept) return this.drawAll(camera);
@@ -188,11 +236,9 @@ export class View {
     this.showing(false, true);
     this.moving.updateMatrixWorld();
     still.show(windowOf(this.moving, camera, this.gl.drawingBufferWidth, this.gl.drawingBufferHeight));
-    this.scene.background = null; // or the canvas is cleared
     this.renderer.autoClear = false;
     this.renderer.render(this.scene, camera);
     this.renderer.autoClear = true;
-    this.scene.background = backdrop;
     this.showing(true, true);
   }
 
@@ -202,11 +248,17 @@ export class View {
     this.drawNow();
   }
 
-  private drawAll(camera: PerspectiveCamera): void {
+  /** The lamp is over the left shoulder: shading tells the shape from every side. */
+  private light(camera: PerspectiveCamera): void {
     const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
     const above = new Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
-    // A lamp over the left shoulder: shading tells the shape from every side.
-    this.lamp.position.copy(camera.position).addScaledVector(right, -0.35).addScaledVector(above, 0.45);
+    this.body.lighting.lamp.value.copy(camera.position).addScaledVector(right, -0.35).addScaledVector(above, 0.45).normalize();
+  }
+
+  private drawAll(camera: PerspectiveCamera): void {
+    this.still?.hide();
+    this.drape.draw(camera, this.gl.drawingBufferWidth, this.gl.drawingBufferHeight);
+    this.renderer.setClearColor(0x000000, clearAlpha);
     if (this.software) this.body.leaveOutBacks(camera.position.toArray() as Vec3);
     this.renderer.render(this.scene, camera);
   }
@@ -230,15 +282,27 @@ export class View {
     return { x: 0.5 * (at.x + 1) * this.canvas.clientWidth, y: 0.5 * (1 - at.y) * this.canvas.clientHeight };
   }
 
-  /** Coarser pixels where the processor cannot keep up, finer ones where it can. */
+  /** The plain shading, then coarser pixels where the processor cannot keep up, the fine ones where it can. */
   private adapt(): void {
+    const fine = this.wholeSeconds > slowest ? false : this.wholeSeconds < quickest ? true : this.fineEnough;
+    if (fine !== this.fineEnough) {
+      this.fineEnough = fine;
+      this.wholeSeconds = this.drawSeconds = 0.5 * (slowest + quickest);
+      this.shade();
+      return;
+    }
     let wanted = this.sharpness;
-    if (this.drawSeconds > 0.07) wanted = Math.max(0.5, wanted - 0.25);
+    if (this.drawSeconds > slowest) wanted = Math.max(0.5, wanted - 0.25);
     else if (this.drawSeconds < 0.02) wanted = Math.min(1, wanted + 0.25);
     if (wanted === this.sharpness) return;
     this.drawSeconds = 0.045;
     this.sharpness = wanted;
     this.resize();
+  }
+
+  private shade(): void {
+    this.body.lighting.fine.value = Number(this.wanted === 'auto' ? this.fineEnough : this.wanted === 'fine');
+    this.change();
   }
 
   private resize(): void {

@@ -19,10 +19,20 @@ export interface Opened {
   complaints: string[]; // console errors, uncaught exceptions, requests to elsewhere
 }
 
+export interface Size {
+  width: number; // px of the page
+  height: number;
+  touch?: boolean;
+  ratio?: number; // px of the screen per px of the page
+  first?: boolean; // visit of this browser: panels folded, with the hint
+  still?: boolean; // who sees it wants nothing to move by itself
+}
+
+/** Opens the page as somebody does who has been there before and has left its panels open, or for the first time. */
 export async function openPage(
   browser: Browser,
   address: string,
-  size: { width: number; height: number; touch?: boolean; ratio?: number } = { width: 1280, height: 800 },
+  size: Size = { width: 1280, height: 800 },
   prepare?: (tab: Tab) => Promise<void>,
 ): Promise<Opened> {
   const context = await browser.newContext({
@@ -30,7 +40,12 @@ export async function openPage(
     acceptDownloads: true,
     hasTouch: size.touch ?? false,
     deviceScaleFactor: size.ratio ?? 1,
+    reducedMotion: size.still ? 'reduce' : 'no-preference',
   });
+  if (!size.first) {
+    const shown = size.width > 760 ? 'yes' : 'no';
+    await context.addInitScript((panels) => Object.entries({ hint: 'seen', panels }).forEach(([key, value]) => localStorage.setItem(`spherecut.${key}`, value)), shown);
+  }
   context.setDefaultTimeout(1000 * patience);
   const tab = await context.newPage();
   const complaints: string[] = [];

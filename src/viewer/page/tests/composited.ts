@@ -36,13 +36,14 @@ export async function composited(tab: Tab, wait = 10): Promise<Picture> {
 type Test = (r: number, g: number, b: number) => boolean;
 /** What a pixel of the view can be of, by its colour. */
 export const kinds = {
-  backdrop: (r, g, b) => Math.abs(r - 16) < 7 && Math.abs(g - 23) < 7 && Math.abs(b - 28) < 7,
+  backdrop: (r, g, b) => r < 46 && g >= r + 2 && b >= g - 2 && b < 92, // the drape
   tissue: (r, g, b) => r > g + 22 && r > b + 18 && g < b + 60 && r > 45, // of the organ, and the walls of a wound
-  wall: (r, g, b) => r > 50 && g < 0.36 * r && b < 0.42 * r, // of a wound alone
-  lip: (r, g, b) => r > 220 && g > 180 && b > 130 && r > b + 25,
-  steel: (r, g, b) => b >= r && r > 50 && b - r < 45 && g >= r - 4 && b < 250,
-  arrow: (r, g, b) => Math.abs(r - 242) < 34 && Math.abs(g - 193) < 34 && Math.abs(b - 78) < 40,
+  wall: (r, g, b) => r > 20 && g < 0.3 * r && b < 0.35 * r, // of a wound alone
+  lip: (r, g, b) => r > 185 && g > 0.62 * r && g - b > 16 && b > 90,
+  steel: (r, g, b) => b >= r && r > 50 && b - r < 45 && g >= r - 4 && b < 253,
+  arrow: (r, g, b) => r > 232 && g > 70 && g < 236 && b < 136 && g - b > 40, // and the curve of the chart
   hand: (r, g, b) => Math.abs(r - 98) < 30 && Math.abs(g - 182) < 30 && Math.abs(b - 203) < 30,
+  plan: (r, g, b) => b > 120 && b > r + 50 && b > g + 50,
 } satisfies Record<string, Test>;
 export type Kind = keyof typeof kinds;
 

@@ -23,9 +23,10 @@ export function look(tab: Tab): Promise<Seen> {
     const page = globalThis.spherecut!;
     const frame = page.frame!;
     const text = (id: string): string => document.getElementById(id)!.textContent ?? '';
+    const [, number, milli] = /^([\d.]+) (m?)N$/.exec(text('force')) ?? [];
     return {
       force: Math.hypot(...frame.force),
-      readout: Number(text('force')),
+      readout: Number(number) * (milli ? 1e-3 : 1),
       depth: frame.depth,
       solve: frame.solve,
       mode: frame.mode,

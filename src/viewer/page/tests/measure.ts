@@ -3,7 +3,9 @@
 // status 1 when the feed has fewer than 20 frames a second, or the hand is later than 250 ms (95 %) in the picture.
 // node measure.mjs BUILD_FOLDER SOURCE_FOLDER stroke [KEY=VALUE ...]: a wavy stroke of the blade as a user draws it, in five
 // seconds and, in a session begun anew, at 30 mm/s; as a table. Keys of the scenario take other values (fine_spacing=0.004).
-import { readFileSync } from 'node:fs';
+// node measure.mjs BUILD_FOLDER SOURCE_FOLDER picture: what a picture of the live liver takes, drawn as a whole and for a tool
+// that moves alone, with each shading, in a window of 1280 x 800.
+import { readdirSync, readFileSync } from 'node:fs';
 import { loadavg } from 'node:os';
 import { join } from 'node:path';
 import type { Page as Tab } from 'playwright-core';
@@ -110,6 +112,21 @@ async function rates(): Promise<void> {
   }
 }
 
+/** Processor time of this process's descendants but for the server's, s: that of the browser. */
+function browserTime(server: number): number {
+  const parents = new Map<number, number>();
+  for (const name of readdirSync('/proc')) {
+    if (!/^\d+$/.test(name)) continue;
+    try {
+      parents.set(Number(name), Number(readFileSync(`/proc/${name}/stat`, 'latin1').replace(/^.*\) /, '').split(' ')[1]));
+    } catch {
+      // It has ended.
+    }
+  }
+  const ours = (pid: number): boolean => pid !== server && (pid === process.pid || (parents.has(pid) && ours(parents.get(pid)!)));
+  return [...parents.keys()].filter((pid) => pid !== process.pid && ours(pid)).reduce((sum, pid) => sum + processorTime(pid), 0);
+}
+
 /** Processor time of a process with all its threads, s. */
 function processorTime(pid: number): number {
   const fields = readFileSync(`/proc/${pid}/stat`, 'latin1').replace(/^.*\) /, '').split(' ');
@@ -196,6 +213,63 @@ async function strokes(): Promise<void> {
   for (const row of rows) console.log(`| ${row.join(' | ')} |`);
 }
 
-await (kind === 'stroke' ? strokes() : rates());
+/** Draws `count` pictures, each waited for to its last pixel, as a whole or for a tool that moves alone; ms of each. */
+function pictureTimes(tab: Tab, alone: boolean, count: number): Promise<number[]> {
+  return tab.evaluate(
+    ([tool, most]) => {
+      const { view } = globalThis.spherecut!;
+      const gl = view.canvas.getContext('webgl2')!;
+      const pixel = new Uint8Array(4);
+      return Array.from({ length: Number(most) }, () => {
+        const start = performance.now();
+        if (tool) {
+          view.moved();
+          view.drawNow();
+        } else view.drawWhole();
+        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+        return performance.now() - start;
+      });
+    },
+    [alone, count],
+  );
+}
+
+async function pictures(): Promise<void> {
+  const served = await serve(build, join(source, 'scenarios/liver_live.toml'));
+  const browser = await launch();
+  try {
+    const { tab } = await openPage(browser, served.address, { width: 1280, height: 800 });
+    await ready(tab);
+    await hover(tab, -0.03, -0.012);
+    await tab.waitForTimeout(1500);
+    // Nothing else draws, and every pixel of the page has one of the picture.
+    await tab.evaluate(() => {
+      const page = globalThis.spherecut as unknown as { show(): void };
+      page.show = () => undefined;
+      const view = globalThis.spherecut!.view as unknown as { adapt(): void; sharpness: number; resize(): void };
+      view.adapt = () => undefined;
+      view.sharpness = 1;
+      view.resize();
+    });
+    const size = await tab.evaluate(() => `${globalThis.spherecut!.view.canvas.width} x ${globalThis.spherecut!.view.canvas.height}`);
+    const count = 100;
+    for (const [what, shading, alone] of [['as a whole, with grain', 'fine', false], ['as a whole, plain', 'plain', false], ['tool alone', 'fine', true]] as const) {
+      await tab.selectOption('#shading', shading);
+      await pictureTimes(tab, alone, 8);
+      const before = browserTime(served.process.pid!);
+      const times = await pictureTimes(tab, alone, count);
+      const spent = (1000 * (browserTime(served.process.pid!) - before)) / count;
+      console.log(
+        `a picture of ${size}, ${what}: ${quantile(times, 0.5)!.toFixed(1)} ms (5 % ${quantile(times, 0.05)!.toFixed(1)}), ` +
+          `${spent.toFixed(1)} ms of processor time; load ${loadavg()[0]!.toFixed(1)}`,
+      );
+    }
+  } finally {
+    await browser.close();
+    await served.stop();
+  }
+}
+
+await { stroke: strokes, picture: pictures, rates }[kind]!();
 for (const miss of misses) console.error(`MISSED: ${miss}`);
 process.exit(misses.length > 0 ? 1 : 0);

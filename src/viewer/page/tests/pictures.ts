@@ -43,17 +43,22 @@ async function liver(): Promise<void> {
       await photograph(tab, out, name);
       console.log(name, JSON.stringify(await look(tab)));
     };
+    await tab.selectOption('#shading', 'fine');
+    const panels = (): Promise<void> => tab.keyboard.press('0');
+    await panels();
     await hover(tab, -0.03, -0.012);
     await tab.mouse.down();
     await until(tab, 'the force is felt', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.05);
     await tab.mouse.wheel(0, -800);
     await tab.waitForTimeout(2500);
     await keep('press');
+    await panels();
     await tab.selectOption('#colours', 'von_mises');
     await tab.waitForTimeout(1200);
     await keep('stress');
     await tab.selectOption('#colours', 'none');
     await tab.mouse.up();
+    await panels();
     await chooseMode(tab, '2', 'blade');
     for (let i = 0; i < 6; ++i) await tab.keyboard.press('.', { delay: 150 });
     await hover(tab, -0.06, 0.004);
@@ -67,12 +72,13 @@ async function liver(): Promise<void> {
     await caughtUp(tab);
     await tab.evaluate(() => {
       const orbit = globalThis.spherecut!.view.orbit;
-      orbit.turn(0, 0.35);
-      orbit.zoom(1.9);
-      orbit.pan(0.06, -0.13);
+      orbit.turn(0, 0.25);
+      orbit.zoom(2.1);
+      orbit.pan(0.2, -0.2);
       globalThis.spherecut!.view.change();
     });
     await keep('wound');
+    await panels();
     await tab.keyboard.press('n');
     await hover(tab, -0.03, -0.004);
     await tab.keyboard.press('p');
@@ -89,6 +95,11 @@ async function liver(): Promise<void> {
     await context.close();
     const phone = await openPhone();
     await ready(phone.tab);
+    await phone.tab.evaluate(() => {
+      const list = document.getElementById('shading') as HTMLSelectElement;
+      list.value = 'fine';
+      list.dispatchEvent(new Event('change'));
+    });
     await phone.tab.getByText('Probe', { exact: true }).tap();
     await phone.tab.waitForTimeout(2000);
     await phone.tab.tap('#view', { position: { x: 170, y: 300 } });
@@ -101,6 +112,8 @@ async function liver(): Promise<void> {
 /** The flap held by the grasper, before and after it has torn on. */
 async function flap(): Promise<void> {
   await withPage('liver_flap.toml', coarserFlap, async ({ tab }) => {
+    await tab.selectOption('#shading', 'fine');
+    await tab.keyboard.press('0');
     await hover(tab, -0.062, 0.003);
     await tab.mouse.down();
     await until(tab, 'the flap comes off its bed', () => globalThis.spherecut!.view.body.lipsApart() > 1e-3);

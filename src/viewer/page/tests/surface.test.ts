@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import { Part, Tag, type Topology } from '../source/protocol';
-import { castRay, frontEdges, frontFaces, lipDistance, lipEdges, trianglesOf, vertexNormals } from '../source/surface';
+import { castRay, frontEdges, frontFaces, isSmooth, lipDistance, lipEdges, trianglesOf, vertexNormals } from '../source/surface';
 
 /** A square of two triangles at z = 0, and a wall of one triangle below the edge from 1 to 2. */
 const square: Topology = {
@@ -53,4 +53,26 @@ test('Lips lie between surface and wall, the opening between the pairs', () => {
   assert.deepEqual([...lipEdges(square)], [1, 2]);
   assert.equal(frontEdges(square).length, 0);
   assert.equal(lipDistance(square, square.rest), 1);
+});
+
+test('A ball is smooth, a tetrahedron is not', () => {
+  const [rings, spokes] = [24, 48];
+  const places: number[] = [];
+  const index: number[] = [];
+  for (let i = 0; i <= rings; ++i) {
+    for (let j = 0; j < spokes; ++j) {
+      const [u, v] = [0.1 + ((Math.PI - 0.2) * i) / rings, (2 * Math.PI * j) / spokes];
+      places.push(Math.sin(u) * Math.cos(v), Math.sin(u) * Math.sin(v), Math.cos(u));
+      const [a, b] = [i * spokes + j, i * spokes + ((j + 1) % spokes)];
+      if (i < rings) index.push(a, a + spokes, b, b, a + spokes, b + spokes);
+    }
+  }
+  const smooth = (x: readonly number[], t: readonly number[]): boolean => {
+    const [positions, triangles] = [Float32Array.from(x), Uint32Array.from(t)];
+    const normals = new Float32Array(positions.length);
+    vertexNormals(positions, triangles, normals);
+    return isSmooth(positions, triangles, normals);
+  };
+  assert.ok(smooth(places, index));
+  assert.ok(!smooth([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1], [0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3]));
 });
