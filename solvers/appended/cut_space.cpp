@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numbers>
 
@@ -137,8 +136,7 @@ PlacedPart& CutSpace::place_of(PartId part) const {
 }
 
 /// The connected components of some parts, numbered from the first part on: that of each, and how many there are. Parts
-/// that are marked as faint (may be empty) join nothing, and go with a component that they touch. local_ tells the
-/// place of each part when this returns.
+/// that are marked as faint (may be empty) join nothing, and go with a component that they touch. local_ tells the place of each part when this returns.
 int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>& component,
                               const std::vector<char>& faint_parts) {
   for (std::size_t k = 0; k < parts.size(); ++k)
@@ -247,22 +245,12 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
     add_step(node, std::move(parts), found);
 }
 
-/// Least spacing of the nodes whose spheres hold x, m; infinite where none does.
-double CutSpace::finest_about(const Vector3& x) const {
-  double finest = std::numeric_limits<double>::infinity();
-  for (const int node : spheres_.candidates(x))
-    if ((spheres_.centres()[node] - x).norm() < spheres_.radii()[node])
-      finest = std::min(finest, nodes_.spacings[node]);
-  return finest;
-}
-
 /// The step of a sphere in which the front ends, or beside which it passes, where its run is curved.
 void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const {
   const Vector3& x = spheres_.centres()[node];
   const double radius = spheres_.radii()[node];
   const auto nearest = incision_->front_frame(x, 2 * radius);
-  if (!nearest || curved_[nearest->segment] == 0 || !incision_->closest(x, radius) ||
-      nodes_.spacings[node] > options_.step_coarsest * finest_about(nearest->point))
+  if (!nearest || curved_[nearest->segment] == 0 || !incision_->closest(x, radius))
     return;
   CutFunction function;
   Twin& twin = function.twin;

@@ -17,12 +17,8 @@ struct CutSpaceOptions {
   /// most of its length; on straight ones, corners included, the front functions do as well with half as many.
   double step_reach = 1;
   double step_turn = 20; // degrees
-  /// Spheres of more than so many times the finest spacing at the front have none: the finer ones about it tell its
-  /// curvature, and a step of a large sphere is a sum over thousands of parts. On a liver of 6 to 40 mm a cut opens the
-  /// same without.
-  double step_coarsest = 1.5;
-  double shallow = 1.2; // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
-  double corner = 45;   // degrees from one segment to the next: a corner, which is no curvature
+  double shallow = 1.2;  // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
+  double corner = 45;    // degrees from one segment to the next: a corner, which is no curvature
 };
 
 /// A second vector unknown of a sphere: h_J psi. Where the cut parts the sphere, psi is 1 in one component of what is
@@ -131,7 +127,6 @@ class CutSpace {
   void add_twins(int node, std::vector<CutFunction>& found);
   int find_components(const std::vector<PartId>& parts, std::vector<int>& component,
                       const std::vector<char>& faint_parts);
-  [[nodiscard]] double finest_about(const Vector3& x) const;
   [[nodiscard]] std::vector<char> faint_of(int node, const std::vector<PartId>& parts) const;
   [[nodiscard]] double energy_in(int node, PartId part) const;
   void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
