@@ -170,6 +170,25 @@ TEST_CASE("A pressurised penny that is appended opens by the right volume") {
   CHECK(volume == Approx(experiments::penny_opening_volume(material, 1, 1)).epsilon(0.015));
 }
 
+TEST_CASE("A sphere whose rim comes near a front that lies outside of it has a twin all the same") {
+  // On this node set one sphere, 0.4 m behind the front, holds the cut, and a box at its rim holds the front.
+  const experiments::CutFrame& crack = experiments::straight_crack_frame();
+  experiments::CutBody body = experiments::straight_crack_body(5, 0.3, Method::galerkin, SightRule::appended);
+  const Material material = body.problem.material;
+  const Intensities opens = Vector3::UnitX();
+  experiments::hold_whole_surface(body.problem, [&](const Vector3& x) {
+    return experiments::straight_crack_displacement(material, crack, opens, x);
+  });
+  const auto cut = discretise(body.problem, appending());
+  const Field field = cut->solve();
+  for (const double behind : {0.3, 0.36, 0.42, 0.48}) {
+    const Vector3 x = crack.origin - behind * crack.ahead - 0.32 * crack.tangent;
+    const double opening = experiments::opening_at(*cut, field, x, crack.normal, body.fine).dot(crack.normal);
+    INFO(behind << " m behind the front");
+    CHECK(opening == Approx(2 * tip_field(material, opens, -behind, 1e-15).displacement[1]).epsilon(0.03));
+  }
+}
+
 TEST_CASE("A body whose cut has grown by appending equals one that was cut at once") {
   AppendingScene scene;
   const auto follows = discretise(scene.problem(), appending());
