@@ -136,7 +136,8 @@ PlacedPart& CutSpace::place_of(PartId part) const {
 }
 
 /// The connected components of some parts, numbered from the first part on: that of each, and how many there are. Parts
-/// that are marked as faint (may be empty) join nothing, and go with a component that they touch. local_ tells the place of each part when this returns.
+/// that are marked as faint (may be empty) join nothing, and go with a component that they touch. local_ tells the
+/// place of each part when this returns.
 int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>& component,
                               const std::vector<char>& faint_parts) {
   for (std::size_t k = 0; k < parts.size(); ++k)

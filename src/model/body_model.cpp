@@ -23,8 +23,8 @@ constexpr double largest_share = 0.8;  // of the nodes in a window that is worth
 // rebuilt.
 constexpr double long_advance = 0.2, largest_share_of_long = 0.2;
 // Nodes of a body of `collocation` that is followed: the dense L U of its window costs more than the sparse one of the
-// whole body beyond. A run of liver_cut_linear.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with windows
-// and takes 27 s without; steps of 0.1 mm at 1000 nodes a third of the rebuild's time with them.
+// whole body beyond. A run of liver_cut_linear.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with
+// windows and takes 27 s without; steps of 0.1 mm at 1000 nodes a third of the rebuild's time with them.
 constexpr int largest_followed_balance = 1200;
 constexpr double crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a fixed region is kept
 constexpr double crowded_by_seed = 0.7;  // likewise, to a node that must be where it is
