@@ -181,12 +181,14 @@ int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>
 // Boxes at the rim of a sphere reach beyond it, and may join around a front outside of it what the cut parts inside.
 std::vector<char> CutSpace::faint_of(int node, const std::vector<PartId>& parts) const {
   std::vector<double> energy;
+  energy.reserve(parts.size());
   double whole = 0;
   for (const PartId part : parts) {
     energy.push_back(energy_in(node, part));
     whole += energy.back();
   }
   std::vector<char> faint_parts;
+  faint_parts.reserve(parts.size());
   for (const double own : energy)
     faint_parts.push_back(own < faint * whole ? 1 : 0);
   return faint_parts;

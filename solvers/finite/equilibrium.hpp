@@ -12,6 +12,7 @@
 #include "solvers/finite/step_memory.hpp"
 
 #include <optional>
+#include <utility>
 
 namespace spherecut::solvers {
 
@@ -116,6 +117,8 @@ class Equilibrium {
     double gripped = 0; // N, norm of the nodal forces of a tool that is not without friction
   };
   struct CarriedTangent { // at a state that has been
+    CarriedTangent(RestOperator tangent, std::vector<Matrix3> maps_back)
+        : matrix(std::move(tangent)), back(std::move(maps_back)) {}
     RestOperator matrix;
     std::vector<Matrix3> back; // inverse of the maps from the stress-free body to that state, a node each
   };
