@@ -315,6 +315,7 @@ MatrixX Equilibrium::contact_compliance(const std::vector<int>& chosen) {
   const std::vector<DisplacementMean>& means = contact_->means();
   const auto size = std::ssize(chosen);
   std::vector<const DisplacementMean*> of;
+  of.reserve(chosen.size());
   for (const int c : chosen)
     of.push_back(&means[static_cast<std::size_t>(c)]);
   find_responses(preconditioner(), chosen, of, responses_);
