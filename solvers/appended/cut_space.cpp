@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <numbers>
 
@@ -255,6 +256,9 @@ void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunc
   const auto nearest = incision_->front_frame(x, 2 * radius);
   if (!nearest || curved_[nearest->segment] == 0 || !incision_->closest(x, radius))
     return;
+  static const double share_limit = std::getenv("SPHERECUT_STEP_SHARE") ? std::atof(std::getenv("SPHERECUT_STEP_SHARE")) : options_.step_share;
+  if (largest_on_cut(node, parts) < share_limit)
+    return;
   CutFunction function;
   Twin& twin = function.twin;
   twin.node = node;
@@ -265,6 +269,21 @@ void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunc
   Vector3 gradient;
   twin.step_at_node = step(at ? &*at : nullptr, x, twin.step_length, gradient);
   found.push_back(std::move(function));
+}
+
+/// The largest value of the shape function of a node at a box that the cut divides.
+double CutSpace::largest_on_cut(int node, const std::vector<PartId>& parts) const {
+  double largest = 0;
+  for (const PartId part : parts) {
+    const int box = box_of(part);
+    if (part % most_parts != 0 || !cut_.is_divided(box))
+      continue;
+    const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
+    const auto at = std::lower_bound(cell.nodes.begin(), cell.nodes.end(), node);
+    if (at != cell.nodes.end() && *at == node)
+      largest = std::max(largest, std::abs(cell.value_at(at - cell.nodes.begin(), boxes_.lane_of(box))));
+  }
+  return largest;
 }
 
 // A run of the front is curved where it turns by more than step_turn within a sphere, over most of its length; corners,

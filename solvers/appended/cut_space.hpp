@@ -17,6 +17,9 @@ struct CutSpaceOptions {
   /// most of its length; on straight ones, corners included, the front functions do as well with half as many.
   double step_reach = 1;
   double step_turn = 20; // degrees
+  /// Where the shape function of a sphere is nowhere on the cut larger than this, it has no step: a large sphere among
+  /// small ones, which open the cut by themselves.
+  double step_share = 0.05;
   double shallow = 1.2;  // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
   double corner = 45;    // degrees from one segment to the next: a corner, which is no curvature
 };
@@ -130,6 +133,7 @@ class CutSpace {
   [[nodiscard]] std::vector<char> faint_of(int node, const std::vector<PartId>& parts) const;
   [[nodiscard]] double energy_in(int node, PartId part) const;
   void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
+  [[nodiscard]] double largest_on_cut(int node, const std::vector<PartId>& parts) const;
   void find_curved_front();
   void follow_places(const BoundingBox& region, std::vector<char>& changed);
   [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool has_curved) const;

@@ -60,6 +60,7 @@ export class View {
   private wanted: Shading = 'auto';
   private drawSeconds = 0; // of a picture, smoothed
   private wholeSeconds = 0; // of a picture in which more than the tool was drawn, smoothed
+  private givenBack: (() => void) | null = null; // the canvas has been given back, no picture is done yet
   private ordered: { done: WebGLSync; since: number; whole: boolean } | null = null; // the picture that the processor is at
 
   /** Throws Error in words when the browser has no WebGL 2. */
@@ -85,17 +86,21 @@ export class View {
     this.resize();
   }
 
-  /** Calls `told` with true when the browser takes the canvas's contents away, with false when it gives the canvas back. */
+  /**
+   * Calls `told` with true when the browser takes the canvas's contents away, with false when there is a whole picture again
+   * after the browser has given the canvas back.
+   */
   watchContext(told: (lost: boolean) => void): void {
     this.canvas.addEventListener('webglcontextlost', () => {
       this.ordered = null;
       this.kept = false;
+      this.givenBack = null;
       told(true);
     });
     this.canvas.addEventListener('webglcontextrestored', () => {
       this.still?.lose();
       this.change();
-      told(false);
+      this.givenBack = () => told(false);
     });
   }
 
@@ -162,7 +167,10 @@ export class View {
     const since = performance.now();
     this.since = since;
     this.drawNow();
-    if (!this.software) return true;
+    if (!this.software) {
+      this.tellDone();
+      return true;
+    }
     const { gl } = this;
     const done = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
@@ -181,8 +189,15 @@ export class View {
     const seconds = (performance.now() - since) / 1000;
     this.drawSeconds += 0.2 * (seconds - this.drawSeconds);
     if (whole) this.wholeSeconds += 0.2 * (seconds - this.wholeSeconds);
+    this.tellDone();
     this.adapt();
     return false;
+  }
+
+  /** A picture is done: the first one after the canvas was given back is told. */
+  private tellDone(): void {
+    this.givenBack?.();
+    this.givenBack = null;
   }
 
   /** Where the processor draws it has more to do than pictures: the solver is on the same machine. */
