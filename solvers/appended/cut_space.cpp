@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <numbers>
+#include <utility>
 
 namespace spherecut::solvers {
 
@@ -13,6 +13,7 @@ namespace {
 constexpr double near_front_boxes = 3; // half diagonals of a box: nearer to a front its octants count one by one
 constexpr int front_samples_along = 4; // an edge of such a box
 constexpr double faint = 1e-4;         // of a sphere's energy: less of it beyond a cut says nothing of the places there
+constexpr double faint_at_rim = 1e-3;  // likewise: parts with less join nothing around a front outside of the sphere
 constexpr double nearest_sample = 0.05; // half diagonals: samples count as this far from the front at least
 
 } // namespace
@@ -127,32 +128,64 @@ PlacedPart& CutSpace::place_of(PartId part) const {
     if (place && place->distance < near_front_boxes * boxes_.boxes()[box_of(part)].half.norm())
       *known = sampled(part, *place);
     if (known->empty())
-      known->push_back({1, at.centroid, place, {}, {}, {}});
-    for (PlacedSample& sample : *known)
-      if (sample.place)
-        sample.tip = tip_fields(material_, *sample.place);
+      known->push_back({1, at.centroid, place, {}});
     placed_.push_back(part);
   }
   return *known;
 }
 
+/// A sample with respect to a run; null: the run is far from it.
+PlaceAtRun* CutSpace::at_run(PlacedSample& sample, int run) const {
+  if (!sample.place)
+    return nullptr;
+  for (PlaceAtRun& at : sample.runs)
+    if (at.run == run)
+      return &at;
+  const std::optional<FrontPlace> place =
+      runs_->run_of(sample.place->segment) == run ? sample.place : runs_->place(run, sample.at, front_reach_);
+  if (!place)
+    return nullptr;
+  return &sample.runs.emplace_back(PlaceAtRun{run, *place, tip_fields(material_, *place), {}, {}});
+}
+
+/// Runs of places that stay, as they are numbered now. False: one of them is not there any more, and nothing is done.
+bool CutSpace::renumber_runs(PlacedPart& kept, const std::vector<int>& segment_now) const {
+  const auto is_there = [&](const FrontPlace& place) { return segment_now[place.segment] >= 0; };
+  const bool all_there = std::all_of(kept.begin(), kept.end(), [&](const PlacedSample& sample) {
+    return (!sample.place || is_there(*sample.place)) &&
+           std::all_of(sample.runs.begin(), sample.runs.end(),
+                       [&](const PlaceAtRun& at) { return is_there(at.place); });
+  });
+  if (!all_there)
+    return false;
+  for (PlacedSample& sample : kept) {
+    if (sample.place)
+      sample.place->segment = segment_now[sample.place->segment];
+    for (PlaceAtRun& at : sample.runs) {
+      at.place.segment = segment_now[at.place.segment];
+      at.run = runs_->run_of(at.place.segment);
+    }
+  }
+  return true;
+}
+
 /// The connected components of some parts, numbered from the first part on: that of each, and how many there are. Parts
-/// that are marked as faint (may be empty) join nothing, and go with a component that they touch. local_ tells the
-/// place of each part when this returns.
+/// that are marked (none where the list is empty) join nothing, and go with a component that they touch. local_ tells
+/// the place of each part when this returns.
 int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>& component,
-                              const std::vector<char>& faint_parts) {
+                              const std::vector<char>& marked) {
   for (std::size_t k = 0; k < parts.size(); ++k)
     local_[parts[k]] = static_cast<int>(k);
   component.assign(parts.size(), -1);
-  const auto is_faint = [&](int place) { return !faint_parts.empty() && faint_parts[place] != 0; };
+  const auto is_marked = [&](int place) { return !marked.empty() && marked[place] != 0; };
   int count = 0;
   std::vector<int> pending;
-  const auto spread = [&](bool into_faint) {
+  const auto spread = [&](bool into_marked) {
     for (std::size_t done = 0; done < pending.size(); ++done) {
       const int at = pending[done];
       cut_.for_each_linked(parts[at], [&](PartId next) {
         const int place = local_[next];
-        if (place >= 0 && component[place] < 0 && is_faint(place) == into_faint) {
+        if (place >= 0 && component[place] < 0 && is_marked(place) == into_marked) {
           component[place] = component[at];
           pending.push_back(place);
         }
@@ -160,13 +193,13 @@ int CutSpace::find_components(const std::vector<PartId>& parts, std::vector<int>
     }
   };
   for (std::size_t start = 0; start < parts.size(); ++start) {
-    if (component[start] >= 0 || is_faint(static_cast<int>(start)))
+    if (component[start] >= 0 || is_marked(static_cast<int>(start)))
       continue;
     component[start] = count++;
     pending.assign(1, static_cast<int>(start));
     spread(false);
   }
-  if (faint_parts.empty())
+  if (marked.empty())
     return count;
   pending.clear();
   for (std::size_t k = 0; k < parts.size(); ++k)
@@ -191,7 +224,7 @@ std::vector<char> CutSpace::faint_of(int node, const std::vector<PartId>& parts)
   std::vector<char> faint_parts;
   faint_parts.reserve(parts.size());
   for (const double own : energy)
-    faint_parts.push_back(own < faint * whole ? 1 : 0);
+    faint_parts.push_back(own < faint_at_rim * whole ? 1 : 0);
   return faint_parts;
 }
 
@@ -256,8 +289,7 @@ void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunc
   const auto nearest = incision_->front_frame(x, 2 * radius);
   if (!nearest || curved_[nearest->segment] == 0 || !incision_->closest(x, radius))
     return;
-  static const double share_limit = std::getenv("SPHERECUT_STEP_SHARE") ? std::atof(std::getenv("SPHERECUT_STEP_SHARE")) : options_.step_share;
-  if (largest_on_cut(node, parts) < share_limit)
+  if (largest_on_cut(node, parts) < options_.step_share)
     return;
   CutFunction function;
   Twin& twin = function.twin;
@@ -307,7 +339,7 @@ void CutSpace::find_curved_front() {
     radius.push_back(largest);
   }
   curved_.assign(front.size(), 0);
-  for (const FrontRun& run : front_runs(*incision_)) {
+  for (const FrontRun& run : runs_->runs()) {
     const int count = static_cast<int>(run.segments.size());
     const auto turning = [&](int k, int step) {
       double turned = 0;
@@ -343,24 +375,60 @@ void CutSpace::find_curved_front() {
   }
 }
 
-/// Forgets the places of parts whose nearest place of the front is another one now: changed[box] becomes 2, unless the
-/// box itself is another (1).
-void CutSpace::follow_places(const BoundingBox& region, std::vector<char>& changed) {
+/// What the segments of the front before are called now; -1: they have gone.
+std::vector<int> CutSpace::segments_now(const FrontRuns* before) const {
+  if (before == nullptr)
+    return {};
+  const auto key_of = [](const topology::FrontSegment& segment) {
+    return std::array<double, 7>{segment.from.x(),
+                                 segment.from.y(),
+                                 segment.from.z(),
+                                 segment.to.x(),
+                                 segment.to.y(),
+                                 segment.to.z(),
+                                 static_cast<double>(segment.sheet)};
+  };
+  std::map<std::array<double, 7>, int> now;
+  for (int s = 0; s < std::ssize(incision_->front()); ++s)
+    now[key_of(incision_->front()[s])] = s;
+  std::vector<int> segments;
+  segments.reserve(before->incision().front().size());
+  for (const topology::FrontSegment& segment : before->incision().front()) {
+    const auto found = now.find(key_of(segment));
+    segments.push_back(found == now.end() ? -1 : found->second);
+  }
+  return segments;
+}
+
+/// Forgets the places of parts whose places of the fronts are others now: changed[box] becomes 2, unless the box itself
+/// is another (1).
+void CutSpace::follow_places(const BoundingBox& region, const std::vector<int>& segment_now,
+                             std::vector<char>& changed) {
   // The nearest place of the front changes where the front did. Far from what has changed it is where it was.
   const auto is_far = [&](const Vector3& x, double radius, const PlacedPart& before) {
     const double away = (x - region.lower.cwiseMax(x.cwiseMin(region.upper))).norm();
     return std::all_of(before.begin(), before.end(), [&](const PlacedSample& sample) {
-      return away > (sample.place ? sample.place->distance : front_reach_) + radius;
+      double farthest = sample.place ? sample.place->distance : front_reach_;
+      for (const PlaceAtRun& at : sample.runs)
+        farthest = std::max(farthest, at.place.distance);
+      return away > farthest + radius;
     });
   };
-  const auto is_other = [](const std::optional<FrontPlace>& before, const std::optional<FrontPlace>& now) {
-    return now.has_value() != before.has_value() ||
-           (now && (now->ahead != before->ahead || now->above != before->above ||
-                    now->grad_ahead != before->grad_ahead || now->grad_above != before->grad_above));
+  const auto is_same = [](const FrontPlace& before, const FrontPlace& now) {
+    return now.ahead == before.ahead && now.above == before.above && now.grad_ahead == before.grad_ahead &&
+           now.grad_above == before.grad_above;
   };
-  const auto are_others = [&](const PlacedPart& before, const PlacedPart& now) {
-    return !std::equal(before.begin(), before.end(), now.begin(), now.end(),
-                       [&](const PlacedSample& a, const PlacedSample& b) { return !is_other(a.place, b.place); });
+  // What functions had asked for is asked for again.
+  const auto are_same = [&](const PlacedSample& before, PlacedSample& now) {
+    return now.place.has_value() == before.place.has_value() && (!now.place || is_same(*before.place, *now.place)) &&
+           std::all_of(before.runs.begin(), before.runs.end(), [&](const PlaceAtRun& was) {
+             const int segment = segment_now[was.place.segment];
+             const PlaceAtRun* const is = segment < 0 ? nullptr : at_run(now, runs_->run_of(segment));
+             return is != nullptr && is_same(was.place, is->place);
+           });
+  };
+  const auto are_others = [&](const PlacedPart& before, PlacedPart& now) {
+    return !std::equal(before.begin(), before.end(), now.begin(), now.end(), are_same);
   };
   std::vector<PartId> before_parts = std::move(placed_);
   placed_.clear();
@@ -370,7 +438,8 @@ void CutSpace::follow_places(const BoundingBox& region, std::vector<char>& chang
     std::unique_ptr<PlacedPart> before = std::move(places_[part]);
     if (changed[box] == 1 || part % most_parts >= cut_.part_count(box))
       continue;
-    if (is_far(boxes_.boxes()[box].centre, boxes_.boxes()[box].half.norm(), *before)) {
+    if (is_far(boxes_.boxes()[box].centre, boxes_.boxes()[box].half.norm(), *before) &&
+        renumber_runs(*before, segment_now)) {
       places_[part] = std::move(before);
       placed_.push_back(part);
     } else if (are_others(*before, place_of(part))) {
@@ -407,12 +476,13 @@ struct CutSpace::Wanted {
   std::vector<char> twin_taken, group_taken;
 };
 
-bool CutSpace::front_stays(const CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const {
+bool CutSpace::front_stays(CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const {
   for (std::size_t g = 0; g < wanted.groups.size(); ++g)
     if (wanted.group_taken[g] == 0 && wanted.groups[g] == old.group) {
       const std::vector<int> cells = cells_of(old);
       if (std::none_of(cells.begin(), cells.end(), [&](int cell) { return cell_changed[cell] != 0; })) {
         wanted.group_taken[g] = 1;
+        old.group.run = wanted.groups[g].run;
         return true;
       }
     }
@@ -447,11 +517,12 @@ bool CutSpace::twin_stays(const CutFunction& old, const std::vector<char>& chang
 
 CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> incision, const BoundingBox& region) {
   incision_ = std::move(incision);
+  const std::unique_ptr<const FrontRuns> runs_before = std::exchange(runs_, std::make_unique<FrontRuns>(incision_));
   // Parts whose boxes (1), or whose places with respect to the front (2), are others now.
   std::vector<char> changed(boxes_.size(), 0);
   for (const int box : cut_.update(*incision_, region))
     changed[box] = 1;
-  follow_places(region, changed);
+  follow_places(region, segments_now(runs_before.get()), changed);
   std::vector<char> cell_changed(boxes_.cells().size(), 0);
   for (int box = 0; box < boxes_.size(); ++box)
     if (changed[box] != 0)
@@ -467,7 +538,7 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   Wanted wanted;
   for (const int node : concerned)
     add_twins(node, wanted.twins);
-  wanted.groups = front_groups(*incision_, nodes_, options_.front);
+  wanted.groups = front_groups(*runs_, nodes_, options_.front);
   wanted.twin_taken.assign(wanted.twins.size(), 0);
   wanted.group_taken.assign(wanted.groups.size(), 0);
 
@@ -563,11 +634,11 @@ bool CutSpace::term_at(int k, PartId part, int sample, ScalarTerm& term) const {
 }
 
 // A group whose blended hats are `value`, with their gradient, at a place.
-FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, PlacedSample& placed) const {
+FrontTerm CutSpace::front_term(int k, double value, const Vector3& gradient, PlaceAtRun& placed) const {
   const FrontStation& station = functions_[k].group.station;
   if (placed.station.spacing != station.spacing || placed.station.point != station.point ||
       placed.station.axes != station.axes) {
-    placed.fields = front_fields(material_, station, *placed.place, placed.tip);
+    placed.fields = front_fields(material_, station, placed.place, placed.tip);
     placed.station = station;
   }
   const FrontFields& fields = placed.fields;
@@ -633,9 +704,10 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
   }
   if (of_group.empty() || place_here() == nullptr)
     return;
-  PlacedSample here{1, x, place, tip_fields(material_, *place), {}, {}};
+  PlacedSample here{1, x, place, {}};
   for (const auto& [k, sum] : of_group)
-    terms.front.push_back(front_term(k, sum.first, sum.second, here));
+    if (PlaceAtRun* const at = at_run(here, functions_[k].group.run); at != nullptr)
+      terms.front.push_back(front_term(k, sum.first, sum.second, *at));
 }
 
 } // namespace spherecut::solvers

@@ -19,9 +19,9 @@ struct CutSpaceOptions {
   double step_turn = 20; // degrees
   /// Where the shape function of a sphere is nowhere on the cut larger than this, it has no step: a large sphere among
   /// small ones, which open the cut by themselves.
-  double step_share = 0.05;
-  double shallow = 1.2;  // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
-  double corner = 45;    // degrees from one segment to the next: a corner, which is no curvature
+  double step_share = 0.1;
+  double shallow = 1.2; // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
+  double corner = 45;   // degrees from one segment to the next: a corner, which is no curvature
 };
 
 /// A second vector unknown of a sphere: h_J psi. Where the cut parts the sphere, psi is 1 in one component of what is
@@ -66,15 +66,22 @@ struct CutTerms {
   }
 };
 
-/// Place of a part, or of a sample of it, with respect to the front, and the near-tip fields there.
-struct PlacedSample {
-  double share = 1;                // of the part's volume
-  Vector3 at = Vector3::Zero();    // m, centroid
-  std::optional<FrontPlace> place; // of no value: far from every front
+/// A place with respect to one run of the front, and the near-tip fields there.
+struct PlaceAtRun {
+  int run = -1;
+  FrontPlace place;
   TipFields tip;
   // The fields as the station had them that was asked for last: its rings follow one another.
   FrontStation station; // of no spacing: none yet
   FrontFields fields;
+};
+
+/// Place of a part, or of a sample of it, with respect to the fronts.
+struct PlacedSample {
+  double share = 1;                // of the part's volume
+  Vector3 at = Vector3::Zero();    // m, centroid
+  std::optional<FrontPlace> place; // with respect to the nearest front; of no value: far from every front
+  std::vector<PlaceAtRun> runs;    // those that functions have asked for
 };
 /// One sample, or several where the near-tip fields change much within the part. The functions of the uncut body stay
 /// linear over all of them, so that their products with one another are what they are without the samples.
@@ -128,21 +135,23 @@ class CutSpace {
   /// Boxes that the sphere of a node may reach, ascending; kept.
   [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
   void add_twins(int node, std::vector<CutFunction>& found);
-  int find_components(const std::vector<PartId>& parts, std::vector<int>& component,
-                      const std::vector<char>& faint_parts);
+  int find_components(const std::vector<PartId>& parts, std::vector<int>& component, const std::vector<char>& marked);
   [[nodiscard]] std::vector<char> faint_of(int node, const std::vector<PartId>& parts) const;
   [[nodiscard]] double energy_in(int node, PartId part) const;
   void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
   [[nodiscard]] double largest_on_cut(int node, const std::vector<PartId>& parts) const;
   void find_curved_front();
-  void follow_places(const BoundingBox& region, std::vector<char>& changed);
+  void follow_places(const BoundingBox& region, const std::vector<int>& segment_now, std::vector<char>& changed);
+  [[nodiscard]] std::vector<int> segments_now(const FrontRuns* before) const;
   [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool has_curved) const;
   struct Wanted;
-  bool front_stays(const CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const;
+  bool front_stays(CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const;
   bool twin_stays(const CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned,
                   Wanted& wanted);
   void list_by_node();
-  [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlacedSample& placed) const;
+  [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlaceAtRun& placed) const;
+  [[nodiscard]] PlaceAtRun* at_run(PlacedSample& sample, int run) const;
+  bool renumber_runs(PlacedPart& kept, const std::vector<int>& segment_now) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
   /// Place of a part with respect to the front, kept until the front about it changes.
   [[nodiscard]] PlacedPart& place_of(PartId part) const;
@@ -172,8 +181,9 @@ class CutSpace {
   mutable std::vector<int> blend_of_;           // by function, -1 between calls
   mutable std::vector<int> local_;              // of a part among those of a sphere, -1 between calls
   mutable std::vector<std::vector<int>> reach_; // by node, found as they are asked for
-  std::vector<char> curved_;                    // by segment of the front: its run is curved
-  double front_reach_ = 0;                      // m, from a front to the farthest place that its functions come to
+  std::unique_ptr<const FrontRuns> runs_;
+  std::vector<char> curved_; // by segment of the front: its run is curved
+  double front_reach_ = 0;   // m: places farther from every front know of none
   int next_id_ = 0;
 };
 
@@ -217,9 +227,10 @@ void CutSpace::for_each_front_term(int first, int cell_index, Visit&& visit) con
         if (samples == nullptr)
           samples = &place_of(part);
         for (int n = 0; n < std::ssize(*samples); ++n)
-          if (PlacedSample& sample = (*samples)[n]; sample.place)
+          if (PlaceAtRun* const at = at_run((*samples)[n], functions_[blend.function].group.run); at != nullptr)
             visit(part, n,
-                  front_term(blend.function, blend.middle[lane] + gradient.dot(sample.at - centre), gradient, sample));
+                  front_term(blend.function, blend.middle[lane] + gradient.dot((*samples)[n].at - centre), gradient,
+                             *at));
       }
     }
   }

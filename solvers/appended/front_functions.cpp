@@ -13,7 +13,8 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double least_run = 1e-9; // of a spacing
+constexpr double least_run = 1e-9;  // of a spacing
+constexpr double same_place = 1e-6; // of a segment
 
 /// A run with the way along it in spacings.
 struct MeasuredRun : FrontRun {
@@ -37,13 +38,38 @@ PointKey key_of(const Vector3& x) {
 
 } // namespace
 
-std::vector<FrontRun> front_runs(const topology::Incision& incision) {
-  const std::vector<topology::FrontSegment>& front = incision.front();
-  std::map<std::pair<int, PointKey>, int> starting, ending;
-  for (int s = 0; s < std::ssize(front); ++s) {
+namespace {
+
+/// The segment of the same sheet that goes on where each one ends, to rounding; -1: none does.
+std::vector<int> next_segments(const std::vector<topology::FrontSegment>& front) {
+  std::map<std::pair<int, PointKey>, int> starting;
+  for (int s = 0; s < std::ssize(front); ++s)
     starting[{front[s].sheet, key_of(front[s].from)}] = s;
-    ending[{front[s].sheet, key_of(front[s].to)}] = s;
-  }
+  std::vector<int> next(front.size(), -1);
+  std::vector<char> follows(front.size(), 0);
+  for (int s = 0; s < std::ssize(front); ++s)
+    if (const auto found = starting.find({front[s].sheet, key_of(front[s].to)}); found != starting.end()) {
+      next[s] = found->second;
+      follows[found->second] = 1;
+    }
+  // Ends of pieces of one edge of the sheet may differ by rounding.
+  for (int s = 0; s < std::ssize(front); ++s)
+    for (int t = 0; t < std::ssize(front) && next[s] < 0; ++t)
+      if (t != s && follows[t] == 0 && front[t].sheet == front[s].sheet &&
+          (front[t].from - front[s].to).norm() <= same_place * (front[s].to - front[s].from).norm()) {
+        next[s] = t;
+        follows[t] = 1;
+      }
+  return next;
+}
+
+std::vector<FrontRun> runs_of(const topology::Incision& incision) {
+  const std::vector<topology::FrontSegment>& front = incision.front();
+  const std::vector<int> next = next_segments(front);
+  std::vector<char> follows(front.size(), 0);
+  for (const int s : next)
+    if (s >= 0)
+      follows[s] = 1;
   std::vector<char> taken(front.size(), 0);
   std::vector<FrontRun> runs;
   const auto follow = [&](int first) {
@@ -51,16 +77,15 @@ std::vector<FrontRun> front_runs(const topology::Incision& incision) {
     for (int s = first; taken[s] == 0;) {
       taken[s] = 1;
       run.segments.push_back(s);
-      const auto next = starting.find({front[s].sheet, key_of(front[s].to)});
-      if (next == starting.end())
+      if (next[s] < 0)
         break;
-      run.closed = next->second == first;
-      s = next->second;
+      run.closed = next[s] == first;
+      s = next[s];
     }
     runs.push_back(std::move(run));
   };
   for (int s = 0; s < std::ssize(front); ++s) // open runs first, from their starts
-    if (taken[s] == 0 && !ending.contains({front[s].sheet, key_of(front[s].from)}))
+    if (taken[s] == 0 && follows[s] == 0)
       follow(s);
   for (int s = 0; s < std::ssize(front); ++s)
     if (taken[s] == 0)
@@ -68,8 +93,9 @@ std::vector<FrontRun> front_runs(const topology::Incision& incision) {
   return runs;
 }
 
-std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach) {
-  const auto frame = incision.front_frame(x, reach);
+// `frame`: of the nearest point of the front that counts.
+std::optional<FrontPlace> place_from(const topology::Incision& incision, const Vector3& x,
+                                     const std::optional<topology::FrontFrame>& frame) {
   if (!frame)
     return std::nullopt;
   FrontPlace place;
@@ -79,8 +105,9 @@ std::optional<FrontPlace> front_place(const topology::Incision& incision, const 
   const Vector3 d = x - frame->point;
   Vector3 normal = frame->normal;
   double behind = 1;
+  const int own = incision.front()[frame->segment].sheet;
   if (frame->distance > 0)
-    if (const auto sheet = incision.closest(x, frame->distance * (1 + 1e-9)); sheet && !sheet->on_border) {
+    if (const auto sheet = incision.closest_of(own, x, frame->distance * (1 + 1e-9)); sheet && !sheet->on_border) {
       normal = sheet->normal;
       place.above = normal.dot(x - sheet->point);
       behind = -1;
@@ -96,16 +123,47 @@ std::optional<FrontPlace> front_place(const topology::Incision& incision, const 
   return place;
 }
 
+} // namespace
+
+FrontRuns::FrontRuns(std::shared_ptr<const topology::Incision> incision)
+    : incision_(std::move(incision)), runs_(runs_of(*incision_)), run_of_(incision_->front().size(), -1) {
+  for (int r = 0; r < count(); ++r) {
+    std::vector<char>& marked = marked_.emplace_back(incision_->front().size(), 0);
+    BoundingBox& box = boxes_.emplace_back(BoundingBox{Vector3::Constant(std::numeric_limits<double>::infinity()),
+                                                       Vector3::Constant(-std::numeric_limits<double>::infinity())});
+    for (const int s : runs_[r].segments) {
+      run_of_[s] = r;
+      marked[s] = 1;
+      const topology::FrontSegment& segment = incision_->front()[s];
+      box.lower = box.lower.cwiseMin(segment.from).cwiseMin(segment.to);
+      box.upper = box.upper.cwiseMax(segment.from).cwiseMax(segment.to);
+    }
+  }
+}
+
+std::optional<FrontPlace> FrontRuns::place(int run, const Vector3& x, double reach) const {
+  if (count() == 1)
+    return front_place(*incision_, x, reach);
+  const BoundingBox& box = boxes_[run];
+  if ((x - x.cwiseMax(box.lower).cwiseMin(box.upper)).squaredNorm() > reach * reach)
+    return std::nullopt;
+  return place_from(*incision_, x, incision_->front_frame_among(marked_[run], x, reach));
+}
+
+std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach) {
+  return place_from(incision, x, incision.front_frame(x, reach));
+}
+
 namespace {
 
 /// Stations along the runs of a front, and the nodes about it in their hats.
 class FrontStations {
  public:
-  FrontStations(const topology::Incision& incision, const NodeCloud& nodes, const FrontOptions& options)
-      : incision_(incision), front_(incision.front()), nodes_(nodes), options_(options), tree_(nodes.positions),
-        run_of_(front_.size(), -1), place_in_run_(front_.size(), 0) {
-    for (FrontRun& run : front_runs(incision))
-      runs_.push_back({std::move(run), {}, false});
+  FrontStations(const FrontRuns& runs, const NodeCloud& nodes, const FrontOptions& options)
+      : of_front_(runs), incision_(runs.incision()), front_(incision_.front()), nodes_(nodes), options_(options),
+        tree_(nodes.positions), place_in_run_(front_.size(), 0) {
+    for (const FrontRun& run : runs.runs())
+      runs_.push_back({run, {}, false});
     for (int r = 0; r < std::ssize(runs_); ++r)
       measure(r);
     of_run_.resize(runs_.size());
@@ -116,11 +174,13 @@ class FrontStations {
   [[nodiscard]] std::vector<FrontGroup> groups() const {
     std::vector<FrontGroup> groups;
     double widest = 0;
-    for (const FrontStation& station : all_) {
-      widest = std::max(widest, station.spacing);
-      for (int ring = 0; ring < options_.rings; ++ring)
-        groups.push_back({station, ring, {}, {}});
-    }
+    for (int r = 0; r < std::ssize(runs_); ++r)
+      for (std::size_t k = 0; k < of_run_[r].at.size(); ++k) {
+        const FrontStation& station = all_[of_run_[r].first + k];
+        widest = std::max(widest, station.spacing);
+        for (int ring = 0; ring < options_.rings; ++ring)
+          groups.push_back({station, r, ring, {}, {}});
+      }
     for (int j = 0; j < nodes_.size(); ++j)
       add_node(j, widest, groups);
     std::erase_if(groups, [](const FrontGroup& group) { return group.nodes.empty(); });
@@ -140,7 +200,6 @@ class FrontStations {
     run.measure.assign(1, 0);
     for (int k = 0; k < std::ssize(run.segments); ++k) {
       const topology::FrontSegment& segment = front_[run.segments[k]];
-      run_of_[run.segments[k]] = r;
       place_in_run_[run.segments[k]] = k;
       run.measure.push_back(run.measure.back() +
                             (segment.to - segment.from).norm() / spacing_at(0.5 * (segment.from + segment.to)));
@@ -184,12 +243,12 @@ class FrontStations {
     }
   }
 
-  /// Node j joins the groups in whose hats it lies.
+  /// Node j joins the groups of the nearest run in whose hats it lies.
   void add_node(int j, double widest, std::vector<FrontGroup>& groups) const {
     const auto place = front_place(incision_, nodes_.positions[j], options_.radius * widest);
     if (!place)
       return;
-    const int r = run_of_[place->segment];
+    const int r = of_front_.run_of(place->segment);
     const std::vector<double>& at = of_run_[r].at;
     if (at.empty())
       return;
@@ -220,24 +279,24 @@ class FrontStations {
         }
   }
 
+  const FrontRuns& of_front_;
   const topology::Incision& incision_;
   const std::vector<topology::FrontSegment>& front_;
   const NodeCloud& nodes_;
   const FrontOptions& options_;
   topology::PointTree tree_;
   std::vector<MeasuredRun> runs_;
-  std::vector<int> run_of_, place_in_run_; // of every segment
+  std::vector<int> place_in_run_; // of every segment
   std::vector<Stations> of_run_;
   std::vector<FrontStation> all_;
 };
 
 } // namespace
 
-std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
-                                     const FrontOptions& options) {
-  if (incision.front().empty() || options.radius <= 0 || options.rings < 1)
+std::vector<FrontGroup> front_groups(const FrontRuns& runs, const NodeCloud& nodes, const FrontOptions& options) {
+  if (runs.count() == 0 || options.radius <= 0 || options.rings < 1)
     return {};
-  return FrontStations(incision, nodes, options).groups();
+  return FrontStations(runs, nodes, options).groups();
 }
 
 TipFields tip_fields(const Material& material, const FrontPlace& place) {

@@ -10,6 +10,7 @@
 #include "solvers/fracture/stress_intensity.hpp"
 #include "solvers/nodes/nodes.hpp"
 
+#include <memory>
 #include <optional>
 
 namespace spherecut::solvers {
@@ -24,7 +25,8 @@ struct FrontPlace {
   Vector3 nearest = Vector3::Zero();    // m, point of the front
 };
 
-/// Nothing farther than `reach` m from the front. Continuous across everything but the sheet.
+/// With respect to the nearest front. Nothing farther than `reach` m from it. Continuous across everything but the
+/// sheets, but for places as far from one front as from another.
 std::optional<FrontPlace> front_place(const topology::Incision& incision, const Vector3& x, double reach);
 
 /// Segments of the front that follow one another.
@@ -32,13 +34,34 @@ struct FrontRun {
   std::vector<int> segments;
   bool closed = false;
 };
-/// All runs of the front; open ones come first.
-std::vector<FrontRun> front_runs(const topology::Incision& incision);
+
+/// The runs of the front of an incision, and places with respect to one of them. Functions about one run know nothing
+/// of the others: where two fronts come near to each other, the functions of both are smooth.
+class FrontRuns {
+ public:
+  /// All runs of the front; open ones come first.
+  explicit FrontRuns(std::shared_ptr<const topology::Incision> incision);
+
+  [[nodiscard]] const topology::Incision& incision() const { return *incision_; }
+  [[nodiscard]] const std::vector<FrontRun>& runs() const { return runs_; }
+  [[nodiscard]] int count() const { return static_cast<int>(runs_.size()); }
+  /// The run of a segment of Incision::front().
+  [[nodiscard]] int run_of(int segment) const { return run_of_[segment]; }
+  /// Nothing farther than `reach` m from the run. Continuous across everything but the sheet of the run.
+  [[nodiscard]] std::optional<FrontPlace> place(int run, const Vector3& x, double reach) const;
+
+ private:
+  std::shared_ptr<const topology::Incision> incision_;
+  std::vector<FrontRun> runs_;
+  std::vector<int> run_of_;               // of every segment
+  std::vector<std::vector<char>> marked_; // segments of every run
+  std::vector<BoundingBox> boxes_;        // of every run
+};
 
 struct FrontOptions {
-  double radius = 3; // of the outer ring, in spacings at the front; 0: no functions
-  double gather = 2; // from station to station, in the same units
-  int rings = 3;     // the first on the front
+  double radius = 3;   // of the outer ring, in spacings at the front; 0: no functions
+  double gather = 1.5; // from station to station, in the same units
+  int rings = 3;       // the first on the front
 };
 
 /// One place along the front.
@@ -51,6 +74,7 @@ struct FrontStation {
 /// One station and ring with the nodes that carry it. It stands for three unknowns, one a mode.
 struct FrontGroup {
   FrontStation station;
+  int run = -1; // of the front as it is now
   int ring = 0;
   std::vector<int> nodes; // ascending
   std::vector<double> weights;
@@ -63,8 +87,7 @@ struct FrontGroup {
 
 /// The groups of all runs of the front. An open run is measured from its older end, so that stations stay where they
 /// are as the other end grows, and do not depend on the increments by which it has.
-std::vector<FrontGroup> front_groups(const topology::Incision& incision, const NodeCloud& nodes,
-                                     const FrontOptions& options);
+std::vector<FrontGroup> front_groups(const FrontRuns& runs, const NodeCloud& nodes, const FrontOptions& options);
 
 /// Near-tip fields of unit intensity in the axes (ahead, normal, along): displacement of every mode in a column, m, and
 /// its derivatives ahead and along the normal.

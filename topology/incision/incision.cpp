@@ -21,6 +21,8 @@ namespace spherecut::topology {
 
 namespace {
 
+constexpr int any_sheet = -1;
+
 /// A triangle as a plane and two barycentric coordinates, affine functions of the position relative to the tree's
 /// origin. What a sight line is tested against.
 struct Wall {
@@ -430,6 +432,14 @@ bool Incision::near(const Vector3& x, double radius) const {
 }
 
 std::optional<SheetPoint> Incision::closest(const Vector3& x, double reach) const {
+  return closest_where(x, reach, any_sheet);
+}
+
+std::optional<SheetPoint> Incision::closest_of(int sheet, const Vector3& x, double reach) const {
+  return closest_where(x, reach, sheet);
+}
+
+std::optional<SheetPoint> Incision::closest_where(const Vector3& x, double reach, int sheet) const {
   const Data& data = *data_;
   SheetPoint nearest;
   int nearest_place = -1;
@@ -442,6 +452,8 @@ std::optional<SheetPoint> Incision::closest(const Vector3& x, double reach) cons
       std::nextafter(reach * reach, std::numeric_limits<double>::infinity()),
       [&](const BoxTree::Boxes& boxes) { return boxes.squared_distance(at); },
       [&](int place, double best) {
+        if (sheet != any_sheet && data.triangles[place].sheet != sheet)
+          return best;
         const auto& [a, b, c] = data.corners[place];
         const TrianglePoint candidate = closest_on_triangle(x, a, b, c);
         const double candidate_squared = (x - candidate.point).squaredNorm();
@@ -467,6 +479,16 @@ std::optional<SheetPoint> Incision::closest(const Vector3& x, double reach) cons
 }
 
 std::optional<FrontFrame> Incision::front_frame(const Vector3& x, double reach) const {
+  return front_frame_where(x, reach, nullptr);
+}
+
+std::optional<FrontFrame> Incision::front_frame_among(const std::vector<char>& marked, const Vector3& x,
+                                                      double reach) const {
+  return front_frame_where(x, reach, &marked);
+}
+
+std::optional<FrontFrame> Incision::front_frame_where(const Vector3& x, double reach,
+                                                      const std::vector<char>* marked) const {
   const Data& data = *data_;
   FrontFrame frame;
   double share = 0; // place on the segment, 0 to 1
@@ -476,6 +498,8 @@ std::optional<FrontFrame> Incision::front_frame(const Vector3& x, double reach) 
       [&](const BoxTree::Boxes& boxes) { return boxes.squared_distance(at); },
       [&](int place, double best) {
         const int segment = data.front_tree.order()[place];
+        if (marked != nullptr && (*marked)[segment] == 0)
+          return best;
         const auto& [from, to, sheet] = data.front[segment];
         const double s = std::clamp((x - from).dot(to - from) / (to - from).squaredNorm(), 0.0, 1.0);
         const Vector3 point = from + s * (to - from);

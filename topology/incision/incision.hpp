@@ -101,10 +101,16 @@ class Incision {
 
   /// Nearest point of the sheets within `reach` m; nullopt when there is none.
   [[nodiscard]] std::optional<SheetPoint> closest(const Vector3& x, double reach) const;
+  /// The same of one sheet alone.
+  [[nodiscard]] std::optional<SheetPoint> closest_of(int sheet, const Vector3& x, double reach) const;
 
   /// Frame of the nearest point of the front within `reach` m; nullopt when there is none. Depends on the segments
   /// within reach alone, not on their order: of two as near, the one with the lexicographically smaller ends counts.
   [[nodiscard]] std::optional<FrontFrame> front_frame(const Vector3& x, double reach) const;
+
+  /// The same of those segments alone that are marked, one entry a segment.
+  [[nodiscard]] std::optional<FrontFrame> front_frame_among(const std::vector<char>& marked, const Vector3& x,
+                                                            double reach) const;
 
   /// Frame at the point from + share (to - from) of a segment of the front, share in [0, 1]; its distance is 0.
   [[nodiscard]] FrontFrame front_frame_at(int segment, double share) const;
@@ -123,6 +129,9 @@ class Incision {
   [[nodiscard]] std::optional<Detour> detour(const Eye& x, const Eye& y, double reach, int first = -1) const;
 
  private:
+  [[nodiscard]] std::optional<SheetPoint> closest_where(const Vector3& x, double reach, int sheet) const;
+  [[nodiscard]] std::optional<FrontFrame> front_frame_where(const Vector3& x, double reach,
+                                                            const std::vector<char>* marked) const;
   struct Data;
   struct DetourSearch;
   std::unique_ptr<const Data> data_;

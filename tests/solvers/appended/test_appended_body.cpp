@@ -189,6 +189,44 @@ TEST_CASE("A sphere whose rim comes near a front that lies outside of it has a t
   }
 }
 
+TEST_CASE("The front of a sheet that runs on is one run, also where its pieces differ by rounding") {
+  // The border of this sheet leaves and enters the body at its surface: pieces of it are found one by one.
+  const experiments::CutBody body = experiments::straight_crack_body(1, 0.3, Method::galerkin, SightRule::appended);
+  const FrontRuns runs(body.problem.incision);
+  REQUIRE(runs.count() == 1);
+  CHECK(runs.runs()[0].segments.size() == body.problem.incision->front().size());
+  CHECK_FALSE(runs.runs()[0].closed);
+}
+
+TEST_CASE("Places with respect to one front do not notice another one") {
+  // Two slits side by side, whose fronts lie along y at x = 0 and at x = 0.4, at heights 0 and 0.1.
+  const auto domain = topology::make_box_domain({-1, -0.5, -1}, {1, 0.5, 1}, 0.2);
+  const auto slit = [](double from, double to, double height) {
+    return topology::make_rectangle_sheet({0.5 * (from + to), 0, height}, Vector3::UnitZ(), Vector3::UnitX(), 1.4,
+                                          to - from, 0.1);
+  };
+  const auto incision =
+      std::make_shared<const topology::Incision>(std::vector{slit(-1.2, 0, 0), slit(0.4, 1.2, 0.1)}, domain);
+  const FrontRuns runs(incision);
+  REQUIRE(runs.count() == 2);
+  int left = 0; // the run at x = 0
+  if (std::abs(incision->front()[runs.runs()[0].segments[0]].from.x()) > 0.1)
+    left = 1;
+  double before = 0;
+  for (int k = 0; k <= 100; ++k) { // past the middle between the fronts, and over the other slit
+    const Vector3 x(0.1 + 0.005 * k, 0.03, 0.08);
+    const auto place = runs.place(left, x, 3);
+    REQUIRE(place);
+    CHECK(place->ahead == Approx(x.x()).margin(1e-9));
+    CHECK(std::abs(place->above) == Approx(x.z()).margin(1e-9));
+    if (k > 0)
+      CHECK(place->above == Approx(before).margin(1e-9));
+    before = place->above;
+  }
+  CHECK(front_place(*incision, {0.5, 0.03, 0.08}, 3)->ahead < 0); // the other slit's front is the nearest
+  CHECK_FALSE(runs.place(left, {0.9, 0.03, 0.08}, 0.5));
+}
+
 TEST_CASE("A body whose cut has grown by appending equals one that was cut at once") {
   AppendingScene scene;
   const auto follows = discretise(scene.problem(), appending());
