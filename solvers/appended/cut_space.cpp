@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace spherecut::solvers {
@@ -13,7 +14,7 @@ namespace {
 constexpr double near_front_boxes = 3; // half diagonals of a box: nearer to a front its octants count one by one
 constexpr int front_samples_along = 4; // an edge of such a box
 constexpr double faint = 1e-4;         // of a sphere's energy: less of it beyond a cut says nothing of the places there
-constexpr double faint_at_rim = 1e-3;  // likewise: parts with less join nothing around a front outside of the sphere
+constexpr double faint_at_rim = 1e-3;  // likewise, of all parts together that join nothing: those at its rim
 constexpr double nearest_sample = 0.05; // half diagonals: samples count as this far from the front at least
 
 } // namespace
@@ -221,10 +222,18 @@ std::vector<char> CutSpace::faint_of(int node, const std::vector<PartId>& parts)
     energy.push_back(energy_in(node, part));
     whole += energy.back();
   }
-  std::vector<char> faint_parts;
-  faint_parts.reserve(parts.size());
-  for (const double own : energy)
-    faint_parts.push_back(own < faint_at_rim * whole ? 1 : 0);
+  std::vector<std::size_t> faintest(parts.size());
+  std::iota(faintest.begin(), faintest.end(), 0);
+  std::stable_sort(faintest.begin(), faintest.end(),
+                   [&](std::size_t a, std::size_t b) { return energy[a] < energy[b]; });
+  std::vector<char> faint_parts(parts.size(), 0);
+  double left = faint_at_rim * whole;
+  for (const std::size_t k : faintest) {
+    left -= energy[k];
+    if (left < 0)
+      break;
+    faint_parts[k] = 1;
+  }
   return faint_parts;
 }
 
