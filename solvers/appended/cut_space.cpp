@@ -11,25 +11,25 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double near_front_boxes = 3; // half diagonals of a box: nearer to a front its octants count one by one
-constexpr int front_samples_along = 4; // an edge of such a box
-constexpr double faint = 1e-4;         // of a sphere's energy: less of it beyond a cut says nothing of the places there
-constexpr double faint_at_rim = 1e-3;  // likewise, of all parts together that join nothing: those at its rim
-constexpr double nearest_sample = 0.05; // half diagonals: samples count as this far from the front at least
+constexpr double faint = 1e-4;        // of a sphere's energy: less of it beyond a cut says nothing of the places there
+constexpr double faint_at_rim = 1e-3; // likewise, of all parts together that join nothing: those at its rim
+
+/// m, from a front to the farthest place that its functions come to.
+double farthest_from_front(const NodeCloud& nodes, const Spheres& spheres, const CutSpaceOptions& options) {
+  const double widest = *std::max_element(nodes.spacings.begin(), nodes.spacings.end());
+  const double largest = *std::max_element(spheres.radii().begin(), spheres.radii().end());
+  return options.front.radius * widest + largest + 2 * widest;
+}
 
 } // namespace
 
 CutSpace::CutSpace(const SmallBoxes& boxes, const topology::Domain& domain, const NodeCloud& nodes,
                    const Spheres& spheres, const Material& material, CutSpaceOptions options)
     : boxes_(boxes), domain_(domain), nodes_(nodes), spheres_(spheres), material_(material), options_(options),
-      cut_(boxes, domain), twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()),
-      group_weights_(nodes.positions.size()), faint_(nodes.positions.size()),
-      places_(most_parts * static_cast<std::size_t>(boxes.size())),
-      local_(most_parts * static_cast<std::size_t>(boxes.size()), -1), reach_(nodes.positions.size()) {
-  const double widest = *std::max_element(nodes_.spacings.begin(), nodes_.spacings.end());
-  const double largest = *std::max_element(spheres_.radii().begin(), spheres_.radii().end());
-  front_reach_ = options_.front.radius * widest + largest + 2 * widest;
-}
+      cut_(boxes, domain), places_(cut_, domain, material, farthest_from_front(nodes, spheres, options)),
+      twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()), group_weights_(nodes.positions.size()),
+      faint_(nodes.positions.size()), local_(most_parts * static_cast<std::size_t>(boxes.size()), -1),
+      reach_(nodes.positions.size()) {}
 
 const std::vector<int>& CutSpace::boxes_in_reach(int node) const {
   std::vector<int>& near = reach_[node];
@@ -63,111 +63,6 @@ double CutSpace::step(const FrontPlace* place, const Vector3& x, double length, 
     gradient = slope * ((a / r - 1) * place->grad_ahead + b / r * place->grad_above);
   }
   return side * t * (15 - 10 * squared + 3 * squared * squared) / 8;
-}
-
-// What is integrated goes with 1 / r. The octants of a part near the front count one by one, and the place of each
-// stands where r is its harmonic mean over the octant.
-PlacedPart CutSpace::sampled(PartId part, const FrontPlace& middle) const {
-  const CutPart whole = cut_.part(part);
-  const SmallBox& box = boxes_.boxes()[box_of(part)];
-  const double radius = box.half.norm();
-  const bool divided = cut_.part_count(box_of(part)) > 1;
-  const Vector3 half = box.half / front_samples_along;
-  const Matrix3 across =
-      middle.grad_ahead * middle.grad_ahead.transpose() + middle.grad_above * middle.grad_above.transpose();
-  topology::SheetPoint sheet; // no part of an undivided box lies beyond it
-  if (const auto nearest = incision_->closest(box.centre, radius))
-    sheet = *nearest;
-  const double side = divided ? sheet.normal.dot(whole.centroid - sheet.point) : 0;
-  struct Octant {
-    int count = 0;
-    Vector3 sum = Vector3::Zero();
-    double nearness = 0; // sum of 1 / r
-  };
-  std::array<Octant, 16> octants; // a sheet that ends in the box divides them
-  int count = 0;
-  for (int a = 0; a < front_samples_along; ++a)
-    for (int b = 0; b < front_samples_along; ++b)
-      for (int c = 0; c < front_samples_along; ++c) {
-        const Vector3 x = box.centre - box.half + half.cwiseProduct(Vector3(2 * a + 1, 2 * b + 1, 2 * c + 1));
-        const double above = sheet.normal.dot(x - sheet.point);
-        if (above * side < 0 || (!box.whole && domain_.signed_distance(x) > 0))
-          continue;
-        Octant& own = octants[(a >= front_samples_along / 2 ? 1 : 0) + (b >= front_samples_along / 2 ? 2 : 0) +
-                              (c >= front_samples_along / 2 ? 4 : 0) + (above >= 0 ? 8 : 0)];
-        ++own.count;
-        own.sum += x;
-        own.nearness += 1 / std::max(nearest_sample * radius, (across * (x - middle.nearest)).norm());
-        ++count;
-      }
-  PlacedPart samples;
-  for (const Octant& octant : octants) {
-    if (octant.count == 0)
-      continue;
-    PlacedSample sample;
-    sample.share = static_cast<double>(octant.count) / count;
-    sample.at = octant.sum / octant.count;
-    sample.place = front_place(*incision_, sample.at, front_reach_);
-    if (!sample.place)
-      sample.place = middle;
-    if (const double r = std::hypot(sample.place->ahead, sample.place->above); r > 0) {
-      const double factor = octant.count / octant.nearness / std::max(r, 1e-6 * radius);
-      sample.place->ahead *= factor;
-      sample.place->above *= factor;
-    }
-    samples.push_back(std::move(sample));
-  }
-  return samples;
-}
-
-PlacedPart& CutSpace::place_of(PartId part) const {
-  std::unique_ptr<PlacedPart>& known = places_[part];
-  if (known == nullptr) {
-    const CutPart at = cut_.part(part);
-    const std::optional<FrontPlace> place = front_place(*incision_, at.centroid, front_reach_);
-    known = std::make_unique<PlacedPart>();
-    if (place && place->distance < near_front_boxes * boxes_.boxes()[box_of(part)].half.norm())
-      *known = sampled(part, *place);
-    if (known->empty())
-      known->push_back({1, at.centroid, place, {}});
-    placed_.push_back(part);
-  }
-  return *known;
-}
-
-/// A sample with respect to a run; null: the run is far from it.
-PlaceAtRun* CutSpace::at_run(PlacedSample& sample, int run) const {
-  if (!sample.place)
-    return nullptr;
-  for (PlaceAtRun& at : sample.runs)
-    if (at.run == run)
-      return &at;
-  const std::optional<FrontPlace> place =
-      runs_->run_of(sample.place->segment) == run ? sample.place : runs_->place(run, sample.at, front_reach_);
-  if (!place)
-    return nullptr;
-  return &sample.runs.emplace_back(PlaceAtRun{run, *place, tip_fields(material_, *place), {}, {}});
-}
-
-/// Runs of places that stay, as they are numbered now. False: one of them is not there any more, and nothing is done.
-bool CutSpace::renumber_runs(PlacedPart& kept, const std::vector<int>& segment_now) const {
-  const auto is_there = [&](const FrontPlace& place) { return segment_now[place.segment] >= 0; };
-  const bool all_there = std::all_of(kept.begin(), kept.end(), [&](const PlacedSample& sample) {
-    return (!sample.place || is_there(*sample.place)) &&
-           std::all_of(sample.runs.begin(), sample.runs.end(),
-                       [&](const PlaceAtRun& at) { return is_there(at.place); });
-  });
-  if (!all_there)
-    return false;
-  for (PlacedSample& sample : kept) {
-    if (sample.place)
-      sample.place->segment = segment_now[sample.place->segment];
-    for (PlaceAtRun& at : sample.runs) {
-      at.place.segment = segment_now[at.place.segment];
-      at.run = runs_->run_of(at.place.segment);
-    }
-  }
-  return true;
 }
 
 /// The connected components of some parts, numbered from the first part on: that of each, and how many there are. Parts
@@ -306,7 +201,7 @@ void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunc
   twin.is_step = true;
   twin.hidden = std::move(parts);
   twin.step_length = options_.step_reach * nodes_.spacings[node];
-  const auto at = front_place(*incision_, x, front_reach_);
+  const auto at = places_.nearest(x);
   Vector3 gradient;
   twin.step_at_node = step(at ? &*at : nullptr, x, twin.step_length, gradient);
   found.push_back(std::move(function));
@@ -348,7 +243,7 @@ void CutSpace::find_curved_front() {
     radius.push_back(largest);
   }
   curved_.assign(front.size(), 0);
-  for (const FrontRun& run : runs_->runs()) {
+  for (const FrontRun& run : places_.runs().runs()) {
     const int count = static_cast<int>(run.segments.size());
     const auto turning = [&](int k, int step) {
       double turned = 0;
@@ -381,79 +276,6 @@ void CutSpace::find_curved_front() {
     }
     for (const int s : run.segments)
       curved_[s] = curved > 0.5 * length ? 1 : 0;
-  }
-}
-
-/// What the segments of the front before are called now; -1: they have gone.
-std::vector<int> CutSpace::segments_now(const FrontRuns* before) const {
-  if (before == nullptr)
-    return {};
-  const auto key_of = [](const topology::FrontSegment& segment) {
-    return std::array<double, 7>{segment.from.x(),
-                                 segment.from.y(),
-                                 segment.from.z(),
-                                 segment.to.x(),
-                                 segment.to.y(),
-                                 segment.to.z(),
-                                 static_cast<double>(segment.sheet)};
-  };
-  std::map<std::array<double, 7>, int> now;
-  for (int s = 0; s < std::ssize(incision_->front()); ++s)
-    now[key_of(incision_->front()[s])] = s;
-  std::vector<int> segments;
-  segments.reserve(before->incision().front().size());
-  for (const topology::FrontSegment& segment : before->incision().front()) {
-    const auto found = now.find(key_of(segment));
-    segments.push_back(found == now.end() ? -1 : found->second);
-  }
-  return segments;
-}
-
-/// Forgets the places of parts whose places of the fronts are others now: changed[box] becomes 2, unless the box itself
-/// is another (1).
-void CutSpace::follow_places(const BoundingBox& region, const std::vector<int>& segment_now,
-                             std::vector<char>& changed) {
-  // The nearest place of the front changes where the front did. Far from what has changed it is where it was.
-  const auto is_far = [&](const Vector3& x, double radius, const PlacedPart& before) {
-    const double away = (x - region.lower.cwiseMax(x.cwiseMin(region.upper))).norm();
-    return std::all_of(before.begin(), before.end(), [&](const PlacedSample& sample) {
-      double farthest = sample.place ? sample.place->distance : front_reach_;
-      for (const PlaceAtRun& at : sample.runs)
-        farthest = std::max(farthest, at.place.distance);
-      return away > farthest + radius;
-    });
-  };
-  const auto is_same = [](const FrontPlace& before, const FrontPlace& now) {
-    return now.ahead == before.ahead && now.above == before.above && now.grad_ahead == before.grad_ahead &&
-           now.grad_above == before.grad_above;
-  };
-  // What functions had asked for is asked for again.
-  const auto are_same = [&](const PlacedSample& before, PlacedSample& now) {
-    return now.place.has_value() == before.place.has_value() && (!now.place || is_same(*before.place, *now.place)) &&
-           std::all_of(before.runs.begin(), before.runs.end(), [&](const PlaceAtRun& was) {
-             const int segment = segment_now[was.place.segment];
-             const PlaceAtRun* const is = segment < 0 ? nullptr : at_run(now, runs_->run_of(segment));
-             return is != nullptr && is_same(was.place, is->place);
-           });
-  };
-  const auto are_others = [&](const PlacedPart& before, PlacedPart& now) {
-    return !std::equal(before.begin(), before.end(), now.begin(), now.end(), are_same);
-  };
-  std::vector<PartId> before_parts = std::move(placed_);
-  placed_.clear();
-  std::sort(before_parts.begin(), before_parts.end());
-  for (const PartId part : before_parts) {
-    const int box = box_of(part);
-    std::unique_ptr<PlacedPart> before = std::move(places_[part]);
-    if (changed[box] == 1 || part % most_parts >= cut_.part_count(box))
-      continue;
-    if (is_far(boxes_.boxes()[box].centre, boxes_.boxes()[box].half.norm(), *before) &&
-        renumber_runs(*before, segment_now)) {
-      places_[part] = std::move(before);
-      placed_.push_back(part);
-    } else if (are_others(*before, place_of(part))) {
-      changed[box] = 2;
-    }
   }
 }
 
@@ -526,12 +348,11 @@ bool CutSpace::twin_stays(const CutFunction& old, const std::vector<char>& chang
 
 CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> incision, const BoundingBox& region) {
   incision_ = std::move(incision);
-  const std::unique_ptr<const FrontRuns> runs_before = std::exchange(runs_, std::make_unique<FrontRuns>(incision_));
   // Parts whose boxes (1), or whose places with respect to the front (2), are others now.
   std::vector<char> changed(boxes_.size(), 0);
   for (const int box : cut_.update(*incision_, region))
     changed[box] = 1;
-  follow_places(region, segments_now(runs_before.get()), changed);
+  places_.follow(incision_, region, changed);
   std::vector<char> cell_changed(boxes_.cells().size(), 0);
   for (int box = 0; box < boxes_.size(); ++box)
     if (changed[box] != 0)
@@ -547,7 +368,7 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   Wanted wanted;
   for (const int node : concerned)
     add_twins(node, wanted.twins);
-  wanted.groups = front_groups(*runs_, nodes_, options_.front);
+  wanted.groups = front_groups(places_.runs(), nodes_, options_.front);
   wanted.twin_taken.assign(wanted.twins.size(), 0);
   wanted.group_taken.assign(wanted.groups.size(), 0);
 
@@ -633,7 +454,7 @@ bool CutSpace::term_at(int k, PartId part, int sample, ScalarTerm& term) const {
     term = {k, middle, gradient};
     return true;
   }
-  const PlacedSample& placed = place_of(part)[sample];
+  const PlacedSample& placed = places_.of(part)[sample];
   const double value = middle + gradient.dot(placed.at - boxes_.boxes()[box].middle);
   Vector3 slope;
   const double jump =
@@ -685,7 +506,7 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
   bool placed = false;
   const auto place_here = [&]() -> const FrontPlace* {
     if (!placed) {
-      place = front_place(*incision_, x, front_reach_);
+      place = places_.nearest(x);
       placed = true;
     }
     return place ? &*place : nullptr;
@@ -715,7 +536,7 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
     return;
   PlacedSample here{1, x, place, {}};
   for (const auto& [k, sum] : of_group)
-    if (PlaceAtRun* const at = at_run(here, functions_[k].group.run); at != nullptr)
+    if (PlaceAtRun* const at = places_.at_run(here, functions_[k].group.run); at != nullptr)
       terms.front.push_back(front_term(k, sum.first, sum.second, *at));
 }
 

@@ -2,8 +2,7 @@
 // gathered along the front. The functions of the uncut body stay what they are.
 #pragma once
 
-#include "solvers/appended/cut_boxes.hpp"
-#include "solvers/appended/front_functions.hpp"
+#include "solvers/appended/front_places.hpp"
 
 #include <memory>
 #include <set>
@@ -66,27 +65,6 @@ struct CutTerms {
   }
 };
 
-/// A place with respect to one run of the front, and the near-tip fields there.
-struct PlaceAtRun {
-  int run = -1;
-  FrontPlace place;
-  TipFields tip;
-  // The fields as the station had them that was asked for last: its rings follow one another.
-  FrontStation station; // of no spacing: none yet
-  FrontFields fields;
-};
-
-/// Place of a part, or of a sample of it, with respect to the fronts.
-struct PlacedSample {
-  double share = 1;                // of the part's volume
-  Vector3 at = Vector3::Zero();    // m, centroid
-  std::optional<FrontPlace> place; // with respect to the nearest front; of no value: far from every front
-  std::vector<PlaceAtRun> runs;    // those that functions have asked for
-};
-/// One sample, or several where the near-tip fields change much within the part. The functions of the uncut body stay
-/// linear over all of them, so that their products with one another are what they are without the samples.
-using PlacedPart = std::vector<PlacedSample>;
-
 class CutSpace {
  public:
   /// Base nodes and their spheres; all outlive this.
@@ -107,11 +85,9 @@ class CutSpace {
   /// Cells in which a function may differ from zero, ascending.
   [[nodiscard]] std::vector<int> cells_of(const CutFunction& function) const;
   /// Samples of a part for functions that know of the front; the others take the part as one.
-  [[nodiscard]] const PlacedPart& samples(PartId part) const { return place_of(part); }
+  [[nodiscard]] const PlacedPart& samples(PartId part) const { return places_.of(part); }
   /// How many samples a part has as far as functions have been asked for there.
-  [[nodiscard]] int known_samples(PartId part) const {
-    return places_[part] == nullptr ? 1 : static_cast<int>(places_[part]->size());
-  }
+  [[nodiscard]] int known_samples(PartId part) const { return places_.known_samples(part); }
   /// Term of a twin at a part of a box, or of a step at one of its samples, with the box's linear shape functions.
   /// False: it vanishes there.
   bool term_at(int k, PartId part, int sample, ScalarTerm& term) const;
@@ -141,8 +117,6 @@ class CutSpace {
   void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
   [[nodiscard]] double largest_on_cut(int node, const std::vector<PartId>& parts) const;
   void find_curved_front();
-  void follow_places(const BoundingBox& region, const std::vector<int>& segment_now, std::vector<char>& changed);
-  [[nodiscard]] std::vector<int> segments_now(const FrontRuns* before) const;
   [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool has_curved) const;
   struct Wanted;
   bool front_stays(CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const;
@@ -150,12 +124,7 @@ class CutSpace {
                   Wanted& wanted);
   void list_by_node();
   [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlaceAtRun& placed) const;
-  [[nodiscard]] PlaceAtRun* at_run(PlacedSample& sample, int run) const;
-  bool renumber_runs(PlacedPart& kept, const std::vector<int>& segment_now) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
-  /// Place of a part with respect to the front, kept until the front about it changes.
-  [[nodiscard]] PlacedPart& place_of(PartId part) const;
-  [[nodiscard]] PlacedPart sampled(PartId part, const FrontPlace& middle) const;
 
   const SmallBoxes& boxes_;
   const topology::Domain& domain_;
@@ -164,13 +133,12 @@ class CutSpace {
   Material material_;
   CutSpaceOptions options_;
   CutBoxes cut_;
+  mutable FrontPlaces places_;
   std::shared_ptr<const topology::Incision> incision_;
   std::vector<CutFunction> functions_;
   std::vector<std::vector<int>> twins_of_, groups_of_; // places in functions_ by node
   std::vector<std::vector<double>> group_weights_;
   std::vector<std::vector<PartId>> faint_; // by node: hidden parts in its reach without a twin that weighs, ascending
-  mutable std::vector<std::unique_ptr<PlacedPart>> places_; // by part; null: not asked for yet
-  mutable std::vector<PartId> placed_;                      // those that are there
   /// Blended hats of a front group over the boxes of a cell.
   struct Blend {
     int function;
@@ -181,9 +149,7 @@ class CutSpace {
   mutable std::vector<int> blend_of_;           // by function, -1 between calls
   mutable std::vector<int> local_;              // of a part among those of a sphere, -1 between calls
   mutable std::vector<std::vector<int>> reach_; // by node, found as they are asked for
-  std::unique_ptr<const FrontRuns> runs_;
-  std::vector<char> curved_; // by segment of the front: its run is curved
-  double front_reach_ = 0;   // m: places farther from every front know of none
+  std::vector<char> curved_;                    // by segment of the front: its run is curved
   int next_id_ = 0;
 };
 
@@ -225,9 +191,9 @@ void CutSpace::for_each_front_term(int first, int cell_index, Visit&& visit) con
         if (blend.middle[lane] == 0 && gradient.isZero(0))
           continue;
         if (samples == nullptr)
-          samples = &place_of(part);
+          samples = &places_.of(part);
         for (int n = 0; n < std::ssize(*samples); ++n)
-          if (PlaceAtRun* const at = at_run((*samples)[n], functions_[blend.function].group.run); at != nullptr)
+          if (PlaceAtRun* const at = places_.at_run((*samples)[n], functions_[blend.function].group.run); at != nullptr)
             visit(part, n,
                   front_term(blend.function, blend.middle[lane] + gradient.dot((*samples)[n].at - centre), gradient,
                              *at));
