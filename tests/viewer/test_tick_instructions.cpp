@@ -12,9 +12,11 @@
 #include <csignal>
 #include <cstring>
 #include <ctime>
+#include <dlfcn.h>
 #include <fstream>
 #include <sched.h>
 #include <stdexcept>
+#include <sys/auxv.h>
 #include <sys/ptrace.h>
 #include <sys/syscall.h>
 #include <sys/user.h>
@@ -28,9 +30,9 @@ using namespace spherecut::tests;
 namespace {
 
 /// Steps a thread from one reading of its processor time to the next. A tick reads it once before and once after its
-/// work, so two stretches on end are a whole tick, waiting left out: a stepped thread is always late. The kernel's page
-/// of clock readings (the vDSO) is not counted: a reading begins anew whenever the kernel has just set the clock, which
-/// a stepped thread is slow enough to meet at any time.
+/// work, so two stretches on end are a whole tick, waiting left out: a stepped thread is always late. A reading of the
+/// clock in the page of the kernel (the vDSO) becomes a system call: the page's own code begins anew whenever the
+/// kernel has just set the clock, which a stepped thread meets at any time, and for ever where a step takes long.
 class Stepper {
  public:
   explicit Stepper(pid_t thread) : thread_(thread) {
@@ -38,12 +40,14 @@ class Stepper {
       throw std::runtime_error(std::string("this process may not trace its child: ") + std::strerror(errno));
     ptrace(PTRACE_INTERRUPT, thread_, nullptr, nullptr);
     wait();
-    std::ifstream maps("/proc/" + std::to_string(thread_) + "/maps");
-    for (std::string line; std::getline(maps, line);)
-      if (line.find("[vdso]") != std::string::npos) {
-        clock_page_.first = std::stoull(line, nullptr, 16);
-        clock_page_.second = std::stoull(line.substr(line.find('-') + 1), nullptr, 16);
-      }
+    // The page is the same in every process, at another place.
+    void* const page = dlopen("linux-vdso.so.1", RTLD_LAZY | RTLD_NOLOAD);
+    const void* const reading = page != nullptr ? dlsym(page, "__vdso_clock_gettime") : nullptr;
+    const unsigned long long here = getauxval(AT_SYSINFO_EHDR), there = clock_page(thread_);
+    if (reading == nullptr || here == 0 || there == 0)
+      return; // without such a page every reading is a system call
+    read_clock_ = there + (reinterpret_cast<unsigned long long>(reading) - here);
+    system_call_ = there + system_call_of(here);
   }
   ~Stepper() { ptrace(PTRACE_DETACH, thread_, nullptr, nullptr); }
   Stepper(const Stepper&) = delete;
@@ -63,6 +67,40 @@ class Stepper {
   }
 
  private:
+  // Where the page begins in a process; 0 if it has none.
+  static unsigned long long clock_page(pid_t process) {
+    std::ifstream maps("/proc/" + std::to_string(process) + "/maps");
+    for (std::string line; std::getline(maps, line);)
+      if (line.find("[vdso]") != std::string::npos)
+        return std::stoull(line, nullptr, 16);
+    return 0;
+  }
+  // Of a system call in the page that begins here: bytes from its beginning.
+  static unsigned long long system_call_of(unsigned long long page) {
+    constexpr std::array<unsigned char, 2> call{0x0f, 0x05};
+    const auto* const first = reinterpret_cast<const unsigned char*>(page);
+    const auto* const last = first + sysconf(_SC_PAGESIZE);
+    const auto* const found = std::search(first, last, call.begin(), call.end());
+    if (found == last)
+      throw std::runtime_error("the kernel's page of clock readings holds no system call");
+    return static_cast<unsigned long long>(found - first);
+  }
+  [[nodiscard]] bool is_system_call(unsigned long long instruction) const {
+    return (ptrace(PTRACE_PEEKTEXT, thread_, instruction, nullptr) & 0xffff) == 0x050f;
+  }
+  // The thread has called the page's function and has its arguments where a system call expects them.
+  void read_clock_by_system_call(const user_regs_struct& called) const {
+    user_regs_struct registers = called;
+    registers.rax = SYS_clock_gettime;
+    registers.rip = system_call_;
+    ptrace(PTRACE_SETREGS, thread_, nullptr, &registers);
+    ptrace(PTRACE_SINGLESTEP, thread_, nullptr, nullptr);
+    wait();
+    ptrace(PTRACE_GETREGS, thread_, nullptr, &registers);
+    registers.rip = static_cast<unsigned long long>(ptrace(PTRACE_PEEKTEXT, thread_, called.rsp, nullptr));
+    registers.rsp = called.rsp + sizeof(registers.rsp); // the function has returned
+    ptrace(PTRACE_SETREGS, thread_, nullptr, &registers);
+  }
   void wait() const {
     int status = 0;
     if (waitpid(thread_, &status, __WALL) != thread_ || !WIFSTOPPED(status))
@@ -73,19 +111,23 @@ class Stepper {
     for (long steps = 0; steps < 10'000'000; ++steps) {
       user_regs_struct registers{};
       ptrace(PTRACE_GETREGS, thread_, nullptr, &registers);
-      const bool reads = registers.rax == SYS_clock_gettime && registers.rdi == CLOCK_THREAD_CPUTIME_ID &&
-                         (ptrace(PTRACE_PEEKTEXT, thread_, registers.rip, nullptr) & 0xffff) == 0x050f; // syscall
-      if (registers.rip < clock_page_.first || registers.rip >= clock_page_.second)
-        ++count;
-      ptrace(PTRACE_SINGLESTEP, thread_, nullptr, nullptr);
-      wait();
+      ++count;
+      const bool calls = read_clock_ != 0 && registers.rip == read_clock_;
+      const bool is_own = registers.rdi == CLOCK_THREAD_CPUTIME_ID;
+      const bool reads = is_own && (calls || (registers.rax == SYS_clock_gettime && is_system_call(registers.rip)));
+      if (calls) {
+        read_clock_by_system_call(registers);
+      } else {
+        ptrace(PTRACE_SINGLESTEP, thread_, nullptr, nullptr);
+        wait();
+      }
       if (reads)
         return count;
     }
     throw std::runtime_error("the haptic thread does not read its processor time any more: the ticks cannot be told");
   }
   pid_t thread_;
-  std::pair<unsigned long long, unsigned long long> clock_page_{0, 0}; // addresses: first, and one past the last
+  unsigned long long read_clock_ = 0, system_call_ = 0; // addresses in the page of the thread; 0 without a page
 };
 
 /// Watches until it is told to stop.
