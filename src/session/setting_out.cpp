@@ -38,6 +38,31 @@ std::optional<FirstTouch> find_touch(const SessionState& state, const std::vecto
   return touch || leader == Leader::path ? touch : nearest_approach(*state.scenario.tool, motion, state.query);
 }
 
+// Way through the organ at rest from a point of its surface, m.
+double thickness_along(const topology::Domain& domain, const Vector3& from, const Vector3& direction) {
+  constexpr double least_step = 1e-5; // of the organ's diagonal
+  const double step = least_step * domain.bounds().extent().norm();
+  double way = step;
+  while (domain.signed_distance(from + way * direction) < 0)
+    way += std::max(step, -domain.signed_distance(from + way * direction));
+  return way;
+}
+
+// An approach that ends beyond the other side of the organ: there is nothing there that the tool would press on.
+void watch_depth(SessionState& state) {
+  constexpr double grazing = 0.5; // cosine of the angle between way and surface normal: below it a touch is no press
+  const auto* approach = std::get_if<Approach>(&state.scenario.tool->motion);
+  if (approach == nullptr || !state.touch || -approach->direction.dot(state.touch->contact.normal) < grazing)
+    return;
+  const Vector3& at = state.touch->contact.point;
+  if (const double thickness = thickness_along(*state.organ.domain, at, approach->direction);
+      approach->depth >= thickness)
+    state.log.warn("depth", fmt::format("tool.approach.depth = {:g} m, but at [{:.4g}, {:.4g}, {:.4g}] m the organ at "
+                                        "rest is {:.3g} m thick along the tool's way: the tool goes through it, and "
+                                        "the run ends there",
+                                        approach->depth, at.x(), at.y(), at.z(), thickness));
+}
+
 } // namespace
 
 void set_out(SessionState& state, Leader leader) {
@@ -58,6 +83,8 @@ void set_out(SessionState& state, Leader leader) {
                                state.scenario.material.poisson_ratio, stiffest_galerkin));
   if (state.scenario.tool && !state.touch)
     state.log.warn("touch", "the tool never touches the organ on its way");
+  if (state.scenario.tool)
+    watch_depth(state);
   if (has_cuts(state.scenario)) {
     const StageTimer timer(state.profile.topology);
     state.incisions =

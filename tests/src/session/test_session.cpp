@@ -76,6 +76,15 @@ TEST_CASE("A motion that never touches gives zero force and says so") {
   CHECK_THAT(session.warnings().front(), Contains("never touches"));
 }
 
+TEST_CASE("An approach that goes through the organ is told before the run, with the thickness there") {
+  const std::string deep = "depth = 0.002";
+  CHECK(session_of(replaced(small_scenario, deep, "depth = 0.029")).warnings().empty());
+  const Session session = session_of(replaced(small_scenario, deep, "depth = 0.031"));
+  REQUIRE(session.warnings().size() == 1);
+  CHECK_THAT(session.warnings().front(),
+             Contains("tool.approach.depth = 0.031 m, but at [0, 0, 0.03] m") && Contains("0.03 m thick"));
+}
+
 TEST_CASE("A tool that lifts off again ends without force") {
   Session session = session_of(path({{0, "[0, 0, 0.031]"}, {0.5, "[0, 0, 0.029]"}, {1, "[0, 0, 0.032]"}}));
   const std::vector<StepResult> steps = run(session);
