@@ -7,6 +7,7 @@
 #include "src/tissue/cut_checks.hpp"
 #include "src/tissue/finite_body.hpp"
 #include "topology/base/errors.hpp"
+#include "topology/domain/way_out.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -38,16 +39,6 @@ std::optional<FirstTouch> find_touch(const SessionState& state, const std::vecto
   return touch || leader == Leader::path ? touch : nearest_approach(*state.scenario.tool, motion, state.query);
 }
 
-// Way through the organ at rest from a point of its surface, m.
-double thickness_along(const topology::Domain& domain, const Vector3& from, const Vector3& direction) {
-  constexpr double least_step = 1e-5; // of the organ's diagonal
-  const double step = least_step * domain.bounds().extent().norm();
-  double way = step;
-  while (domain.signed_distance(from + way * direction) < 0)
-    way += std::max(step, -domain.signed_distance(from + way * direction));
-  return way;
-}
-
 // An approach that ends beyond the other side of the organ: there is nothing there that the tool would press on.
 void watch_depth(SessionState& state) {
   constexpr double grazing = 0.5; // cosine of the angle between way and surface normal: below it a touch is no press
@@ -55,7 +46,7 @@ void watch_depth(SessionState& state) {
   if (approach == nullptr || !state.touch || -approach->direction.dot(state.touch->contact.normal) < grazing)
     return;
   const Vector3& at = state.touch->contact.point;
-  if (const double thickness = thickness_along(*state.organ.domain, at, approach->direction);
+  if (const double thickness = topology::way_out(*state.organ.domain, at, approach->direction, 2 * approach->depth);
       approach->depth >= thickness)
     state.log.warn("depth", fmt::format("tool.approach.depth = {:g} m, but at [{:.4g}, {:.4g}, {:.4g}] m the organ at "
                                         "rest is {:.3g} m thick along the tool's way: the tool goes through it, and "

@@ -2,6 +2,7 @@
 
 #include "solvers/fracture/tear_seed.hpp"
 #include "topology/base/errors.hpp"
+#include "topology/domain/way_out.hpp"
 #include "topology/incision/cut_sheets.hpp"
 #include "topology/incision/front_joining.hpp"
 
@@ -134,6 +135,22 @@ std::optional<topology::SurfaceMesh> TearFronts::seed(const BodyModel& model) co
   const double radius = std::max(solvers::seed_radius(scenario_.material, toughness_(place), settings.strength),
                                  smallest_seed * zone_.spacing.fine);
   return topology::make_disc_sheet(place, weakest.stress.direction, radius, std::min(sheet_edge(zone_), radius / 2));
+}
+
+std::optional<TearFronts::ThinLayer>
+TearFronts::thin_layer(const BodyModel& model, const std::vector<solvers::FrontState>& states, double least) const {
+  const topology::Domain& domain = *model.incision->domain();
+  const double limit = least * zone_.spacing.fine;
+  const auto thickness = [&](const Vector3& from, const Vector3& across) {
+    return std::min(topology::way_out(domain, from, across, limit), topology::way_out(domain, from, -across, limit));
+  };
+  const auto drive = [](const solvers::FrontState& state) { return state.release / state.toughness; };
+  const auto foremost =
+      std::max_element(states.begin(), states.end(), [&](const auto& a, const auto& b) { return drive(a) < drive(b); });
+  if (foremost == states.end() || thickness(foremost->frame.point, foremost->frame.tangent) < limit)
+    return std::nullopt;
+  const double layer = thickness(foremost->frame.point, foremost->frame.normal);
+  return layer < limit ? std::optional<ThinLayer>({foremost->frame.point, layer}) : std::nullopt;
 }
 
 double TearFronts::released(const BodyModel& model, const topology::Incision& after) const {

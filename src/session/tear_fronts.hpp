@@ -32,6 +32,15 @@ class TearFronts {
   /// A crack across the largest stress, where that reaches the strength off every cut, held region and tool.
   [[nodiscard]] std::optional<topology::SurfaceMesh> seed(const BodyModel& model) const;
 
+  /// The tissue between a front and the surface, m, along the normal of the sheet, at the place of largest G / G_c away
+  /// from where the front meets the surface; nothing where it is thicker than `least` fine spacings.
+  struct ThinLayer {
+    Vector3 place;
+    double thickness = 0; // m
+  };
+  [[nodiscard]] std::optional<ThinLayer> thin_layer(const BodyModel& model,
+                                                    const std::vector<solvers::FrontState>& states, double least) const;
+
   /// What the loads on the body, without the blade, release when the cut grows to `after`, J: by the intensities at the
   /// fronts near its new part. Two bodies' energies would tell it too, but nodes differ between them.
   [[nodiscard]] double released(const BodyModel& model, const topology::Incision& after) const;

@@ -448,6 +448,7 @@ class TearPropagation::Loop {
     const std::optional<Growth> growth = next_growth(number, follow_load());
     if (!growth)
       return false;
+    watch_layer(growth->moving);
     const auto before = state_.model.incision;
     const double area_before = before == nullptr ? 0 : before->area();
     const double toughness = before == nullptr
@@ -496,6 +497,20 @@ class TearPropagation::Loop {
     account().force = state_.model.state->tool.tool_force;
     account().area += torn;
     result_.cut->triangles += growth.sheets.triangles;
+  }
+
+  // Under a layer of few nodes the near field of a front has no room.
+  void watch_layer(const std::vector<solvers::FrontState>& moving) {
+    constexpr double least = 2; // fine spacings: G is within 10 % from there on, 45 % too small at 1.3
+    if (state_.model.incision == nullptr)
+      return;
+    if (const auto thin = tears_.fronts_.thin_layer(state_.model, moving, least))
+      state_.log.warn(
+          "layer", fmt::format("t = {:.3g} s: at [{:.4g}, {:.4g}, {:.4g}] m the tear runs {:.2g} mm below the surface, "
+                               "{:.2g} spacings: below {:g} its release rate may be half of what it is; "
+                               "nodes.fine_spacing = {:.2g} would do",
+                               loaded_sample().time, thin->place.x(), thin->place.y(), thin->place.z(),
+                               1e3 * thin->thickness, thin->thickness / fine_, least, thin->thickness / least));
   }
 
   void tell() {

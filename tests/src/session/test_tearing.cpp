@@ -90,6 +90,26 @@ TEST_CASE("A grasper that pulls tears a cut on along a weak plane, and the accou
   require_sound(session);
 }
 
+TEST_CASE("A tear that runs fewer than two spacings below the surface is told, with place and thickness") {
+  const auto told = [](const std::string& text) {
+    Session session(scenario_of(text));
+    REQUIRE(run(session).back().tear->area > 0);
+    std::vector<std::string> warnings = session.warnings();
+    std::erase_if(warnings,
+                  [](const std::string& warning) { return warning.find("below the surface") == warning.npos; });
+    return warnings;
+  };
+  CHECK(told(peel).empty()); // 3.7 spacings
+  std::string shallow = replaced(peel, "toughness = 0.4", "toughness = 0.02");
+  for (std::size_t at = 0; (at = shallow.find("0.0181")) != std::string::npos;)
+    shallow.replace(at, 6, "0.0251");
+  const std::vector<std::string> warnings = told(shallow);
+  REQUIRE(warnings.size() == 1);
+  // It climbs out of the plane of the cut by half a millimetre.
+  CHECK_THAT(warnings.front(), Contains("the tear runs 4.4 mm below the surface, 1.4 spacings") &&
+                                   Contains("nodes.fine_spacing = 0.0022"));
+}
+
 TEST_CASE("A notch in a stretched bar runs away, parts the bar, and says so") {
   Session session(scenario_of(stretched_bar(0.15, 0.05, bar_notch + "[tearing]\nstep = 1.0\n")));
   const StepResult result = session.step(session.steps().front());
