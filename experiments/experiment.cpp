@@ -49,6 +49,8 @@ const std::vector<Experiment>& all_experiments() {
       {"precut_beam", "compliance of a double cantilever", run_precut_beam},
       {"cutting_force", "force of a blade: steady cutting, first rupture, balance of work", run_cutting_force},
       {"sever", "a body cut in two: no coupling, rigid motions", run_sever},
+      {"front_position", "a front that moves by a tenth of a spacing at a time: energy of each step, openings",
+       run_front_position},
       {"sif", "stress intensities and release rate along straight and round fronts", run_sif},
       {"kink", "the direction in which a front in mixed mode tears on", run_kink},
       {"penny_growth", "a penny crack torn on by fluid: onset, pressure against radius, energy", run_penny_growth},

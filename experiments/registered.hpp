@@ -20,6 +20,7 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context);
 std::vector<Check> run_precut_torsion(const ExperimentContext& context);
 std::vector<Check> run_precut_ellipse(const ExperimentContext& context);
 std::vector<Check> run_precut_lens(const ExperimentContext& context);
+std::vector<Check> run_front_position(const ExperimentContext& context);
 std::vector<Check> run_precut_edge(const ExperimentContext& context);
 std::vector<Check> run_precut_kinked(const ExperimentContext& context);
 std::vector<Check> run_precut_crossing(const ExperimentContext& context);

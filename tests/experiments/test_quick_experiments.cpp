@@ -133,6 +133,10 @@ TEST_CASE("Quick stress intensities: straight and round fronts") {
   require_quick_run_passes("sif");
 }
 
+TEST_CASE("Quick front_position: a front that moves by a tenth of a spacing at a time") {
+  require_quick_run_passes("front_position");
+}
+
 TEST_CASE("Quick layers: two materials in one body") {
   require_quick_run_passes("layers");
 }

@@ -16,7 +16,6 @@
 #include <fstream>
 #include <sched.h>
 #include <stdexcept>
-#include <sys/auxv.h>
 #include <sys/ptrace.h>
 #include <sys/syscall.h>
 #include <sys/user.h>
@@ -43,11 +42,13 @@ class Stepper {
     // The page is the same in every process, at another place.
     void* const page = dlopen("linux-vdso.so.1", RTLD_LAZY | RTLD_NOLOAD);
     const void* const reading = page != nullptr ? dlsym(page, "__vdso_clock_gettime") : nullptr;
-    const unsigned long long here = getauxval(AT_SYSINFO_EHDR), there = clock_page(thread_);
-    if (reading == nullptr || here == 0 || there == 0)
+    const unsigned long long there = clock_page(thread_);
+    Dl_info here{};
+    if (reading == nullptr || dladdr(reading, &here) == 0 || there == 0)
       return; // without such a page every reading is a system call
-    read_clock_ = there + (reinterpret_cast<unsigned long long>(reading) - here);
-    system_call_ = there + system_call_of(here);
+    const auto* const first = static_cast<const unsigned char*>(here.dli_fbase);
+    read_clock_ = there + static_cast<unsigned long long>(static_cast<const unsigned char*>(reading) - first);
+    system_call_ = there + system_call_of(first);
   }
   ~Stepper() { ptrace(PTRACE_DETACH, thread_, nullptr, nullptr); }
   Stepper(const Stepper&) = delete;
@@ -76,9 +77,8 @@ class Stepper {
     return 0;
   }
   // Of a system call in the page that begins here: bytes from its beginning.
-  static unsigned long long system_call_of(unsigned long long page) {
+  static unsigned long long system_call_of(const unsigned char* first) {
     constexpr std::array<unsigned char, 2> call{0x0f, 0x05};
-    const auto* const first = reinterpret_cast<const unsigned char*>(page);
     const auto* const last = first + sysconf(_SC_PAGESIZE);
     const auto* const found = std::search(first, last, call.begin(), call.end());
     if (found == last)
