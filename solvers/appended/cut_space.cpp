@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -186,12 +187,18 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
     add_step(node, std::move(parts), found);
 }
 
-/// The step of a sphere in which the front ends, or beside which it passes, where its run is curved.
+/// The step of a sphere in which the front ends, or beside which it passes, where its run is curved; of one that a
+/// straight front ends in, where no function along the front carries its node.
 void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const {
   const Vector3& x = spheres_.centres()[node];
   const double radius = spheres_.radii()[node];
   const auto nearest = incision_->front_frame(x, 2 * radius);
-  if (!nearest || curved_[nearest->segment] == 0 || !incision_->closest(x, radius))
+  if (!nearest || !incision_->closest(x, radius))
+    return;
+  // The functions along the front carry the nodes about it alone: a sphere that reaches it from beyond knows no
+  // opening.
+  const bool from_beyond = nearest->distance > carried_[nearest->segment] && nearest->distance < radius;
+  if (curved_[nearest->segment] == 0 && !from_beyond)
     return;
   if (largest_on_cut(node, parts) < options_.step_share)
     return;
@@ -232,15 +239,24 @@ void CutSpace::find_curved_front() {
   middle.reserve(front.size());
   ahead.reserve(front.size());
   radius.reserve(front.size());
+  carried_.clear();
+  carried_.reserve(front.size());
   for (int s = 0; s < std::ssize(front); ++s) {
     const Vector3 x = 0.5 * (front[s].from + front[s].to);
     middle.push_back(x);
     ahead.push_back(incision_->front_frame_at(s, 0.5).ahead);
-    double largest = 0;
-    for (const int node : spheres_.candidates(x))
-      if ((spheres_.centres()[node] - x).norm() < spheres_.radii()[node])
+    double largest = 0, nearest = std::numeric_limits<double>::infinity(), spacing = 0;
+    for (const int node : spheres_.candidates(x)) {
+      const double distance = (spheres_.centres()[node] - x).norm();
+      if (distance < spheres_.radii()[node])
         largest = std::max(largest, spheres_.radii()[node]);
+      if (distance < nearest) {
+        nearest = distance;
+        spacing = nodes_.spacings[node];
+      }
+    }
     radius.push_back(largest);
+    carried_.push_back(options_.front.radius * spacing);
   }
   curved_.assign(front.size(), 0);
   for (const FrontRun& run : places_.runs().runs()) {

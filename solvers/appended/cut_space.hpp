@@ -13,7 +13,8 @@ struct CutSpaceOptions {
   FrontOptions front;
   /// Spheres that a curved front ends in have twins too, with a step that closes at the front over `step_reach`
   /// spacings (0: none has). A run of the front is curved where it turns by more than `step_turn` within a sphere over
-  /// most of its length; on straight ones, corners included, the front functions do as well with half as many.
+  /// most of its length; on straight ones, corners included, the front functions do as well with half as many, and
+  /// only spheres have one that are so much larger than those at the front that its functions do not carry their nodes.
   double step_reach = 1;
   double step_turn = 20; // degrees
   /// Where the shape function of a sphere is nowhere on the cut larger than this, it has no step: a large sphere among
@@ -150,6 +151,7 @@ class CutSpace {
   mutable std::vector<int> local_;              // of a part among those of a sphere, -1 between calls
   mutable std::vector<std::vector<int>> reach_; // by node, found as they are asked for
   std::vector<char> curved_;                    // by segment of the front: its run is curved
+  std::vector<double> carried_;                 // m, likewise: nodes so near to it carry functions along the front
   int next_id_ = 0;
 };
 
