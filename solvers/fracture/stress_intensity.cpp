@@ -17,10 +17,10 @@ using topology::FrontFrame;
 
 namespace {
 
-const topology::Incision& incision_of(const Discretisation& body) {
-  if (body.problem().incision == nullptr)
+const topology::Incision& incision_of(const Problem& problem) {
+  if (problem.incision == nullptr)
     throw InputError("stress intensity: the body has no cut");
-  return *body.problem().incision;
+  return *problem.incision;
 }
 
 } // namespace
@@ -74,8 +74,19 @@ std::vector<FrontFrame> front_samples(const topology::Incision& incision, double
 
 Intensities displacement_correlation(const Discretisation& body, const Field& field, const FrontFrame& front,
                                      const CorrelationOptions& options) {
-  const topology::Incision& incision = incision_of(body);
-  const double h = spacing_at(body.problem().nodes, front.point);
+  return displacement_correlation(
+      body.problem(), front,
+      [&](const Vector3& plus, const Vector3& minus) -> Vector3 {
+        return body.at(plus, field).displacement - body.at(minus, field).displacement;
+      },
+      options);
+}
+
+Intensities displacement_correlation(const Problem& problem, const FrontFrame& front,
+                                     const std::function<Vector3(const Vector3&, const Vector3&)>& jump,
+                                     const CorrelationOptions& options) {
+  const topology::Incision& incision = incision_of(problem);
+  const double h = spacing_at(problem.nodes, front.point);
   Eigen::Matrix2d normal_matrix = Eigen::Matrix2d::Zero();
   Eigen::Matrix<double, 2, 3> right = Eigen::Matrix<double, 2, 3>::Zero();
   for (int k = 0; k < options.samples; ++k) {
@@ -85,16 +96,16 @@ Intensities displacement_correlation(const Discretisation& body, const Field& fi
       throw InputError(fmt::format("stress intensity: there is no sheet {:.3g} m behind the front at ({:.6g}, {:.6g}, "
                                    "{:.6g}) m",
                                    s, front.point.x(), front.point.y(), front.point.z()));
-    const Vector3 jump = body.at(face->point + lip_offset * h * face->normal, field).displacement -
-                         body.at(face->point - lip_offset * h * face->normal, field).displacement;
+    const Vector3 off = lip_offset * h * face->normal;
+    const Vector3 apart = jump(face->point + off, face->point - off);
     const Eigen::Vector2d terms(std::sqrt(s), s * std::sqrt(s));
     const double weight = 1 / std::sqrt(s);
     normal_matrix += weight * terms * terms.transpose();
-    right +=
-        weight * terms * Vector3(jump.dot(front.normal), jump.dot(front.ahead), jump.dot(front.tangent)).transpose();
+    right += weight * terms *
+             Vector3(apart.dot(front.normal), apart.dot(front.ahead), apart.dot(front.tangent)).transpose();
   }
   const Vector3 leading = normal_matrix.inverse().row(0) * right;
-  const Material& material = body.problem().material;
+  const Material& material = problem.material;
   const double plane = plane_strain_modulus(material) * std::sqrt(2 * std::numbers::pi) / 8;
   return {plane * leading[0], plane * leading[1],
           material.shear_modulus() * std::sqrt(2 * std::numbers::pi) / 4 * leading[2]};
@@ -188,7 +199,7 @@ class InteractionRule {
  public:
   InteractionRule(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
                   double inset_spacings)
-      : incision_(incision_of(body)), problem_(body.problem()), front_(front), options_(options),
+      : incision_(incision_of(body.problem())), problem_(body.problem()), front_(front), options_(options),
         h_(spacing_at(body.problem().nodes, front.point)), tube_(front, curvature_of(incision_, front, h_)),
         inset_(inset_spacings * h_) {
     size_tube();

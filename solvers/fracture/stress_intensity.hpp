@@ -30,6 +30,10 @@ struct CorrelationOptions {
 };
 Intensities displacement_correlation(const Discretisation& body, const Field& field, const topology::FrontFrame& front,
                                      const CorrelationOptions& options = {});
+/// The same of any body, whose jump u+ - u- between two points beside the sheet, m, `jump` gives.
+Intensities displacement_correlation(const Problem& problem, const topology::FrontFrame& front,
+                                     const std::function<Vector3(const Vector3& plus, const Vector3& minus)>& jump,
+                                     const CorrelationOptions& options = {});
 
 /// Interaction integral over a tube around the front, with the terms for loaded faces, body forces and the front's
 /// curvature in the plane of the cut (which is taken as flat within the tube). K = E'/2 I for the first two modes, mu I

@@ -76,13 +76,28 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
   const Problem& problem = body.problem();
   if (problem.incision == nullptr)
     throw InputError("tearing: the body has no cut");
-  std::vector<FrontState> states, without; // without: places where neither way fits
   const std::vector<FrontFrame> frames = front_samples(*problem.incision, spacing);
   FrontRules once;
   if (rules == nullptr)
     rules = &once;
   if (rules->spacing != spacing || rules->places.size() != frames.size())
     *rules = {spacing, std::vector<FrontRules::Place>(frames.size())};
+  const auto by_integral = [&](std::size_t f, const FrontFrame& frame) -> std::optional<Intensities> {
+    FrontRules::Place& place = rules->places[f];
+    if (!place.asked) {
+      place.rule = rule_at(body, field.pressure.size() > 0, frame);
+      place.asked = true;
+    }
+    return place.rule ? std::optional<Intensities>((*place.rule)(field)) : std::nullopt;
+  };
+  const auto by_jump = [&](const FrontFrame& frame) { return displacement_correlation(body, field, frame); };
+  return front_states(problem, frames, {by_integral, by_jump}, toughness, closed);
+}
+
+std::vector<FrontState> front_states(const Problem& problem, const std::vector<FrontFrame>& frames,
+                                     const FrontProbe& probe, const std::function<double(const Vector3&)>& toughness,
+                                     const std::vector<Vector3>& closed) {
+  std::vector<FrontState> states, without; // without: places where neither way fits
   for (std::size_t f = 0; f < frames.size(); ++f) {
     const FrontFrame& frame = frames[f];
     FrontState state;
@@ -94,21 +109,16 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
                                    frame.point.x(), frame.point.y(), frame.point.z(), state.toughness));
     if (presses_behind(problem, frame, closed)) {
       try {
-        state.intensities = displacement_correlation(body, field, frame);
+        state.intensities = probe.by_jump(frame);
         state.by_integral = false;
         states.push_back(state);
       } catch (const InputError&) {
         without.push_back(state);
       }
     } else {
-      FrontRules::Place& place = rules->places[f];
-      if (!place.asked) {
-        place.rule = rule_at(body, field.pressure.size() > 0, frame);
-        place.asked = true;
-      }
-      if (place.rule)
-        state.intensities = (*place.rule)(field);
-      (place.rule ? states : without).push_back(state);
+      const std::optional<Intensities> found = probe.by_integral(f, frame);
+      state.intensities = found.value_or(state.intensities);
+      (found ? states : without).push_back(state);
     }
   }
   const std::size_t known = states.size();
@@ -123,7 +133,7 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
     state.by_integral = distance <= 3 * spacing_at(problem.nodes, state.frame.point);
     if (!state.by_integral) {
       try {
-        state.intensities = displacement_correlation(body, field, state.frame);
+        state.intensities = probe.by_jump(state.frame);
       } catch (const InputError&) { // too near to the surface even for this: the nearest place it is
         if (known == 0)
           throw NumericalError(fmt::format("tearing: the intensities cannot be had at ({:.6g}, {:.6g}, {:.6g}) m: the "

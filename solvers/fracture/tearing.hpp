@@ -51,6 +51,19 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
                                      const std::function<double(const Vector3&)>& toughness, double spacing,
                                      const std::vector<Vector3>& closed = {}, FrontRules* rules = nullptr);
 
+/// How a body tells of a place of its front.
+struct FrontProbe {
+  /// By an integral; nothing where no tube fits. `place`: of the samples along the front.
+  std::function<std::optional<Intensities>(std::size_t place, const topology::FrontFrame& frame)> by_integral;
+  /// By the jump behind the front. Throws InputError where there is no room for it.
+  std::function<Intensities(const topology::FrontFrame& frame)> by_jump;
+};
+
+/// The same of any body, asked at these places of its front.
+std::vector<FrontState> front_states(const Problem& problem, const std::vector<topology::FrontFrame>& frames,
+                                     const FrontProbe& probe, const std::function<double(const Vector3&)>& toughness,
+                                     const std::vector<Vector3>& closed);
+
 /// The states with intensities averaged along the front over about `length` m (standard deviation of the weight), and
 /// what follows from them. Intensities scatter from place to place with the nodes; a front that followed that would
 /// grow ragged. So would one whose places each took the mean with their own triangle's way ahead: what the field says

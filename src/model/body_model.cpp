@@ -347,6 +347,8 @@ std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyMod
 }
 
 std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model, bool severed) {
+  if (model.finite != nullptr)
+    return not_linear;
   if (model.sprinkling.walls != nullptr)
     return "the organ has narrow gaps of its own";
   if (scenario.method.method == solvers::Method::published)

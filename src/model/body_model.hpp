@@ -123,6 +123,9 @@ void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Do
 /// Reason not to follow: the window would hold more of the body than pays.
 inline constexpr const char* too_much_of_body = "the cut concerns too much of the body";
 
+/// The same: it is at finite strain.
+inline constexpr const char* not_linear = "the law is not linear";
+
 /// Nodes that updates may add before a body is condensed anew.
 inline constexpr int growth_room = 150;
 

@@ -1,6 +1,8 @@
 #include "src/model/finite_model.hpp"
 
 #include "solvers/contact/friction.hpp"
+#include "solvers/finite/front_states.hpp"
+#include "solvers/finite/transfer.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/search/point_tree.hpp"
@@ -58,8 +60,10 @@ Hindrance hindrance_of(const Scenario& scenario) {
     return {"cut.lips = \"sticking\"", line};
   if (cuts && scenario.cut.sight == solvers::SightRule::appended)
     return {"cut.sight = \"appended\"", line};
-  if (scenario.tearing.enabled)
-    return {"[tearing]", line};
+  if (scenario.tearing.enabled && !scenario.law.spec.prony.empty())
+    return {"[tearing] with material.prony", line};
+  if (scenario.tearing.enabled && scenario.tearing.strength > 0)
+    return {"tearing.strength", line};
   return {};
 }
 
@@ -97,8 +101,8 @@ void require_run(const Scenario& scenario) {
   if (hindrance.what.empty())
     return;
   throw InputError(fmt::format("{}:{}: {} does not go with material.law = \"{}\"; possible with it: fixed regions, "
-                               "gravity, pre-tension, precuts, a blade that nothing resists, and a tool that presses, "
-                               "rubs, bonds or grasps, by method galerkin",
+                               "gravity, pre-tension, precuts, their tearing, a blade that nothing resists, and a tool "
+                               "that presses, rubs, bonds or grasps, by method galerkin",
                                scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
 }
 
@@ -125,8 +129,8 @@ bool can_run(const Scenario& scenario) {
 
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                          const BodyModel& nodes, bool touched, Patience patience)
-    : body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario),
-            fibre_field(scenario.law)),
+    : fibres_(fibre_field(scenario.law)),
+      body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario), fibres_),
       equilibrium_(body_, equilibrium_options(patience)), is_prestrained_(!scenario.pretension.isZero(0)),
       pairs_(body_, nodes.pairs) {
   if (!nodes.pairs.empty() && scenario.cut.lips != solvers::LipCondition::open)
@@ -248,10 +252,7 @@ Vector3 FiniteModel::force_along_surface() const {
 }
 
 void FiniteModel::go_on_from(const BodyModel& before) {
-  const solvers::NodeCloud& nodes = body_.problem().nodes;
-  VectorX start(3 * static_cast<Eigen::Index>(nodes.size()));
-  for (int i = 0; i < nodes.size(); ++i)
-    start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(nodes.positions[i]).displacement;
+  const VectorX start = state_from(before);
   if (before.finite == nullptr || equilibrium_.contact() == nullptr) {
     equilibrium_.set_coefficients(start, 1);
     return;
@@ -261,6 +262,40 @@ void FiniteModel::go_on_from(const BodyModel& before) {
   if (!old.may_begin_anew())
     shares = shares_from(old, start);
   equilibrium_.set_coefficients(start, 1, old.pose_, std::move(shares));
+}
+
+// Nodes that both bodies have keep their coefficients; new ones, and those about them, whose shape functions are others
+// now, take those with which the body is strained as it was.
+VectorX FiniteModel::state_from(const BodyModel& before) const {
+  constexpr double about = 2; // radii of a new node's sphere
+  const solvers::NodeCloud& nodes = body_.problem().nodes;
+  VectorX start(3 * static_cast<Eigen::Index>(nodes.size()));
+  if (before.finite == nullptr) {
+    for (int i = 0; i < nodes.size(); ++i)
+      start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(nodes.positions[i]).displacement;
+    return start;
+  }
+  const topology::PointTree known(before.nodes().positions), here(nodes.positions);
+  std::vector<char> free(nodes.positions.size(), 0);
+  std::vector<topology::PointTree::Found> near;
+  for (int i = 0; i < nodes.size(); ++i) {
+    const Vector3& x = nodes.positions[i];
+    const topology::PointTree::Found nearest = known.nearest(x);
+    const double same = same_place * nodes.spacings[i];
+    if (nearest.index >= 0 && nearest.squared_distance < same * same) {
+      start.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+          before.finite->coefficients().segment<3>(3 * static_cast<Eigen::Index>(nearest.index));
+      continue;
+    }
+    start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(x).displacement;
+    near.clear();
+    here.within(x, about * body_.spheres().radii()[i], near);
+    for (const topology::PointTree::Found& found : near)
+      free[found.index] = 1;
+  }
+  return solvers::nearest_state(body_, std::move(start), free, [&](const Vector3& x) -> Matrix3 {
+    return Matrix3::Identity() + before.at(x).gradient;
+  });
 }
 
 // A node that both bodies have keeps its place on the tool. One that is new where the tool touches sticks where it is
@@ -344,6 +379,9 @@ FiniteStep FiniteModel::solve_step(double time, const std::optional<topology::To
   step.iterations = status.iterations;
   step.residual = status.residual;
   step.least_jacobian = status.least_jacobian;
+  step.energy = status.energy;
+  step.loads = body_.loads().dot(equilibrium_.coefficients());
+  step.friction_work = status.friction_work;
   if (loading.tool) {
     step.tangential = equilibrium_.contact()->options().condition == solvers::ContactCondition::bonded
                           ? force_along_surface()
@@ -411,6 +449,18 @@ void FiniteModel::condense(const std::vector<int>& wanted, solvers::ContactPatch
   state.tool_torque = last_->torque;
   state.active_nodes = last_->active_nodes;
   state.contact_radius = last_->contact_radius;
+}
+
+std::vector<solvers::FrontState> FiniteModel::front_states(const std::function<double(const Vector3&)>& toughness,
+                                                           double spacing) const {
+  std::vector<Vector3> closed;
+  if (const solvers::FiniteLips* lips = equilibrium_.lips()) {
+    const std::vector<double> forces = lips->known_forces();
+    for (std::size_t p = 0; p < forces.size(); ++p)
+      if (forces[p] > 0)
+        closed.push_back(body_.problem().nodes.positions[lips->pairs()[p].plus]);
+  }
+  return solvers::front_states(body_, equilibrium_.coefficients(), toughness, spacing, closed, fibres_);
 }
 
 VectorX FiniteModel::nodal_displacements() const {

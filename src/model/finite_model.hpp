@@ -4,6 +4,7 @@
 #pragma once
 
 #include "solvers/finite/equilibrium.hpp"
+#include "solvers/fracture/tearing.hpp"
 #include "src/model/body_model.hpp"
 
 namespace spherecut::app {
@@ -26,6 +27,9 @@ struct FiniteStep {
   double residual = 0;  // norm of the unbalanced forces over that of the acting ones
   double least_jacobian = 1;
   double penetration = 0; // m, deepest that corners and middles of the surface's triangles lie in the tool
+  double energy = 0;      // J, of the strain
+  double loads = 0;       // J, forces of the loads, which are dead, times displacement
+  double friction_work = 0; // J, taken by the friction of the tool on the way from the last solution
 };
 
 /// How long an equilibrium is looked for that may not be there: a hand would wait for seconds, and its next pose may
@@ -78,6 +82,10 @@ class FiniteModel {
   /// Gap of every pair of lips along its normal, m.
   [[nodiscard]] std::vector<double> openings() const;
   [[nodiscard]] VectorX nodal_displacements() const; // 3 a node, m
+  /// What drives the fronts of its cut in the last solution, at places `spacing` m apart; `toughness`, J/m2, of the body
+  /// at rest. Throws as solvers::front_states().
+  [[nodiscard]] std::vector<solvers::FrontState>
+  front_states(const std::function<double(const Vector3&)>& toughness, double spacing) const;
   /// The last solution as a loop wants it that asks for the force at other poses of the tool: displacements = base +
   /// compliance * forces, exact at this pose, the compliance that of small motions about it. `wanted`: free nodes of
   /// the surface; those that touch the tool join them.
@@ -99,10 +107,12 @@ class FiniteModel {
   [[nodiscard]] std::vector<int> places_among_candidates(const std::vector<int>& nodes) const;
   [[nodiscard]] double deepest(const topology::ToolPose& pose) const;
   void summarise_contact(FiniteStep& step) const;
+  [[nodiscard]] VectorX state_from(const BodyModel& before) const;
   void set_candidates(std::vector<int> nodes);
   [[nodiscard]] Vector3 force_along_surface() const;
   [[nodiscard]] std::vector<solvers::ContactShare> shares_from(const FiniteModel& before, const VectorX& start) const;
 
+  std::function<solvers::FibreFrame(const Vector3&)> fibres_;
   solvers::FiniteBody body_;
   solvers::Equilibrium equilibrium_;
   std::vector<int> candidates_;            // free nodes of the surface; of a grasper those that it holds

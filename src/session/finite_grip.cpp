@@ -31,15 +31,16 @@ void take_hold(const StepSample& sample, SessionState& state, Grasping& grasping
 
 } // namespace
 
-void follow_grip(const StepSample& sample, SessionState& state, Grasping& grasping) {
+bool follow_grip(const StepSample& sample, SessionState& state, Grasping& grasping) {
   const Grasping::Change change = grasping.change_at(sample, state.options.grip);
   if (change == Grasping::Change::closes)
     take_hold(sample, state, grasping);
   if (change != Grasping::Change::opens)
-    return;
+    return false;
   grasping.let_go();
   if (state.model.finite != nullptr)
     state.model.finite->let_go();
+  return true;
 }
 
 } // namespace spherecut::app

@@ -7,7 +7,7 @@
 namespace spherecut::app {
 
 /// Takes hold of the tissue or lets go of it where the time has come; the step that follows is solved with that. Throws
-/// NumericalError, and InputError when there is nothing to hold.
-void follow_grip(const StepSample& sample, SessionState& state, Grasping& grasping);
+/// NumericalError, and InputError when there is nothing to hold. True: it has let go.
+bool follow_grip(const StepSample& sample, SessionState& state, Grasping& grasping);
 
 } // namespace spherecut::app

@@ -136,9 +136,10 @@ void Session::Parts::step_linear(const StepSample& sample, std::vector<topology:
 
 void Session::Parts::step_finite(const StepSample& sample, std::vector<topology::BladePose> passed,
                                  StepResult& result) {
+  Loading loading;
   {
     const StageTimer timer(result.stages.solve);
-    follow_grip(sample, state, grasping);
+    loading.releases = follow_grip(sample, state, grasping);
   }
   const std::optional<CutReport> taken = cutting.take_report();
   bool is_solved = false;
@@ -156,6 +157,10 @@ void Session::Parts::step_finite(const StepSample& sample, std::vector<topology:
   if (is_solved && may_follow_finite()) {
     const StageTimer timer(result.stages.body);
     follow_tool(sample, result);
+  }
+  if (is_solved && tears) {
+    const StageTimer timer(result.stages.tear);
+    tears->tear(sample, loading, result);
   }
   if (is_solved)
     report.tell_finite(result);

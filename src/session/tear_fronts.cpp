@@ -1,6 +1,7 @@
 #include "src/session/tear_fronts.hpp"
 
 #include "solvers/fracture/tear_seed.hpp"
+#include "src/model/finite_model.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/domain/way_out.hpp"
 #include "topology/incision/cut_sheets.hpp"
@@ -52,17 +53,24 @@ Vector3 up_to_next_sheet(const topology::Incision& incision, const topology::Fro
 
 } // namespace
 
-std::vector<solvers::FrontState> TearFronts::states(const BodyModel& model) const {
-  if (model.incision == nullptr || model.incision->front().empty())
-    return {};
+// Before averages and directions.
+std::vector<solvers::FrontState> TearFronts::found_states(const BodyModel& model) const {
   const double fine = zone_.spacing.fine;
+  if (model.finite != nullptr)
+    return model.finite->front_states(toughness_, fine);
   std::vector<Vector3> closed;
   if (model.state)
     for (std::size_t p = 0; p < std::min(model.pairs.size(), model.state->lips.closed.size()); ++p)
       if (model.state->lips.closed[p] != 0)
         closed.push_back(model.sprinkling.nodes.positions[model.pairs[p].plus]);
-  std::vector<solvers::FrontState> found =
-      solvers::front_states(*model.body, model.field, toughness_, fine, closed, &model.front_rules);
+  return solvers::front_states(*model.body, model.field, toughness_, fine, closed, &model.front_rules);
+}
+
+std::vector<solvers::FrontState> TearFronts::states(const BodyModel& model) const {
+  if (model.incision == nullptr || model.incision->front().empty())
+    return {};
+  const double fine = zone_.spacing.fine;
+  std::vector<solvers::FrontState> found = found_states(model);
   std::erase_if(found, [&](const solvers::FrontState& state) {
     return !state.intensities.allFinite() || has_met(*model.incision, state.frame, fine);
   });

@@ -46,6 +46,8 @@ class TearFronts {
   [[nodiscard]] double released(const BodyModel& model, const topology::Incision& after) const;
 
  private:
+  [[nodiscard]] std::vector<solvers::FrontState> found_states(const BodyModel& model) const;
+
   const Scenario& scenario_;
   const std::function<double(const Vector3&)>& toughness_;
   const FineZone& zone_;

@@ -1,6 +1,7 @@
 #include "src/session/tear_propagation.hpp"
 
 #include "src/base/stage_timer.hpp"
+#include "src/model/finite_model.hpp"
 #include "src/tissue/cut_checks.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/base/interruption.hpp"
@@ -54,6 +55,21 @@ double mean_toughness(const topology::FrontGrowth& growth, const topology::Incis
   return area > 0 ? sum / area : 0;
 }
 
+/// What the tool of a solved body feels and takes.
+struct ToolLoad {
+  Vector3 force;       // N, of the body on the tool
+  double friction = 0; // J, taken by friction in the last step
+  bool acts = false;
+};
+ToolLoad tool_load(const BodyModel& model) {
+  if (model.finite != nullptr) {
+    const FiniteStep& step = model.finite->last();
+    return {step.force, step.friction_work, step.active_nodes > 0};
+  }
+  const solvers::ContactState& tool = model.state->tool;
+  return {tool.tool_force, tool.friction_work, tool.active_nodes > 0};
+}
+
 /// Means over what is swept: weighted by how far the nearest of the places `from` moves. Zero without weights.
 struct Swept {
   double surplus = 0; // G - G_c, J/m2
@@ -98,12 +114,14 @@ TearIncrement increment_of(const std::vector<solvers::FrontState>& states, const
 } // namespace
 
 Energies energies(const BodyModel& model) {
-  Energies energies;
-  energies.loads = model.body->load_work(model.field);
+  if (model.finite != nullptr)
+    return {model.finite->last().loads, model.finite->last().energy};
+  const double loads = model.body->load_work(model.field);
   const solvers::ContactState& tool = model.state->tool;
+  double pressed = 0; // forces of the tool times displacement
   for (std::size_t c = 0; c < tool.nodal_forces.size(); ++c)
-    energies.tool += tool.nodal_forces[c].dot(tool.displacement.segment<3>(3 * static_cast<Eigen::Index>(c)));
-  return energies;
+    pressed += tool.nodal_forces[c].dot(tool.displacement.segment<3>(3 * static_cast<Eigen::Index>(c)));
+  return {loads, 0.5 * (loads + pressed)};
 }
 
 TearPropagation::TearPropagation(SessionState& state, Grasping& grasping, ContactSolver& contact,
@@ -116,37 +134,39 @@ TearPropagation::TearPropagation(SessionState& state, Grasping& grasping, Contac
 // that, and what a grasper does that lets go, belongs to nobody.
 void TearPropagation::book_loading(const StepSample& sample, const Loading& loading) {
   const Energies now = energies(state_.model);
-  const Vector3 force = state_.model.state->tool.tool_force;
+  const ToolLoad tool = tool_load(state_.model);
   if (!account_) {
     account_ = TearAccount{};
   } else {
     EnergyLedger& ledger = account_->ledger;
     double work = 0;
     if (sample.tool && account_->pose)
-      work = -0.5 * (account_->force + force).dot(sample.tool->point - account_->pose->point);
-    const double loads = now.loads - account_->last.loads, elastic = now.elastic() - account_->last.elastic();
+      work = -0.5 * (account_->force + tool.force).dot(sample.tool->point - account_->pose->point);
+    const double loads = now.loads - account_->last.loads, elastic = now.elastic - account_->last.elastic;
     ledger.tool += work;
     ledger.loads += loads;
     ledger.elastic += elastic;
-    const double friction = state_.model.state->tool.friction_work;
-    ledger.dissipation += friction;
-    const double released = std::max(0.0, work + loads - elastic - friction);
+    ledger.dissipation += tool.friction;
+    const double released = std::max(0.0, work + loads - elastic - tool.friction);
     if (loading.cut_surface > 0)
       ledger.surface += std::min(released, loading.cut_surface);
     if (loading.releases || loading.cut_surface > 0)
       ledger.dissipation += std::max(0.0, released - loading.cut_surface);
   }
   account_->last = now;
-  account_->force = force;
+  account_->force = tool.force;
   account_->pose = sample.tool;
   account_->time = sample.time;
 }
 
 // Whether the tool has brought the load of this step since the last account, so that the load at which a front moves
-// can be looked for. A loop in real time wants the force where the tool is.
+// can be looked for. A loop in real time wants the force where the tool is. At finite strain a tool that rubs or bonds
+// cannot go back on its way.
 bool TearPropagation::follows_load(const StepSample& sample, const Loading& loading) const {
+  const bool may_go_back = grasping_.holds() || state_.model.finite == nullptr ||
+                           state_.scenario.contact.condition == solvers::ContactCondition::frictionless;
   return !state_.options.tear_gradually && !loading.releases && loading.cut_surface == 0 && account_ &&
-         account_->pose && sample.tool && (grasping_.holds() || state_.model.state->tool.active_nodes > 0) &&
+         account_->pose && sample.tool && may_go_back && (grasping_.holds() || tool_load(state_.model).acts) &&
          sample.tool->point != account_->pose->point;
 }
 
@@ -322,12 +342,33 @@ class TearPropagation::Loop {
   }
 
   // On to where the largest G / G_c is `target`, if it comes to that in this step, else to its end. `full`: the states
-  // at its end; the solution is at either.
+  // at its end; the solution is at either. Intensities go in proportion to the load, at finite strain nearly so: there
+  // the place is looked for between a load below it and one above.
   void load_until(double target, const States& full) {
-    const double part = states_ && full && states_->size() == full->size()
-                            ? solvers::onset_share(state_.scenario.material, *states_, *full, target)
-                            : 1;
-    load_to(share_ + (1 - share_) * part);
+    constexpr int most_trials = 5;
+    constexpr double near = 0.01; // of the target
+    States low = states_, high = full;
+    double from = share_, to = 1;
+    for (int trial = 0; trial < most_trials; ++trial) {
+      const double part = low && high && low->size() == high->size()
+                              ? solvers::onset_share(state_.scenario.material, *low, *high, target)
+                              : 1;
+      const double share = from + (to - from) * part;
+      if (state_.model.finite == nullptr || share >= 1 || trial + 1 == most_trials) {
+        load_to(share);
+        return;
+      }
+      tears_.contact_.solve(loaded(from_, since_, sample_, share), state_.model);
+      find_states();
+      const double drive = states_ ? drive_of(*states_) : 0;
+      if (std::abs(drive / target - 1) < near) {
+        share_ = share;
+        tears_.book_loading(loaded_sample(), share_ < 1 ? Loading{} : loading_);
+        return;
+      }
+      (drive < target ? from : to) = share;
+      (drive < target ? low : high) = states_;
+    }
   }
 
   void begin() {
@@ -359,7 +400,7 @@ class TearPropagation::Loop {
         increment_of(states_.value_or(std::vector<solvers::FrontState>{}), state_.model.incision.get()));
     TearIncrement& row = report_.increments.back();
     row.time = loaded_sample().time;
-    row.force = state_.model.state->tool.tool_force.norm();
+    row.force = tool_load(state_.model).force.norm();
     row.ledger = account().ledger;
     row.body.nodes = state_.model.sprinkling.nodes.size();
     row.intensity_seconds = intensity_seconds_;
@@ -490,11 +531,11 @@ class TearPropagation::Loop {
     }
     EnergyLedger& ledger = account().ledger;
     ledger.loads += now.loads - account().last.loads;
-    ledger.elastic += now.elastic() - account().last.elastic();
+    ledger.elastic += now.elastic - account().last.elastic;
     ledger.surface += surface;
     ledger.dissipation += std::max(0.0, surplus);
     account().last = now;
-    account().force = state_.model.state->tool.tool_force;
+    account().force = tool_load(state_.model).force;
     account().area += torn;
     result_.cut->triangles += growth.sheets.triangles;
   }

@@ -22,7 +22,6 @@ namespace {
 // as many updates as fit into its zone: one of a spacing, three of a half, six of a quarter.
 constexpr double largest_share = 0.5;
 constexpr const char* spacing_changed = "the spacing has changed";
-constexpr const char* not_linear = "the law is not linear";
 
 } // namespace
 

@@ -1,0 +1,77 @@
+#include "solvers/finite/front_states.hpp"
+
+#include "solvers/fracture/local_values.hpp"
+#include "topology/base/errors.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace spherecut::solvers {
+namespace {
+
+// As of the small-strain integral (solvers/fracture/tearing.cpp):
+constexpr double deepest_inset = 1; // of the tube's shift from the surface, in spacings
+constexpr double least_inset = 0.5; // nearer to the surface nodes do not resolve the field
+
+/// The rotation of F = R U.
+Matrix3 rotation_of(const Matrix3& deformation) {
+  const Eigen::JacobiSVD<Matrix3> parts(deformation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return parts.matrixU() * parts.matrixV().transpose();
+}
+
+/// The integral over the usual tube, or a smaller one, or what of the usual one lies in the body.
+std::optional<double> release_at(const FiniteBody& body, const EnergyMomentum& momentum,
+                                 const topology::FrontFrame& frame) {
+  for (const ReleaseOptions& tube : {ReleaseOptions{}, ReleaseOptions{.inner = 0.5, .outer = 2.5, .half_length = 1}})
+    try {
+      return momentum.at(frame, tube).rate;
+    } catch (const InputError&) { // the tube leaves the body, or the front turns within it
+    }
+  const Problem& problem = body.problem();
+  const double depth = -problem.domain->signed_distance(frame.point) / spacing_at(problem.nodes, frame.point);
+  if (depth < least_inset)
+    return std::nullopt;
+  try {
+    return momentum.at(frame, {.inset = std::min(depth, deepest_inset)}).rate;
+  } catch (const InputError&) { // too near to the surface, or the front turns within the tube
+  }
+  return std::nullopt;
+}
+
+} // namespace
+
+std::vector<FrontState> front_states(const FiniteBody& body, const VectorX& coefficients,
+                                     const std::function<double(const Vector3&)>& toughness, double spacing,
+                                     const std::vector<Vector3>& closed,
+                                     const std::function<FibreFrame(const Vector3& x)>& fibres) {
+  const Problem& problem = body.problem();
+  if (problem.incision == nullptr)
+    throw InputError("tearing: the body has no cut");
+  const EnergyMomentum momentum(body, coefficients, fibres);
+  const auto jump = [&](const Vector3& plus, const Vector3& minus) -> Vector3 {
+    const FiniteState above = body.at(plus, coefficients), below = body.at(minus, coefficients);
+    const Matrix3 rotation = rotation_of(0.5 * (above.deformation + below.deformation));
+    return rotation.transpose() * (above.displacement - below.displacement);
+  };
+  const auto by_jump = [&](const topology::FrontFrame& frame) {
+    return displacement_correlation(problem, frame, jump);
+  };
+  const auto by_integral = [&](std::size_t, const topology::FrontFrame& frame) -> std::optional<Intensities> {
+    const std::optional<double> release = release_at(body, momentum, frame);
+    if (!release)
+      return std::nullopt;
+    // Where the jump tells of no mode that opens or slides, what is released opens the front straight ahead.
+    Intensities modes = Intensities::UnitX();
+    try {
+      if (const Intensities found = by_jump(frame); driving_release_rate(problem.material, found) > 0)
+        modes = found;
+    } catch (const InputError&) { // no room for the jump
+    }
+    modes[0] = std::max(0.0, modes[0]); // faces that are pressed together do not open
+    return std::sqrt(std::max(0.0, *release) / driving_release_rate(problem.material, modes)) * modes;
+  };
+  return front_states(problem, front_samples(*problem.incision, spacing), {by_integral, by_jump}, toughness, closed);
+}
+
+} // namespace spherecut::solvers

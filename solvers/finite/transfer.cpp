@@ -1,0 +1,112 @@
+#include "solvers/finite/transfer.hpp"
+
+#include "solvers/finite/point_kernels.hpp"
+#include "topology/base/errors.hpp"
+
+#include <Eigen/SparseCholesky>
+#include <fmt/format.h>
+
+namespace spherecut::solvers {
+namespace {
+
+constexpr int most_rounds = 4;
+constexpr double more = 100; // times the weight of a point with too low a J counts in the next round: some, beside a
+                             // front, weigh next to nothing
+
+/// One least-squares fit; `emphasis`: of every point, times its weight.
+VectorX fitted(const FiniteBody& body, VectorX coefficients, const std::vector<char>& free,
+               const std::vector<double>& emphasis, const std::function<Matrix3(const Vector3&)>& given) {
+  std::vector<int> place(free.size(), -1); // of a free node among them
+  int count = 0;
+  for (std::size_t i = 0; i < free.size(); ++i)
+    if (free[i] != 0)
+      place[i] = count++;
+  if (count == 0)
+    return coefficients;
+  const PointTable& table = body.points();
+  std::vector<Eigen::Triplet<double>> entries;
+  MatrixX right = MatrixX::Zero(count, 3);
+  std::vector<int> slots; // of the group, that are free
+  for (int group = 0; group < table.groups(); ++group) {
+    const std::span<const int> nodes = table.nodes_of(group);
+    slots.clear();
+    for (int k = 0; k < std::ssize(nodes); ++k)
+      if (place[nodes[k]] >= 0)
+        slots.push_back(k);
+    if (slots.empty())
+      continue;
+    LaneValues f[9];
+    deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table.gradients_of(group), coefficients.data(),
+                          f);
+    for (int lane = 0; lane < table.count[group]; ++lane) {
+      const std::size_t point = static_cast<std::size_t>(point_lanes) * group + lane;
+      const double weight = emphasis[point] * table.weights[group].value[lane];
+      Matrix3 left = given(table.positions[point]);
+      for (int k = 0; k < 9; ++k)
+        left.data()[k] -= f[k].value[lane];
+      for (const int k : slots) {
+        const Vector3 gradient = table.gradient(table.start[group] + k, lane);
+        right.row(place[nodes[k]]) += weight * (left * gradient).transpose();
+        for (const int l : slots)
+          if (place[nodes[l]] <= place[nodes[k]])
+            entries.emplace_back(place[nodes[k]], place[nodes[l]],
+                                 weight * gradient.dot(table.gradient(table.start[group] + l, lane)));
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> matrix(count, count);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  // What a rigid motion of free nodes alone would leave undetermined stays where it is.
+  constexpr double held = 1e-9;
+  for (int i = 0; i < count; ++i)
+    matrix.coeffRef(i, i) *= 1 + held;
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
+  if (factor.info() != Eigen::Success)
+    throw NumericalError(fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
+  const MatrixX change = factor.solve(right);
+  if (!change.allFinite())
+    throw NumericalError(fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
+  for (std::size_t i = 0; i < free.size(); ++i)
+    if (place[i] >= 0)
+      coefficients.segment<3>(3 * static_cast<Eigen::Index>(i)) += change.row(place[i]).transpose();
+  return coefficients;
+}
+
+/// Points with a lower J count for more, and the nodes that reach them are free. False: there is no such point.
+bool stress_inverted(const FiniteBody& body, const VectorX& coefficients, double least_jacobian,
+                     std::vector<char>& free, std::vector<double>& emphasis) {
+  const PointTable& table = body.points();
+  bool has_found = false;
+  for (int group = 0; group < table.groups(); ++group) {
+    const std::span<const int> nodes = table.nodes_of(group);
+    LaneValues f[9];
+    deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table.gradients_of(group), coefficients.data(),
+                          f);
+    for (int lane = 0; lane < table.count[group]; ++lane) {
+      Matrix3 deformation;
+      for (int k = 0; k < 9; ++k)
+        deformation.data()[k] = f[k].value[lane];
+      if (deformation.determinant() >= least_jacobian)
+        continue;
+      has_found = true;
+      emphasis[static_cast<std::size_t>(point_lanes) * group + lane] *= more;
+      for (const int node : nodes)
+        free[node] = 1;
+    }
+  }
+  return has_found;
+}
+
+} // namespace
+
+VectorX nearest_state(const FiniteBody& body, VectorX coefficients, std::vector<char> free,
+                      const std::function<Matrix3(const Vector3&)>& given, double least_jacobian) {
+  std::vector<double> emphasis(body.points().positions.size(), 1);
+  coefficients = fitted(body, std::move(coefficients), free, emphasis, given);
+  for (int round = 0;
+       round < most_rounds && stress_inverted(body, coefficients, least_jacobian, free, emphasis); ++round)
+    coefficients = fitted(body, std::move(coefficients), free, emphasis, given);
+  return coefficients;
+}
+
+} // namespace spherecut::solvers
