@@ -11,7 +11,7 @@
 #include "experiments/support/statistics.hpp"
 
 #include "solvers/elasticity/homogeneous.hpp"
-#include "solvers/finite/energy_release.hpp"
+#include "solvers/release/energy_release.hpp"
 #include "src/output/figure.hpp"
 #include "topology/incision/cut_sheets.hpp"
 

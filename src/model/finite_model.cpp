@@ -1,17 +1,15 @@
 #include "src/model/finite_model.hpp"
 
 #include "solvers/contact/friction.hpp"
-#include "solvers/finite/front_states.hpp"
+#include "solvers/release/front_states.hpp"
 #include "solvers/finite/transfer.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/search/point_tree.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <numbers>
 
 namespace spherecut::app {
 namespace {
@@ -465,13 +463,6 @@ std::vector<solvers::FrontState> FiniteModel::front_states(const std::function<d
 
 VectorX FiniteModel::nodal_displacements() const {
   return body_.nodal_displacements(equilibrium_.coefficients());
-}
-
-double rotation_degrees(const Matrix3& deformation) {
-  const Eigen::JacobiSVD<Matrix3> svd(deformation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Matrix3 rotation = svd.matrixU() * svd.matrixV().transpose();
-  const Vector3 axis(rotation(2, 1) - rotation(1, 2), rotation(0, 2) - rotation(2, 0), rotation(1, 0) - rotation(0, 1));
-  return std::atan2(axis.norm(), rotation.trace() - 1) * 180 / std::numbers::pi;
 }
 
 } // namespace spherecut::app

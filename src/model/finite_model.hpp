@@ -127,7 +127,4 @@ class FiniteModel {
   Skin skin_;
 };
 
-/// Angle of the rotation of F = R U, degrees.
-double rotation_degrees(const Matrix3& deformation);
-
 } // namespace spherecut::app

@@ -2,6 +2,7 @@
 
 #include "solvers/contact/bank_pairs.hpp"
 #include "solvers/contact/tangential_force.hpp"
+#include "solvers/elasticity/rotation.hpp"
 #include "src/base/stage_timer.hpp"
 #include "src/model/finite_model.hpp"
 #include "src/tissue/cut_checks.hpp"
@@ -107,7 +108,7 @@ void StepReport::tell_finite(StepResult& result) {
     for (const Vector3& x : state_.model.sprinkling.nodes.positions) {
       state_.node_states.push_back(state_.model.at(x));
       result.rotation_degrees =
-          std::max(result.rotation_degrees, rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
+          std::max(result.rotation_degrees, solvers::rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
     }
   judge_banks(result);
   if (!state_.touch)

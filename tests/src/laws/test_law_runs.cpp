@@ -1,5 +1,6 @@
 // Runs whose law is not linear: against the linear run where strains are small, against closed forms where they are
 // large, what they refuse, and their bits against threads.
+#include "solvers/elasticity/rotation.hpp"
 #include "solvers/algebra/parallel.hpp"
 #include "solvers/elasticity/homogeneous.hpp"
 #include "src/model/finite_model.hpp"
@@ -176,7 +177,7 @@ TEST_CASE("The angle of a deformation is that of its rotation, whatever the stre
   const Matrix3 stretch = Vector3(0.6, 1.1, 1.7).asDiagonal();
   for (const double degrees : {0.0, 1e-3, 30.0, 90.0, 179.0}) {
     const Eigen::AngleAxisd turn(degrees * std::numbers::pi / 180, Vector3(1, 2, -2).normalized());
-    CHECK(rotation_degrees(turn.toRotationMatrix() * stretch) == Approx(degrees).margin(1e-9));
+    CHECK(solvers::rotation_degrees(turn.toRotationMatrix() * stretch) == Approx(degrees).margin(1e-9));
   }
 }
 

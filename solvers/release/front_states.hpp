@@ -10,7 +10,7 @@
 // because a flap that is folded back would otherwise seem to slide.
 #pragma once
 
-#include "solvers/finite/energy_release.hpp"
+#include "solvers/release/energy_release.hpp"
 #include "solvers/fracture/tearing.hpp"
 
 namespace spherecut::solvers {

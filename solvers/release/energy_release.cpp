@@ -1,6 +1,7 @@
-#include "solvers/finite/energy_release.hpp"
+#include "solvers/release/energy_release.hpp"
 
 #include "solvers/finite/point_kernels.hpp"
+#include "solvers/elasticity/rotation.hpp"
 #include "topology/base/errors.hpp"
 
 #include <Eigen/LU>
@@ -119,8 +120,9 @@ EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficien
   const DilatationBlocks& blocks = body.blocks();
   const Law& law = body.law();
   const auto lanes = static_cast<std::size_t>(point_lanes);
-  gradients_.assign(lanes * table.groups(), Matrix3::Zero());
-  of_points_ = gradients_;
+  deformations_.assign(lanes * table.groups(), Matrix3::Identity());
+  of_points_.assign(deformations_.size(), 0);
+  points_stress_.assign(deformations_.size(), Matrix3::Zero());
   std::vector<double> mean(blocks.volume.size(), 0);
   for (int group = 0; group < table.groups(); ++group) {
     LaneValues f[9];
@@ -128,7 +130,7 @@ EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficien
     deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table.gradients_of(group), coefficients.data(),
                           f);
     for (int lane = 0; lane < table.count[group]; ++lane) {
-      Matrix3 deformation;
+      Matrix3& deformation = deformations_[lanes * group + lane];
       for (int k = 0; k < 9; ++k)
         deformation.data()[k] = f[k].value[lane];
       const double j = deformation.determinant();
@@ -140,70 +142,87 @@ EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficien
       }
       if (blocks.size() > 0)
         mean[blocks.block[group]] += table.weights[group].value[lane] * j / blocks.volume[blocks.block[group]];
-      gradients_[lanes * group + lane] = deformation - Matrix3::Identity();
     }
   }
-  if (blocks.size() > 0)
+  if (blocks.size() > 0) {
     of_blocks_ = of_points_;
+    blocks_stress_ = points_stress_;
+  }
   const double own = body.pointwise_share(), shared = 1 - own;
   for (int group = 0; group < table.groups(); ++group)
     for (int lane = 0; lane < table.count[group]; ++lane) {
       const std::size_t point = lanes * group + lane;
-      const Matrix3 deformation = gradients_[point] + Matrix3::Identity();
+      const Matrix3& deformation = deformations_[point];
       std::vector<FibreFrame> frame;
       if (fibres)
         frame.push_back(fibres(table.positions[point]));
       double energy = 0;
       Matrix3 stress;
       law.evaluate_isochoric({&deformation, 1}, frame, {&energy, 1}, {&stress, 1});
-      const auto tensor = [&](double volumetric, double pressure, const Matrix3& cofactor) -> Matrix3 {
-        return (energy + volumetric) * Matrix3::Identity() -
-               gradients_[point].transpose() * (stress + pressure * cofactor);
-      };
-      if (!body.minds_volume()) {
-        of_points_[point] = tensor(0, 0, Matrix3::Zero());
+      of_points_[point] = energy;
+      points_stress_[point] = stress;
+      if (!body.minds_volume())
         continue;
-      }
       const double j = deformation.determinant();
       const Matrix3 cofactor = j * deformation.inverse().transpose();
       const double volumetric = law.volumetric_energy(j), pressure = law.pressure(j);
-      of_points_[point] = tensor(volumetric, pressure, cofactor);
+      of_points_[point] += volumetric;
+      points_stress_[point] += pressure * cofactor;
       if (blocks.size() == 0)
         continue;
       const double jb = mean[blocks.block[group]], pb = law.pressure(jb);
-      of_blocks_[point] = tensor(own * volumetric + shared * (law.volumetric_energy(jb) + pb * (j - jb)),
-                                 own * pressure + shared * pb, cofactor);
+      of_blocks_[point] = energy + own * volumetric + shared * (law.volumetric_energy(jb) + pb * (j - jb));
+      blocks_stress_[point] = stress + (own * pressure + shared * pb) * cofactor;
     }
 }
 
+/// `about`: becomes A.
 template <class ShiftAt>
-EnergyRelease EnergyMomentum::integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor) const {
+EnergyRelease EnergyMomentum::integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor,
+                                        Matrix3& about) const {
   const PointTable& table = body_.points();
-  const std::vector<Matrix3>& tensor =
-      pressure == ReleasePressure::blocks && !of_blocks_.empty() ? of_blocks_ : of_points_;
-  const auto& body_force = body_.problem().loads.body_force;
-  EnergyRelease sum;
+  const bool takes_blocks = pressure == ReleasePressure::blocks && !of_blocks_.empty();
+  const std::vector<double>& energies = takes_blocks ? of_blocks_ : of_points_;
+  const std::vector<Matrix3>& stresses = takes_blocks ? blocks_stress_ : points_stress_;
+  struct Reached {
+    std::size_t point;
+    double weight; // m3
+    Shift shift;
+  };
+  std::vector<Reached> reached;
+  Matrix3 sum_of_deformations = Matrix3::Zero();
+  double fading = 0;
   for (int group = 0; group < table.groups(); ++group)
     for (int lane = 0; lane < table.count[group]; ++lane) {
       const std::size_t point = static_cast<std::size_t>(point_lanes) * group + lane;
-      const Vector3& x = table.positions[point];
-      const Shift shift = shift_at(x);
+      const Shift shift = shift_at(table.positions[point]);
       if (shift.q == 0)
         continue;
-      const Matrix3& s = tensor[point];
-      const double weight = table.weights[group].value[lane];
-      sum.rate -=
-          weight * (shift.ahead.dot(s * shift.gradient) + shift.q * shift.turn * shift.tangent.dot(s * shift.tangent));
-      if (body_force) {
-        const Vector3 pull = load_factor * weight * shift.q * gradients_[point].transpose() * body_force(x);
-        sum.rate -= shift.ahead.dot(pull);
-      }
+      const double weight = table.weights[group].value[lane], share = weight * shift.gradient.norm();
+      sum_of_deformations += share * deformations_[point];
+      fading += share;
+      reached.push_back({point, weight, shift});
     }
+  about = fading > 0 ? rotation_of(sum_of_deformations / fading) : Matrix3(Matrix3::Identity());
+  const auto& body_force = body_.problem().loads.body_force;
+  EnergyRelease sum;
+  for (const Reached& at : reached) {
+    const Matrix3 h = deformations_[at.point] - about;
+    const Matrix3 s = energies[at.point] * Matrix3::Identity() - h.transpose() * stresses[at.point];
+    const Shift& shift = at.shift;
+    sum.rate -=
+        at.weight * (shift.ahead.dot(s * shift.gradient) + shift.q * shift.turn * shift.tangent.dot(s * shift.tangent));
+    if (body_force) {
+      const Vector3 pull = load_factor * at.weight * shift.q * h.transpose() * body_force(table.positions[at.point]);
+      sum.rate -= shift.ahead.dot(pull);
+    }
+  }
   return sum;
 }
 
 // On a face P n = t: e . S n = -t . H e along the sheet.
-void EnergyMomentum::add_faces(const std::vector<FacePlace>& places, double load_factor, EnergyRelease& sum) const {
+void EnergyMomentum::add_faces(const std::vector<FacePlace>& places, const Matrix3& about, double load_factor,
+                               EnergyRelease& sum) const {
   const auto& lip_traction = body_.problem().loads.lip_traction;
   if (!lip_traction)
     return;
@@ -214,7 +233,7 @@ void EnergyMomentum::add_faces(const std::vector<FacePlace>& places, double load
       if (const auto face = incision.closest(place.position, 100 * place.off); face && !face->on_border)
         at = face->point + side * place.off * face->normal;
       const Vector3 traction = load_factor * lip_traction(at, -side * place.normal);
-      const Matrix3 h = body_.at(at, coefficients_).deformation - Matrix3::Identity();
+      const Matrix3 h = body_.at(at, coefficients_).deformation - about;
       sum.rate -= place.weight * traction.dot(h * place.ahead);
     }
 }
@@ -345,9 +364,10 @@ EnergyRelease EnergyMomentum::at(const topology::FrontFrame& front, const Releas
   if (!options.half_length)
     return mean(options, load_factor);
   const LocalShift shift(body_, front, options);
-  EnergyRelease sum = integrate(shift, options.pressure, load_factor);
+  Matrix3 about;
+  EnergyRelease sum = integrate(shift, options.pressure, load_factor, about);
   sum.length = shift.length();
-  add_faces(shift.faces(), load_factor, sum);
+  add_faces(shift.faces(), about, load_factor, sum);
   sum.rate /= sum.length;
   return sum;
 }
@@ -384,7 +404,8 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
       shift.gradient += across.slope * cover.value / r * (ahead * shift.ahead + above * shift.normal);
     return shift;
   };
-  EnergyRelease sum = integrate(shift_at, options.pressure, load_factor);
+  Matrix3 about;
+  EnergyRelease sum = integrate(shift_at, options.pressure, load_factor, about);
   std::vector<FacePlace> faces;
   const double step = 0.25 * longest;
   for (int k = 0; k < std::ssize(front); ++k) {
@@ -421,7 +442,7 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
     throw InputError(fmt::format("energy release: all of the front lies in the {:.3g} m below the surface where the "
                                  "shift fades",
                                  inset));
-  add_faces(faces, load_factor, sum);
+  add_faces(faces, about, load_factor, sum);
   sum.rate /= sum.length;
   return sum;
 }

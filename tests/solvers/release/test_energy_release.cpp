@@ -1,9 +1,8 @@
 // The energy release rate at finite strain: against the small-strain integral, against the energy of two cuts, against
 // a closed form, and for tubes of any size.
-#include "experiments/support/finite_block.hpp"
 #include "experiments/support/penny_body.hpp"
-#include "solvers/finite/energy_release.hpp"
-#include "topology/incision/cut_sheets.hpp"
+#include "solvers/release/energy_release.hpp"
+#include "tests/solvers/release/cut_strip.hpp"
 
 #include <catch2/catch.hpp>
 #include <numbers>
@@ -12,53 +11,12 @@ using namespace spherecut;
 using namespace spherecut::solvers;
 using experiments::finite_block;
 using experiments::FiniteBlock;
+using tests::cut_strip;
+using tests::LoadedStrip;
+using tests::pulled_strip;
+using tests::strip_depth;
 
 namespace {
-
-constexpr double half_length = 1.2, strip_depth = 0.2, apart = 0.1; // m
-
-/// A strip 1 m high between clamps and sliding sides, cut along its middle up to x = tip. Its nodes lie in rows about
-/// the cut, the same whatever the tip.
-FiniteBlock cut_strip(double tip, double depth = strip_depth) {
-  FiniteBlock block{
-      .lower = {-half_length, -0.55, 0}, .upper = {half_length, 0.55, depth}, .spacing = apart, .jitter = 0};
-  block.held[2].fill(true);
-  block.held[3].fill(true);
-  block.held[4][2] = block.held[5][2] = true;
-  const double from = -half_length - 0.3;
-  block.cuts = {topology::make_rectangle_sheet({0.5 * (from + tip), 0, 0.5 * depth}, Vector3::UnitY(), Vector3::UnitX(),
-                                               2 * depth, tip - from, 0.1)};
-  return block;
-}
-
-struct LoadedStrip {
-  std::unique_ptr<FiniteBody> body;
-  VectorX coefficients;
-  double potential = 0; // J
-};
-
-LoadedStrip pulled_strip(const FiniteBlock& block, double nu, double stretch, double slide, const Loads& loads = {}) {
-  Problem problem = finite_block(block);
-  problem.loads = loads;
-  LoadedStrip strip;
-  strip.body = std::make_unique<FiniteBody>(std::move(problem), experiments::neo_hookean(1, nu));
-  EquilibriumOptions accurate;
-  accurate.tolerance = 1e-5;
-  Equilibrium equilibrium(*strip.body, accurate);
-  const int steps = stretch > 1.01 ? 4 : 1;
-  EquilibriumStatus status;
-  for (int k = 1; k <= steps; ++k) {
-    const double part = static_cast<double>(k) / steps;
-    status = equilibrium.solve({strip.body->prescribed_values([&](const Vector3& x) {
-                                  return Vector3(part * slide * x.y(), part * (stretch - 1) * x.y(), 0);
-                                }),
-                                part,
-                                {}});
-  }
-  strip.coefficients = equilibrium.coefficients();
-  strip.potential = status.energy - strip.body->loads().dot(strip.coefficients);
-  return strip;
-}
 
 ReleaseOptions whole_front(double inner = 1, double outer = 4) {
   ReleaseOptions options;
@@ -74,13 +32,7 @@ ReleaseOptions whole_front(double inner = 1, double outer = 4) {
 TEST_CASE("At 0.1 % strain the release is that of the small-strain intensities") {
   constexpr double nu = 0.3, tip = 0.01, depth = 0.3;
   for (const double slide : {0.0, 0.0005}) {
-    FiniteBlock block = cut_strip(tip, depth);
-    SpacingField field;
-    field.fine = 0.07;
-    field.coarse = 0.14;
-    field.segments = {{Vector3(tip, 0, 0), Vector3(tip, 0, depth)}};
-    block.graded = field;
-    const LoadedStrip strip = pulled_strip(block, nu, 1.001, slide);
+    const LoadedStrip strip = pulled_strip(tests::graded_strip(tip, depth), nu, 1.001, slide);
     const EnergyMomentum momentum(*strip.body, strip.coefficients);
     Problem problem = strip.body->problem();
     problem.prescribed_field = [slide](const Vector3& x) { return Vector3(slide * x.y(), 0.001 * x.y(), 0); };
@@ -115,7 +67,7 @@ TEST_CASE("The release is what the energy loses as the cut grows, whatever drive
         return -drive.pressure * normal;
       };
     // Nodes and cells of three quarters of a spacing repeat themselves after three: what they leave wrong does, too.
-    constexpr double step = 3 * apart, tip = 0.01;
+    constexpr double step = 3 * tests::strip_spacing, tip = 0.01;
     const auto strip = [&](double at) {
       return pulled_strip(cut_strip(at), drive.nu, drive.stretch, drive.slide, loads);
     };

@@ -3,12 +3,14 @@
 // A virtual shift xi = q e of the material about the front, e ahead, q = 1 there and 0 outside a tube, releases
 // [Eshelby 1951; of a crack: Rice 1968, Maugin 1993]
 //
-//   G Q = -int (S : grad xi + xi . H^T b) dV + int_faces xi . S n dS,   S = W I - H^T P,   H = F - I,
+//   G Q = -int (S : grad xi + xi . H^T b) dV + int_faces xi . S n dS,   S = W I - H^T P,   H = F - A,
 //   Q = int q ds along the front,   b the body force, n out of the material.
 //
-// H stands in the place of F: the two differ by the divergence of P, which is zero in equilibrium. Of a discrete body
-// it is zero to the error of its stress, first order in the strain where S is of second: with F the rate of a body
-// strained by 0.1 % would be that error a thousand times.
+// A is any constant: with H or F the integral is the same but for the divergence of P, which is zero in equilibrium. Of
+// a discrete body it is zero to the error of its stress, first order in the strain where S is of second: with F the rate
+// of a body strained by 0.1 % would be that error a thousand times, with F - I that of a flap which has turned. A here
+// is the rotation R of the polar decomposition of the mean of F where the shift fades: the rate does not change as the
+// body turns.
 #pragma once
 
 #include "solvers/finite/body.hpp"
@@ -43,7 +45,7 @@ struct EnergyRelease {
   double length = 0; // Q, m
 };
 
-/// S at every point of a deformed body.
+/// F, W and P at every point of a deformed body.
 class EnergyMomentum {
  public:
   /// The body outlives it. `fibres`: as the body was given them. Throws InputError for coefficients of another number,
@@ -64,12 +66,16 @@ class EnergyMomentum {
   struct FacePlace;
   class LocalShift;
   template <class ShiftAt>
-  [[nodiscard]] EnergyRelease integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor) const;
-  void add_faces(const std::vector<FacePlace>& places, double load_factor, EnergyRelease& sum) const;
+  [[nodiscard]] EnergyRelease integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor,
+                                        Matrix3& about) const;
+  void add_faces(const std::vector<FacePlace>& places, const Matrix3& about, double load_factor,
+                 EnergyRelease& sum) const;
 
   const FiniteBody& body_;
   VectorX coefficients_;
-  std::vector<Matrix3> gradients_, of_blocks_, of_points_; // of every point of the table: H; S, Pa
+  std::vector<Matrix3> deformations_;       // F of every point of the table
+  std::vector<double> of_blocks_, of_points_; // W of each, J/m3
+  std::vector<Matrix3> blocks_stress_, points_stress_; // P of each, Pa
 };
 
 } // namespace spherecut::solvers

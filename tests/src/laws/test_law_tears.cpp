@@ -1,0 +1,219 @@
+// Bodies whose law is not linear that tear: a strip in pure shear against its closed form, a peel at small strain against
+// the linear one, a flap that is folded back.
+#include "solvers/elasticity/prestrained_law.hpp"
+#include "src/live/virtual_loop.hpp"
+#include "src/model/finite_model.hpp"
+#include "tests/src/scenario_session.hpp"
+#include "tests/src/scenario_text.hpp"
+#include "topology/wound/piece_audit.hpp"
+
+#include <catch2/catch.hpp>
+#include <fmt/format.h>
+
+using namespace spherecut;
+using namespace spherecut::app;
+using namespace spherecut::tests;
+using Catch::Contains;
+
+namespace {
+
+constexpr double modulus = 6000, nu = 0.45, height = 0.05, pull = 0.3; // Pa; m; of the strip
+
+/// A strip between clamps that is given as stretched by 1 + pull, with a crack along its middle.
+std::string stretched_strip(double toughness, const std::string& more) {
+  return fmt::format(R"([organ]
+shape = "block"
+size = [0.2, {}, 0.02]
+[material]
+law = "neo_hookean"
+young_modulus = {}
+poisson_ratio = {}
+pretension = [0, {}, 0]
+toughness = {}
+[[fixed]]
+region = "half_space"
+point = [0, {}, 0]
+normal = [0, 1, 0]
+axes = ["x", "y"]
+[[fixed]]
+region = "half_space"
+point = [0, {}, 0]
+normal = [0, -1, 0]
+axes = ["x", "y"]
+[[fixed]]
+region = "half_space"
+point = [0, 0, 1e-6]
+normal = [0, 0, 1]
+axes = ["z"]
+)",
+                     height, modulus, nu, pull, toughness, -0.5 * height + 1e-6, 0.5 * height - 1e-6) +
+         node_spacings("0.006", "0.012") +
+         rectangle_precut("[-0.06, 0, 0.01]", "[0, 1, 0]", "[0, 0, 1]", "0.08", "0.04") +
+         "[tearing]\nmost_increments = 4\n" + more;
+}
+
+/// Energy of the strip far ahead of the crack: its thickness is free.
+double pure_shear_energy() {
+  const double mu = modulus / (2 * (1 + nu));
+  const auto law = solvers::prestrained(
+      solvers::make_law({solvers::NeoHookeanLaw{mu}, solvers::bulk_modulus_of(mu, nu), {}}),
+      Matrix3(Vector3(1, 1 + pull, 1).asDiagonal()));
+  double least = std::numeric_limits<double>::infinity();
+  for (double thinner = 0.7; thinner <= 1; thinner += 1e-5) {
+    const Matrix3 deformation = Vector3(1, 1, thinner).asDiagonal();
+    double energy = 0;
+    Matrix3 stress;
+    law->evaluate({&deformation, 1}, {}, {&energy, 1}, {&stress, 1});
+    least = std::min(least, energy);
+  }
+  return least;
+}
+
+/// The half of a block above a cut is drawn up by so many metres; `law`: a line of the material, may be empty.
+std::string peel(const std::string& law, double toughness, double way, const std::string& more = "") {
+  return fmt::format(R"([organ]
+shape = "block"
+size = [0.06, 0.016, 0.03]
+edge = 0.004
+[material]
+{}young_modulus = 1e4
+poisson_ratio = 0.3
+toughness = {}
+)",
+                     law, toughness) +
+         held_below("0.001") + node_spacings("0.0032", "0.008") +
+         rectangle_precut("[-0.03, 0, 0.0181]", "[0, 0, 1]", "[1, 0, 0]", "0.03", "0.04") + fmt::format(R"([tool]
+shape = "grasper"
+radius = 0.005
+step = 0.25
+[[tool.path]]
+time = 0
+position = [-0.03, 0, 0.028]
+[[tool.path]]
+time = 1
+position = [-0.03, 0, {}]
+[tearing]
+)",
+                                                                                                          0.028 + way) +
+         more;
+}
+
+const std::string neo_hookean = "law = \"neo_hookean\"\n";
+
+} // namespace
+
+TEST_CASE("A strip of a law in pure shear tears where W H reaches the toughness, and straight on") {
+  const double wanted = pure_shear_energy() * height;
+  Session tough(scenario_of(stretched_strip(1.05 * wanted, "")));
+  const StepResult rests = tough.step(tough.steps().front());
+  INFO("W H = " << wanted << " J/m2, G = " << rests.tear->increments.front().release);
+  CHECK(rests.tear->area == 0);
+  CHECK(rests.tear->increments.front().release == Approx(wanted).epsilon(0.04));
+  Session weak(scenario_of(stretched_strip(0.95 * wanted, "")));
+  const StepResult runs = weak.step(weak.steps().front());
+  CHECK(runs.tear->increments.size() == 5);
+  CHECK(runs.tear->unstable); // as it goes on, the strip ahead stays as it is
+  for (const TearIncrement& increment : runs.tear->increments) {
+    INFO(increment.number << ": " << increment.front.transpose() << ", G = " << increment.release);
+    CHECK(std::abs(increment.front.y()) < 0.02 * height);
+    CHECK(increment.release == Approx(wanted).epsilon(0.05));
+  }
+  const EnergyLedger& ledger = runs.tear->ledger;
+  // What the body gives up; 0.2 % of the strip's energy, by which node sets differ, is 6 % of that.
+  CHECK(-ledger.elastic == Approx(wanted * runs.tear->area).epsilon(0.08));
+  CHECK(ledger.open_share().value() < 0.08);
+  CHECK_FALSE(topology::component_difference(*weak.wound()));
+}
+
+TEST_CASE("At small strain a peel of a law tears at the load of the linear one, as far") {
+  constexpr double toughness = 0.004, way = 0.0005; // G goes with the square of the way
+  const auto torn = [&](const std::string& law) {
+    Session session(scenario_of(peel(law, toughness, way, "[cut]\nsight = \"enriched\"\n")));
+    return run(session);
+  };
+  const std::vector<StepResult> linear = torn(""), finite = torn(neo_hookean);
+  const auto onset = [](const std::vector<StepResult>& steps) {
+    for (const StepResult& step : steps)
+      if (step.tear->increments.size() > 1)
+        return step.tear->increments.front();
+    return TearIncrement{};
+  };
+  INFO("linear " << onset(linear).force << " N at " << onset(linear).time << " s, " << linear.back().tear->area
+                 << " m2; law " << onset(finite).force << " N at " << onset(finite).time << " s, "
+                 << finite.back().tear->area << " m2; open " << linear.back().tear->ledger.open_share().value_or(0)
+                 << " and " << finite.back().tear->ledger.open_share().value_or(0));
+  REQUIRE(onset(linear).force > 0);
+  CHECK(onset(finite).force == Approx(onset(linear).force).epsilon(0.05));
+  CHECK(onset(finite).time == Approx(onset(linear).time).epsilon(0.05));
+  CHECK(linear.back().tear->area > 3e-5);
+  CHECK(finite.back().tear->area == Approx(linear.back().tear->area).epsilon(0.15));
+}
+
+TEST_CASE("A thick flap of a law that is drawn up by half of its thickness tears, and the account of energies closes") {
+  Session session(scenario_of(peel(neo_hookean, 0.4, 0.0065)));
+  const std::vector<StepResult> steps = run(session);
+  const TearReport& tear = *steps.back().tear;
+  INFO(tear.reason << ", " << tear.area << " m2, open " << tear.ledger.imbalance());
+  CHECK(tear.area > 3e-5);
+  CHECK(steps.back().rotation_degrees > 20);
+  CHECK(tear.ledger.open_share().value() < 0.1);
+  CHECK(tear.ledger.tool > 0);
+  CHECK(steps.back().force.norm() > 0);
+  CHECK_FALSE(topology::component_difference(*session.wound()));
+}
+
+TEST_CASE("The load at which a law tears does not depend on the step") {
+  const auto onset = [](const std::string& step) {
+    Session session(scenario_of(replaced(peel(neo_hookean, 0.4, 0.008), "step = 0.25", step)));
+    for (const StepResult& result : run(session))
+      if (result.tear->increments.size() > 1)
+        return result.tear->increments.front();
+    return TearIncrement{};
+  };
+  const TearIncrement coarse = onset("step = 0.5"), fine = onset("step = 0.1");
+  INFO("coarse " << coarse.force << " N at " << coarse.time << " s, fine " << fine.force << " N at " << fine.time);
+  REQUIRE(coarse.force > 0);
+  CHECK(coarse.force == Approx(fine.force).epsilon(0.02));
+  CHECK(coarse.time == Approx(fine.time).epsilon(0.02));
+}
+
+TEST_CASE("In the real-time loop a strip of a law tears solve by solve") {
+  const double wanted = pure_shear_energy() * height;
+  const Scenario scenario = scenario_of(stretched_strip(0.9 * wanted, R"([tool]
+shape = "sphere_tip"
+radius = 0.01
+step = 0.1
+[[tool.path]]
+time = 0
+position = [0.06, 0.0, 0.031]
+[[tool.path]]
+time = 1
+position = [0.06, 0.0, 0.026]
+[output]
+figures = false
+)"));
+  HapticSettings settings;
+  settings.passivity = false;
+  HapticSimulation simulation(scenario);
+  ScriptedPath device(simulation.path(), settings.rate);
+  constexpr std::uint64_t ticks = 600, period = 100;
+  const LoopRecords records = run_virtual(settings, simulation, device, regular_solves(ticks, period, 50), ticks);
+  int tearing = 0;
+  for (const SolveRecord& solve : records.solves) {
+    INFO(solve.reason);
+    CHECK_FALSE(solve.failed);
+    tearing += solve.cut_triangles > 0 ? 1 : 0;
+  }
+  CHECK(tearing >= 3);
+}
+
+TEST_CASE("Tears that a law does not go with are refused in words") {
+  const auto refused = [](const std::string& text, const std::string& what) {
+    Session session(scenario_of(text));
+    CHECK_THROWS_WITH(session.step(session.steps().front()), Contains(what + " does not go with material.law = \"neo_hookean\""));
+  };
+  refused(replaced(peel(neo_hookean, 0.4, 0.01), "toughness = 0.4\n",
+                   "toughness = 0.4\n[[material.prony]]\nshare = 0.3\ntime = 2\n"),
+          "[tearing] with material.prony");
+  refused(peel(neo_hookean, 0.4, 0.01, "strength = 1000\n"), "tearing.strength");
+}
