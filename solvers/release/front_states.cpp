@@ -3,6 +3,7 @@
 #include "solvers/elasticity/rotation.hpp"
 #include "solvers/fracture/local_values.hpp"
 #include "topology/base/errors.hpp"
+#include "topology/domain/way_out.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,18 +15,23 @@ namespace {
 constexpr double deepest_inset = 1; // of the tube's shift from the surface, in spacings
 constexpr double least_inset = 0.5; // nearer to the surface nodes do not resolve the field
 
-/// Where a front turns the wide tube does not fit. Its shift stays whole over one and a half spacings: with one the mean G
-/// of a peel is 4 % below the small-strain integral, with one and a half 1 %.
-constexpr ReleaseOptions wide{.inner = 1.5, .outer = 4}, narrow{.inner = 1, .outer = 2.5, .half_length = 1};
+/// The shift of the wide tube stays whole over one and a half spacings: with one the mean G of a peel is 4 % below the
+/// small-strain integral, with one and a half 1 %. Under a thin layer, which bends and turns within it, and where the
+/// front turns the narrow one serves.
+constexpr ReleaseOptions wide{.inner = 1.5, .outer = 4}, narrow{.inner = 0.5, .outer = 2.5, .half_length = 1};
+constexpr double thin = 3; // spacings between the front and the surface, across the sheet
 
 /// The integral over a tube in the body, or over what of it lies there.
 std::optional<double> release_at(const FiniteBody& body, const EnergyMomentum& momentum,
                                  const topology::FrontFrame& frame) {
-  const Problem& problem = body.problem();
-  const double depth = -problem.domain->signed_distance(frame.point) / spacing_at(problem.nodes, frame.point);
+  const topology::Domain& domain = *body.problem().domain;
+  const double spacing = spacing_at(body.problem().nodes, frame.point);
+  const double depth = -domain.signed_distance(frame.point) / spacing;
+  const double layer = std::min(topology::way_out(domain, frame.point, frame.normal, thin * spacing),
+                                topology::way_out(domain, frame.point, -frame.normal, thin * spacing));
   for (const ReleaseOptions& tube : {wide, narrow})
     for (const double inset : {0.0, std::min(depth, deepest_inset)}) {
-      if (inset > 0 && depth < least_inset)
+      if ((tube.outer == wide.outer && layer < thin * spacing) || (inset > 0 && depth < least_inset))
         continue;
       ReleaseOptions options = tube;
       options.inset = inset;

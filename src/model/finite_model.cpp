@@ -106,19 +106,12 @@ void require_run(const Scenario& scenario) {
 
 void require_hand(const Scenario& scenario) {
   require_run(scenario);
-  if (!is_nonlinear(scenario.law) || !scenario.tool)
+  if (!is_nonlinear(scenario.law) || !scenario.tool || !scenario.tool->grasp || !scenario.blade)
     return;
-  const bool grasps = scenario.tool->grasp.has_value();
-  if (!grasps && scenario.contact.condition == solvers::ContactCondition::frictionless)
-    return;
-  const std::string what =
-      grasps ? "tool.shape = \"grasper\""
-             : fmt::format("contact.condition = \"{}\"",
-                           scenario.contact.condition == solvers::ContactCondition::bonded ? "bonded" : "frictional");
-  throw InputError(fmt::format(
-      "{}:{}: {} does not go with material.law = \"{}\" in a hand; possible there: a tool that "
-      "presses without friction",
-      scenario.file.string(), grasps ? scenario.tool->line : scenario.law.line, what, name_of(scenario.law)));
+  throw InputError(fmt::format("{}:{}: tool.shape = \"grasper\" beside a [blade] does not go with material.law = \"{}\" "
+                               "in a hand; possible there: a tool that presses, rubs or bonds, or a grasper without a "
+                               "blade",
+                               scenario.file.string(), scenario.tool->line, name_of(scenario.law)));
 }
 
 bool can_run(const Scenario& scenario) {
@@ -425,6 +418,8 @@ void FiniteModel::condense(const std::vector<int>& wanted, solvers::ContactPatch
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
   patch = {};
   state = {};
+  const bool is_bonded = contact.options().condition == solvers::ContactCondition::bonded;
+  const bool keeps_way = contact.options().condition != solvers::ContactCondition::frictionless;
   VectorX acting = VectorX::Zero(3 * std::ssize(chosen));
   state.displacement.resize(acting.size());
   for (std::size_t k = 0; k < chosen.size(); ++k) {
@@ -439,6 +434,12 @@ void FiniteModel::condense(const std::vector<int>& wanted, solvers::ContactPatch
     const auto row = 3 * static_cast<Eigen::Index>(k);
     acting.segment<3>(row) = forces[c];
     state.displacement.segment<3>(row) = contact.means()[c].of(equilibrium_.coefficients());
+    if (keeps_way) {
+      const solvers::ContactShare& share = equilibrium_.contact_shares()[c];
+      state.along.push_back(is_bonded ? Vector3(Vector3::Zero()) : share.along);
+      state.bond.push_back(is_bonded || !share.touches ? Vector3(state.displacement.segment<3>(row))
+                                                       : Vector3(share.anchor - contact.places()[c]));
+    }
   }
   patch.compliance = equilibrium_.contact_compliance(chosen);
   patch.base_displacement = state.displacement - patch.compliance * acting;

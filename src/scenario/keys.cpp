@@ -85,7 +85,7 @@ constexpr std::array keys = {
         "",
         "\"linear\"",
         "Law of the material: small strain, or one of finite strain. check tells its moduli; run computes all of them, "
-        "those of finite strain without tearing and a force of the blade.",
+        "those of finite strain without a force of the blade.",
         {},
         "linear, neo_hookean, yeoh, ogden, holzapfel_gasser_ogden"},
     ScenarioKey{"material.young_modulus", number, "Pa", "required",

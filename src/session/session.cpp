@@ -292,7 +292,7 @@ void Session::prepare(const StepSample& sample) {
   if (is_nonlinear(of.state.scenario.law)) {
     if (computes() && model.finite == nullptr)
       make_finite(of.state, model);
-    if (of.state.touch && of.state.leader == Leader::device)
+    if (of.state.touch && of.state.leader == Leader::device && !has_grasper(of.state.scenario))
       model.finite->prepare_to_condense(of.contact.candidates(model));
     return;
   }

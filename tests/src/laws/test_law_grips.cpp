@@ -198,6 +198,9 @@ position = [0.006, 0.0, 0.025]
   CHECK(steps.back().active_nodes == steps.front().active_nodes);
   // The patch is where it was held.
   CHECK((session.model().at({0.02, 0, 0.03}).displacement - Vector3(0, 0, 0.004)).norm() < 6e-4);
+  CHECK_THROWS_WITH(Session(
+                        scenario_of(text), [](const std::string&) {}, Leader::device),
+                    Catch::Contains("tool.shape = \"grasper\" beside a [blade] does not go with material.law"));
 }
 
 TEST_CASE("A blade does not cut where a tool rubs on a body of a law, or is bonded to it") {

@@ -152,9 +152,6 @@ TEST_CASE("What a law does not go with is refused in a hand with its line before
     CHECK_FALSE(std::filesystem::exists(out));
     return result.err;
   };
-  const std::string bonded = "[contact]\ncondition = \"bonded\"\n";
-  CHECK_THAT(program("haptics", neo_hookean + "\n" + bonded),
-             Contains("law.toml:7: contact.condition = \"bonded\" does not go with material.law = \"neo_hookean\""));
   CHECK_THAT(program("haptics", elastic + prony),
              Contains("material.prony does not go with material.law = \"linear\""));
   CHECK_THAT(program("run", elastic + prony), Contains("material.prony does not go with material.law = \"linear\""));

@@ -207,6 +207,59 @@ figures = false
   CHECK(tearing >= 3);
 }
 
+TEST_CASE("A grasper in a hand draws a body of a law as one on a path does, and lets it go") {
+  const std::string text = peel(neo_hookean, 1000, 0.006);
+  Session path(scenario_of(text));
+  const std::vector<StepResult> wanted = run(path);
+  Session hand(scenario_of(text), [](const std::string&) {}, Leader::device);
+  SessionOptions options{.force_only = true, .going_on = true, .tear_gradually = true};
+  options.grip = false;
+  hand.set_options(options);
+  hand.prepare(path.steps().front());
+  CHECK(hand.step(path.steps().front()).force.norm() == 0);
+  CHECK_FALSE(hand.grasps());
+  options.grip = true;
+  hand.set_options(options);
+  for (std::size_t k = 0; k < path.steps().size(); ++k) {
+    const Vector3 force = hand.step(path.steps()[k]).force;
+    CHECK(hand.grasps());
+    INFO(force.transpose() << " N, on the path " << wanted[k].force.transpose() << " N");
+    CHECK((force - wanted[k].force).norm() <= 0.01 * wanted.back().force.norm());
+  }
+  CHECK(wanted.back().force.norm() > 0.01);
+  options.grip = false;
+  hand.set_options(options);
+  CHECK(hand.step(path.steps().back()).force.norm() < 1e-3 * wanted.back().force.norm());
+  CHECK_FALSE(hand.grasps());
+  CHECK(hand.model().nodal_displacements().cwiseAbs().maxCoeff() < 1e-5);
+}
+
+TEST_CASE("In the real-time loop a grasper tears a body of a law and its force stays continuous") {
+  const Scenario scenario = scenario_of(replaced(peel(neo_hookean, 0.4, 0.008), "step = 0.25", "step = 0.05"));
+  HapticSettings settings;
+  settings.passivity = false;
+  settings.limits.force = settings.limits.slew = 1e6;
+  HapticSimulation simulation(scenario);
+  ScriptedPath device(simulation.path(), settings.rate);
+  constexpr std::uint64_t ticks = 900, period = 100;
+  const LoopRecords records = run_virtual(settings, simulation, device, regular_solves(ticks, period, 50), ticks);
+  int tearing = 0;
+  for (const SolveRecord& solve : records.solves) {
+    INFO(solve.reason);
+    CHECK_FALSE(solve.failed);
+    tearing += solve.cut_triangles > 0 ? 1 : 0;
+  }
+  CHECK(tearing >= 1);
+  double peak = 0, jump = 0;
+  for (std::size_t k = 1; k < records.ticks.size(); ++k) {
+    peak = std::max(peak, records.ticks[k].tissue.norm());
+    if (records.ticks[k - 1].sequence > 0)
+      jump = std::max(jump, (records.ticks[k].tissue - records.ticks[k - 1].tissue).norm());
+  }
+  CHECK(peak > 0.01);
+  CHECK(jump < 0.02 * peak); // a hand-over takes 20 ticks
+}
+
 TEST_CASE("Tears that a law does not go with are refused in words") {
   const auto refused = [](const std::string& text, const std::string& what) {
     Session session(scenario_of(text));

@@ -69,6 +69,36 @@ TEST_CASE("What the loop gets of a nonlinear body is exact where it was solved, 
   }
 }
 
+// A tool that keeps its way: what sticks goes with it, what slips drags with the limit of the force.
+TEST_CASE("What the loop gets of a nonlinear body on which a tool rubs, or to which it is bonded, is exact there") {
+  for (const std::string contact : {"condition = \"bonded\"", "condition = \"frictional\"\nfriction = 0.5"}) {
+    HapticSimulation simulation(scenario_of(soft(small_scenario) + "[contact]\n" + contact + "\n"));
+    simulation.prepare(pressing(0, -0.001));
+    ContactSnapshot snapshot;
+    std::uint64_t tick = 0;
+    for (double depth = 0; depth < 0.0021; depth += 0.0005)
+      simulation.solve(pressing(++tick, depth), 0, snapshot);
+    simulation.solve(pressing(++tick, 0.002, 0.0002), 0, snapshot); // it sticks
+    REQUIRE(snapshot.count > 3);
+    REQUIRE(snapshot.force.z() > 0.02);
+    TangentModel tangent(simulation.tool());
+    tangent.solved(snapshot);
+    const Vector3 here = tangent.at(snapshot.pose, unturned, snapshot.time).force;
+    INFO(contact << ": " << here.transpose() << " for " << snapshot.force.transpose());
+    CHECK((here - snapshot.force).norm() < 0.01 * snapshot.force.norm());
+    topology::ToolPose aside = snapshot.pose;
+    aside.point.x() += 0.0002;
+    ModelForce expected;
+    for (int round = 0; round < 10; ++round)
+      expected = tangent.at(aside, unturned, snapshot.time);
+    ContactSnapshot solved;
+    simulation.solve(device_at(++tick, aside.point), 0, solved);
+    INFO("aside " << expected.force.transpose() << " for " << solved.force.transpose());
+    CHECK(std::abs(solved.force.x()) > 0.01 * solved.force.norm());
+    CHECK((expected.force - solved.force).norm() < 0.03 * solved.force.norm());
+  }
+}
+
 TEST_CASE("Nodes of a nonlinear body follow a tool that slides, within the steps and in the background") {
   for (const bool in_background : {false, true}) {
     HapticSimulation simulation(scenario_of(soft(small_scenario)));

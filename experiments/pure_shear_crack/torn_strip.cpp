@@ -1,0 +1,133 @@
+#include "experiments/pure_shear_crack/torn_strip.hpp"
+
+#include "solvers/elasticity/homogeneous.hpp"
+#include "src/session/session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace spherecut::experiments {
+
+namespace {
+
+constexpr double height = 0.05, shear = 2000, nu = 0.49; // m, Pa
+
+struct StripLaw {
+  std::string name, keys;
+  solvers::LawSpec spec;
+};
+
+std::vector<StripLaw> strip_laws() {
+  const double bulk = solvers::bulk_modulus_of(shear, nu);
+  return {{"neo_hookean", fmt::format("young_modulus = {}", 2 * (1 + nu) * shear), {solvers::NeoHookeanLaw{shear}, bulk, {}}},
+          {"yeoh", fmt::format("c1 = {}\nc2 = {}\nc3 = {}", 0.5 * shear, 0.1 * shear, 0.01 * shear),
+           {solvers::YeohLaw{0.5 * shear, 0.1 * shear, 0.01 * shear}, bulk, {}}}};
+}
+
+/// W H, J per m2 of the strip as it is given, stretched.
+double wanted_release(const StripLaw& law, double stretch) {
+  const Matrix3 gradient = solvers::homogeneous::pure_shear(law.spec, stretch).gradient;
+  double energy = 0;
+  Matrix3 stress;
+  solvers::make_law(law.spec)->evaluate({&gradient, 1}, {}, {&energy, 1}, {&stress, 1});
+  return energy / stretch * height;
+}
+
+app::Scenario strip(const StripLaw& law, double stretch, double toughness, std::uint64_t seed, bool quick) {
+  return app::read_scenario_text("strip.toml", fmt::format(R"([organ]
+shape = "block"
+size = [{0}, {1}, {2}]
+[material]
+law = "{3}"
+{4}
+poisson_ratio = {5}
+pretension = [0, {6}, 0]
+toughness = {7}
+[[fixed]]
+region = "half_space"
+point = [0, {8}, 0]
+normal = [0, 1, 0]
+axes = ["x", "y"]
+[[fixed]]
+region = "half_space"
+point = [0, {9}, 0]
+normal = [0, -1, 0]
+axes = ["x", "y"]
+[[fixed]]
+region = "half_space"
+point = [0, 0, 1e-6]
+normal = [0, 0, 1]
+axes = ["z"]
+[nodes]
+fine_spacing = {10}
+coarse_spacing = {11}
+random_seed = {12}
+[[precut]]
+shape = "rectangle"
+centre = [{13}, 0, {14}]
+normal = [0, 1, 0]
+up = [0, 0, 1]
+width = {15}
+height = {16}
+[tearing]
+step = 1
+most_increments = 200
+most_area = {17}
+)",
+                                                           5 * height, height, 0.2 * height, law.name, law.keys, nu,
+                                                           stretch - 1, toughness, -0.5 * height + 1e-6,
+                                                           0.5 * height - 1e-6, quick ? 0.12 * height : 0.07 * height,
+                                                           0.2 * height, seed, -1.75 * height, 0.1 * height, 2.5 * height,
+                                                           0.4 * height, (quick ? 0.5 : 2.5) * height * 0.2 * height));
+}
+
+} // namespace
+
+void tear_strips(const std::vector<double>& stretches, std::uint64_t seed, const ExperimentContext& context,
+                 ErrorSeries& errors) {
+  double onset = 0, way = 0, straightness = 0, given_up = 0;
+  for (const StripLaw& law : strip_laws())
+    for (const double stretch : stretches) {
+      const double wanted = wanted_release(law, stretch);
+      app::Session session(strip(law, stretch, 0.9 * wanted, seed, context.quick));
+      const app::StepResult step = session.step(session.steps().front());
+      double release = 0, off = 0;
+      for (const app::TearIncrement& increment : step.tear->increments) {
+        release += increment.release / static_cast<double>(step.tear->increments.size());
+        off = std::max(off, std::abs(increment.front.y()) / height);
+      }
+      const double first = step.tear->increments.front().release / wanted - 1;
+      const double lost = -step.tear->ledger.elastic / (wanted * step.tear->area) - 1;
+      context.say(fmt::format("{}, stretch {}, seed {}: torn {:.3g} cm2 in {} increments; G at the start off W H by "
+                              "{:.2f} %, on the way by {:.2f} % in the mean; what the strip gives up by {:.2f} %; the "
+                              "front {:.2f} % of the height off the middle; {}",
+                              law.name, stretch, seed, 1e4 * step.tear->area, step.tear->increments.size() - 1,
+                              100 * first, 100 * (release / wanted - 1), 100 * lost, 100 * off, step.tear->reason));
+      onset = std::max(onset, std::abs(first));
+      way = std::max(way, std::abs(release / wanted - 1));
+      given_up = std::max(given_up, std::abs(lost));
+      straightness = std::max(straightness, off);
+    }
+  errors.add("onset", onset);
+  errors.add("release_on_the_way", way);
+  errors.add("given_up", given_up);
+  errors.add("off_the_middle", straightness);
+}
+
+int wrong_onsets(const std::vector<double>& stretches, double margin, const ExperimentContext& context) {
+  int wrong = 0;
+  for (const StripLaw& law : strip_laws())
+    for (const double stretch : stretches)
+      for (const bool tears : {true, false}) {
+        const double toughness = wanted_release(law, stretch) * (tears ? 1 / (1 + margin) : 1 + margin);
+        app::Scenario scenario = strip(law, stretch, toughness, 1, context.quick);
+        scenario.tearing.most_increments = 1;
+        app::Session session(scenario);
+        const bool has_torn = session.step(session.steps().front()).tear->area > 0;
+        wrong += has_torn != tears ? 1 : 0;
+      }
+  return wrong;
+}
+
+} // namespace spherecut::experiments
