@@ -20,8 +20,11 @@ struct StripLaw {
 
 std::vector<StripLaw> strip_laws() {
   const double bulk = solvers::bulk_modulus_of(shear, nu);
-  return {{"neo_hookean", fmt::format("young_modulus = {}", 2 * (1 + nu) * shear), {solvers::NeoHookeanLaw{shear}, bulk, {}}},
-          {"yeoh", fmt::format("c1 = {}\nc2 = {}\nc3 = {}", 0.5 * shear, 0.1 * shear, 0.01 * shear),
+  return {{"neo_hookean",
+           fmt::format("young_modulus = {}", 2 * (1 + nu) * shear),
+           {solvers::NeoHookeanLaw{shear}, bulk, {}}},
+          {"yeoh",
+           fmt::format("c1 = {}\nc2 = {}\nc3 = {}", 0.5 * shear, 0.1 * shear, 0.01 * shear),
            {solvers::YeohLaw{0.5 * shear, 0.1 * shear, 0.01 * shear}, bulk, {}}}};
 }
 
@@ -75,11 +78,11 @@ step = 1
 most_increments = 200
 most_area = {17}
 )",
-                                                           5 * height, height, 0.2 * height, law.name, law.keys, nu,
+                                                           6 * height, height, 0.2 * height, law.name, law.keys, nu,
                                                            stretch - 1, toughness, -0.5 * height + 1e-6,
                                                            0.5 * height - 1e-6, quick ? 0.12 * height : 0.07 * height,
-                                                           0.2 * height, seed, -1.75 * height, 0.1 * height, 2.5 * height,
-                                                           0.4 * height, (quick ? 0.5 : 2.5) * height * 0.2 * height));
+                                                           0.2 * height, seed, -2.5 * height, 0.1 * height, 2 * height,
+                                                           0.4 * height, (quick ? 0.5 : 3) * height * 0.2 * height));
 }
 
 } // namespace
@@ -90,7 +93,7 @@ void tear_strips(const std::vector<double>& stretches, std::uint64_t seed, const
   for (const StripLaw& law : strip_laws())
     for (const double stretch : stretches) {
       const double wanted = wanted_release(law, stretch);
-      app::Session session(strip(law, stretch, 0.9 * wanted, seed, context.quick));
+      app::Session session(strip(law, stretch, 0.8 * wanted, seed, context.quick));
       const app::StepResult step = session.step(session.steps().front());
       double release = 0, off = 0;
       for (const app::TearIncrement& increment : step.tear->increments) {

@@ -1,4 +1,4 @@
-// A run of a strip in pure shear whose crack tears on.
+// A run of a strip in pure shear, six times as long as high, whose crack of one and a half heights tears on.
 #pragma once
 
 #include "experiments/experiment.hpp"

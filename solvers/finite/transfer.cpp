@@ -62,10 +62,12 @@ VectorX fitted(const FiniteBody& body, VectorX coefficients, const std::vector<c
     matrix.coeffRef(i, i) *= 1 + held;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
   if (factor.info() != Eigen::Success)
-    throw NumericalError(fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
+    throw NumericalError(
+        fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
   const MatrixX change = factor.solve(right);
   if (!change.allFinite())
-    throw NumericalError(fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
+    throw NumericalError(
+        fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
   for (std::size_t i = 0; i < free.size(); ++i)
     if (place[i] >= 0)
       coefficients.segment<3>(3 * static_cast<Eigen::Index>(i)) += change.row(place[i]).transpose();
@@ -103,8 +105,8 @@ VectorX nearest_state(const FiniteBody& body, VectorX coefficients, std::vector<
                       const std::function<Matrix3(const Vector3&)>& given, double least_jacobian) {
   std::vector<double> emphasis(body.points().positions.size(), 1);
   coefficients = fitted(body, std::move(coefficients), free, emphasis, given);
-  for (int round = 0;
-       round < most_rounds && stress_inverted(body, coefficients, least_jacobian, free, emphasis); ++round)
+  for (int round = 0; round < most_rounds && stress_inverted(body, coefficients, least_jacobian, free, emphasis);
+       ++round)
     coefficients = fitted(body, std::move(coefficients), free, emphasis, given);
   return coefficients;
 }

@@ -12,7 +12,8 @@ namespace spherecut::solvers {
 ///
 /// Displacements of nodes alone would not do: where shape functions have changed they make F jump, down to J < 0 in
 /// what is folded. Points where J is below `least_jacobian` afterwards count for more in another fit, for a few rounds,
-/// and the nodes that reach them become free. Throws NumericalError where a free node reaches no point, and what `given` throws.
+/// and the nodes that reach them become free. Throws NumericalError where a free node reaches no point, and what
+/// `given` throws.
 VectorX nearest_state(const FiniteBody& body, VectorX coefficients, std::vector<char> free,
                       const std::function<Matrix3(const Vector3& x)>& given, double least_jacobian = 0.1);
 

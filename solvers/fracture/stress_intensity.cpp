@@ -101,8 +101,8 @@ Intensities displacement_correlation(const Problem& problem, const FrontFrame& f
     const Eigen::Vector2d terms(std::sqrt(s), s * std::sqrt(s));
     const double weight = 1 / std::sqrt(s);
     normal_matrix += weight * terms * terms.transpose();
-    right += weight * terms *
-             Vector3(apart.dot(front.normal), apart.dot(front.ahead), apart.dot(front.tangent)).transpose();
+    right +=
+        weight * terms * Vector3(apart.dot(front.normal), apart.dot(front.ahead), apart.dot(front.tangent)).transpose();
   }
   const Vector3 leading = normal_matrix.inverse().row(0) * right;
   const Material& material = problem.material;

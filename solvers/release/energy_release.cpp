@@ -1,7 +1,7 @@
 #include "solvers/release/energy_release.hpp"
 
-#include "solvers/finite/point_kernels.hpp"
 #include "solvers/elasticity/rotation.hpp"
+#include "solvers/finite/point_kernels.hpp"
 #include "topology/base/errors.hpp"
 
 #include <Eigen/LU>
@@ -176,10 +176,9 @@ EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficien
     }
 }
 
-/// `about`: becomes A.
 template <class ShiftAt>
 EnergyRelease EnergyMomentum::integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor,
-                                        Matrix3& about) const {
+                                        std::optional<Matrix3>& about) const {
   const PointTable& table = body_.points();
   const bool takes_blocks = pressure == ReleasePressure::blocks && !of_blocks_.empty();
   const std::vector<double>& energies = takes_blocks ? of_blocks_ : of_points_;
@@ -203,11 +202,12 @@ EnergyRelease EnergyMomentum::integrate(const ShiftAt& shift_at, ReleasePressure
       fading += share;
       reached.push_back({point, weight, shift});
     }
-  about = fading > 0 ? rotation_of(sum_of_deformations / fading) : Matrix3(Matrix3::Identity());
+  if (!about)
+    about = fading > 0 ? rotation_of(sum_of_deformations / fading) : Matrix3(Matrix3::Identity());
   const auto& body_force = body_.problem().loads.body_force;
   EnergyRelease sum;
   for (const Reached& at : reached) {
-    const Matrix3 h = deformations_[at.point] - about;
+    const Matrix3 h = deformations_[at.point] - *about;
     const Matrix3 s = energies[at.point] * Matrix3::Identity() - h.transpose() * stresses[at.point];
     const Shift& shift = at.shift;
     sum.rate -=
@@ -364,10 +364,10 @@ EnergyRelease EnergyMomentum::at(const topology::FrontFrame& front, const Releas
   if (!options.half_length)
     return mean(options, load_factor);
   const LocalShift shift(body_, front, options);
-  Matrix3 about;
+  std::optional<Matrix3> about;
   EnergyRelease sum = integrate(shift, options.pressure, load_factor, about);
   sum.length = shift.length();
-  add_faces(shift.faces(), about, load_factor, sum);
+  add_faces(shift.faces(), *about, load_factor, sum);
   sum.rate /= sum.length;
   return sum;
 }
@@ -404,7 +404,7 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
       shift.gradient += across.slope * cover.value / r * (ahead * shift.ahead + above * shift.normal);
     return shift;
   };
-  Matrix3 about;
+  std::optional<Matrix3> about = Matrix3::Identity();
   EnergyRelease sum = integrate(shift_at, options.pressure, load_factor, about);
   std::vector<FacePlace> faces;
   const double step = 0.25 * longest;
@@ -442,7 +442,7 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
     throw InputError(fmt::format("energy release: all of the front lies in the {:.3g} m below the surface where the "
                                  "shift fades",
                                  inset));
-  add_faces(faces, about, load_factor, sum);
+  add_faces(faces, *about, load_factor, sum);
   sum.rate /= sum.length;
   return sum;
 }

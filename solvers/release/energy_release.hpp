@@ -7,10 +7,10 @@
 //   Q = int q ds along the front,   b the body force, n out of the material.
 //
 // A is any constant: with H or F the integral is the same but for the divergence of P, which is zero in equilibrium. Of
-// a discrete body it is zero to the error of its stress, first order in the strain where S is of second: with F the rate
-// of a body strained by 0.1 % would be that error a thousand times, with F - I that of a flap which has turned. A here
-// is the rotation R of the polar decomposition of the mean of F where the shift fades: the rate does not change as the
-// body turns.
+// a discrete body it is zero to the error of its stress, first order in the strain where S is of second: with F the
+// rate of a body strained by 0.1 % would be that error a thousand times, with F - I that of a flap which has turned. A
+// here is the rotation R of the polar decomposition of the mean of F where the shift fades: the rate does not change as
+// the body turns. Of a whole front, whose tube may reach a held surface that such an A would make work on, it is I.
 #pragma once
 
 #include "solvers/finite/body.hpp"
@@ -66,15 +66,16 @@ class EnergyMomentum {
   struct FacePlace;
   class LocalShift;
   template <class ShiftAt>
+  /// `about`: A; where there is none it becomes the rotation of the mean of F.
   [[nodiscard]] EnergyRelease integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor,
-                                        Matrix3& about) const;
+                                        std::optional<Matrix3>& about) const;
   void add_faces(const std::vector<FacePlace>& places, const Matrix3& about, double load_factor,
                  EnergyRelease& sum) const;
 
   const FiniteBody& body_;
   VectorX coefficients_;
-  std::vector<Matrix3> deformations_;       // F of every point of the table
-  std::vector<double> of_blocks_, of_points_; // W of each, J/m3
+  std::vector<Matrix3> deformations_;                  // F of every point of the table
+  std::vector<double> of_blocks_, of_points_;          // W of each, J/m3
   std::vector<Matrix3> blocks_stress_, points_stress_; // P of each, Pa
 };
 

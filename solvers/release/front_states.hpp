@@ -1,5 +1,5 @@
-// What drives the front of a cut at finite strain: its release rate by the domain integral, its modes by the jump of the
-// displacement behind it.
+// What drives the front of a cut at finite strain: its release rate by the domain integral, its modes by the jump of
+// the displacement behind it.
 //
 // Both are told as intensities, those of the small-strain field that releases as much in the same modes: so averages
 // along the front, direction and motion are those of the linear case, to which all of this goes over as the strain
@@ -10,8 +10,8 @@
 // because a flap that is folded back would otherwise seem to slide.
 #pragma once
 
-#include "solvers/release/energy_release.hpp"
 #include "solvers/fracture/tearing.hpp"
+#include "solvers/release/energy_release.hpp"
 
 namespace spherecut::solvers {
 

@@ -1,8 +1,8 @@
 #include "src/model/finite_model.hpp"
 
 #include "solvers/contact/friction.hpp"
-#include "solvers/release/front_states.hpp"
 #include "solvers/finite/transfer.hpp"
+#include "solvers/release/front_states.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/search/point_tree.hpp"
@@ -108,10 +108,11 @@ void require_hand(const Scenario& scenario) {
   require_run(scenario);
   if (!is_nonlinear(scenario.law) || !scenario.tool || !scenario.tool->grasp || !scenario.blade)
     return;
-  throw InputError(fmt::format("{}:{}: tool.shape = \"grasper\" beside a [blade] does not go with material.law = \"{}\" "
-                               "in a hand; possible there: a tool that presses, rubs or bonds, or a grasper without a "
-                               "blade",
-                               scenario.file.string(), scenario.tool->line, name_of(scenario.law)));
+  throw InputError(
+      fmt::format("{}:{}: tool.shape = \"grasper\" beside a [blade] does not go with material.law = \"{}\" "
+                  "in a hand; possible there: a tool that presses, rubs or bonds, or a grasper without a "
+                  "blade",
+                  scenario.file.string(), scenario.tool->line, name_of(scenario.law)));
 }
 
 bool can_run(const Scenario& scenario) {

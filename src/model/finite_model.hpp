@@ -26,9 +26,9 @@ struct FiniteStep {
   int closed_pairs = 0; // of lips that touch each other
   double residual = 0;  // norm of the unbalanced forces over that of the acting ones
   double least_jacobian = 1;
-  double penetration = 0; // m, deepest that corners and middles of the surface's triangles lie in the tool
-  double energy = 0;      // J, of the strain
-  double loads = 0;       // J, forces of the loads, which are dead, times displacement
+  double penetration = 0;   // m, deepest that corners and middles of the surface's triangles lie in the tool
+  double energy = 0;        // J, of the strain
+  double loads = 0;         // J, forces of the loads, which are dead, times displacement
   double friction_work = 0; // J, taken by the friction of the tool on the way from the last solution
 };
 
@@ -82,10 +82,10 @@ class FiniteModel {
   /// Gap of every pair of lips along its normal, m.
   [[nodiscard]] std::vector<double> openings() const;
   [[nodiscard]] VectorX nodal_displacements() const; // 3 a node, m
-  /// What drives the fronts of its cut in the last solution, at places `spacing` m apart; `toughness`, J/m2, of the body
-  /// at rest. Throws as solvers::front_states().
-  [[nodiscard]] std::vector<solvers::FrontState>
-  front_states(const std::function<double(const Vector3&)>& toughness, double spacing) const;
+  /// What drives the fronts of its cut in the last solution, at places `spacing` m apart; `toughness`, J/m2, of the
+  /// body at rest. Throws as solvers::front_states().
+  [[nodiscard]] std::vector<solvers::FrontState> front_states(const std::function<double(const Vector3&)>& toughness,
+                                                              double spacing) const;
   /// The last solution as a loop wants it that asks for the force at other poses of the tool: displacements = base +
   /// compliance * forces, exact at this pose, the compliance that of small motions about it. `wanted`: free nodes of
   /// the surface; those that touch the tool join them.

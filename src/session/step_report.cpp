@@ -107,8 +107,8 @@ void StepReport::tell_finite(StepResult& result) {
   if (!state_.options.force_only)
     for (const Vector3& x : state_.model.sprinkling.nodes.positions) {
       state_.node_states.push_back(state_.model.at(x));
-      result.rotation_degrees =
-          std::max(result.rotation_degrees, solvers::rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
+      result.rotation_degrees = std::max(
+          result.rotation_degrees, solvers::rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
     }
   judge_banks(result);
   if (!state_.touch)

@@ -12,11 +12,11 @@ namespace spherecut::app {
 
 /// Where the work of a run has gone since its first solution, J.
 struct EnergyLedger {
-  double tool = 0;        // work of the tool on the body, from its force and motion
-  double loads = 0;       // work of gravity, of the pressure in cuts, and of a linear body's pre-strain as the load that
-                          // it stands for
-  double elastic = 0;     // change of the energy of the strain; of a linear body by which it differs from its given shape
-  double surface = 0;     // toughness times the area torn, and what the loads pay of a blade's cut
+  double tool = 0;    // work of the tool on the body, from its force and motion
+  double loads = 0;   // work of gravity, of the pressure in cuts, and of a linear body's pre-strain as the load that
+                      // it stands for
+  double elastic = 0; // change of the energy of the strain; of a linear body by which it differs from its given shape
+  double surface = 0; // toughness times the area torn, and what the loads pay of a blade's cut
   double dissipation = 0; // released beyond that: surplus of unstable and of late growth, letting go
   /// What the account leaves open: the error of the solution and of the release rates.
   [[nodiscard]] double imbalance() const { return tool + loads - elastic - surface - dissipation; }

@@ -1,6 +1,6 @@
 // What drives a front at finite strain, and the state that a body with a longer cut begins from.
-#include "solvers/release/front_states.hpp"
 #include "solvers/finite/transfer.hpp"
+#include "solvers/release/front_states.hpp"
 #include "tests/solvers/release/cut_strip.hpp"
 
 #include <Eigen/Geometry>
@@ -113,8 +113,7 @@ TEST_CASE("The nearest state to a homogeneous one is that, whatever its nodes ha
   for (int i = 0; i < body.size(); ++i)
     if (free[i] != 0)
       start.segment<3>(3 * static_cast<Eigen::Index>(i)) += Vector3(std::sin(7.0 * i), std::cos(3.0 * i), 0.2);
-  const VectorX found =
-      nearest_state(body, start, free, [&](const Vector3&) { return deformation; });
+  const VectorX found = nearest_state(body, start, free, [&](const Vector3&) { return deformation; });
   CHECK((found - wanted).cwiseAbs().maxCoeff() < 1e-5); // gradients are consistent to rounding, shape functions are not
   for (int i = 0; i < body.size(); ++i)
     if (free[i] == 0)

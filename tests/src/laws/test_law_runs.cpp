@@ -1,8 +1,8 @@
 // Runs whose law is not linear: against the linear run where strains are small, against closed forms where they are
 // large, what they refuse, and their bits against threads.
-#include "solvers/elasticity/rotation.hpp"
 #include "solvers/algebra/parallel.hpp"
 #include "solvers/elasticity/homogeneous.hpp"
+#include "solvers/elasticity/rotation.hpp"
 #include "src/model/finite_model.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"

@@ -1,5 +1,5 @@
-// Bodies whose law is not linear that tear: a strip in pure shear against its closed form, a peel at small strain against
-// the linear one, a flap that is folded back.
+// Bodies whose law is not linear that tear: a strip in pure shear against its closed form, a peel at small strain
+// against the linear one, a flap that is folded back.
 #include "solvers/elasticity/prestrained_law.hpp"
 #include "src/live/virtual_loop.hpp"
 #include "src/model/finite_model.hpp"
@@ -55,9 +55,9 @@ axes = ["z"]
 /// Energy of the strip far ahead of the crack: its thickness is free.
 double pure_shear_energy() {
   const double mu = modulus / (2 * (1 + nu));
-  const auto law = solvers::prestrained(
-      solvers::make_law({solvers::NeoHookeanLaw{mu}, solvers::bulk_modulus_of(mu, nu), {}}),
-      Matrix3(Vector3(1, 1 + pull, 1).asDiagonal()));
+  const auto law =
+      solvers::prestrained(solvers::make_law({solvers::NeoHookeanLaw{mu}, solvers::bulk_modulus_of(mu, nu), {}}),
+                           Matrix3(Vector3(1, 1 + pull, 1).asDiagonal()));
   double least = std::numeric_limits<double>::infinity();
   for (double thinner = 0.7; thinner <= 1; thinner += 1e-5) {
     const Matrix3 deformation = Vector3(1, 1, thinner).asDiagonal();
@@ -82,7 +82,8 @@ toughness = {}
 )",
                      law, toughness) +
          held_below("0.001") + node_spacings("0.0032", "0.008") +
-         rectangle_precut("[-0.03, 0, 0.0181]", "[0, 0, 1]", "[1, 0, 0]", "0.03", "0.04") + fmt::format(R"([tool]
+         rectangle_precut("[-0.03, 0, 0.0181]", "[0, 0, 1]", "[1, 0, 0]", "0.03", "0.04") +
+         fmt::format(R"([tool]
 shape = "grasper"
 radius = 0.005
 step = 0.25
@@ -94,7 +95,7 @@ time = 1
 position = [-0.03, 0, {}]
 [tearing]
 )",
-                                                                                                          0.028 + way) +
+                     0.028 + way) +
          more;
 }
 
@@ -211,7 +212,8 @@ TEST_CASE("A grasper in a hand draws a body of a law as one on a path does, and 
   const std::string text = peel(neo_hookean, 1000, 0.006);
   Session path(scenario_of(text));
   const std::vector<StepResult> wanted = run(path);
-  Session hand(scenario_of(text), [](const std::string&) {}, Leader::device);
+  Session hand(
+      scenario_of(text), [](const std::string&) {}, Leader::device);
   SessionOptions options{.force_only = true, .going_on = true, .tear_gradually = true};
   options.grip = false;
   hand.set_options(options);
@@ -263,7 +265,8 @@ TEST_CASE("In the real-time loop a grasper tears a body of a law and its force s
 TEST_CASE("Tears that a law does not go with are refused in words") {
   const auto refused = [](const std::string& text, const std::string& what) {
     Session session(scenario_of(text));
-    CHECK_THROWS_WITH(session.step(session.steps().front()), Contains(what + " does not go with material.law = \"neo_hookean\""));
+    CHECK_THROWS_WITH(session.step(session.steps().front()),
+                      Contains(what + " does not go with material.law = \"neo_hookean\""));
   };
   refused(replaced(peel(neo_hookean, 0.4, 0.01), "toughness = 0.4\n",
                    "toughness = 0.4\n[[material.prony]]\nshare = 0.3\ntime = 2\n"),
