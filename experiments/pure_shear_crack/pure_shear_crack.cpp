@@ -158,6 +158,7 @@ std::vector<Check> run_pure_shear_crack(const ExperimentContext& context) {
   tears.check("pure_shear_tear", "release_on_the_way", 0.05, checks);
   tears.check("pure_shear_tear", "given_up", 0.05, checks);
   tears.check("pure_shear_tear", "off_the_middle", 0.07, checks); // a spacing of the nodes
+  tears.check("pure_shear_tear", "untorn", 0.05, checks);
   checks.push_back({"pure_shear_tear_wrong_onsets", static_cast<double>(wrong_onsets(torn, 0.05, context)), "<=", 0});
   table.write(context.out / "releases.csv");
   app::write_png(figure, context.out / "releases.png");

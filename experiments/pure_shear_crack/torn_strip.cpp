@@ -89,7 +89,7 @@ most_area = {17}
 
 void tear_strips(const std::vector<double>& stretches, std::uint64_t seed, const ExperimentContext& context,
                  ErrorSeries& errors) {
-  double onset = 0, way = 0, straightness = 0, given_up = 0;
+  double onset = 0, way = 0, straightness = 0, given_up = 0, untorn = 0;
   for (const StripLaw& law : strip_laws())
     for (const double stretch : stretches) {
       const double wanted = wanted_release(law, stretch);
@@ -100,6 +100,7 @@ void tear_strips(const std::vector<double>& stretches, std::uint64_t seed, const
         release += increment.release / static_cast<double>(step.tear->increments.size());
         off = std::max(off, std::abs(increment.front.y()) / height);
       }
+      const double torn = step.tear->area / session.scenario().tearing.most_area;
       const double first = step.tear->increments.front().release / wanted - 1;
       const double lost = -step.tear->ledger.elastic / (wanted * step.tear->area) - 1;
       context.say(fmt::format("{}, stretch {}, seed {}: torn {:.3g} cm2 in {} increments; G at the start off W H by "
@@ -111,11 +112,13 @@ void tear_strips(const std::vector<double>& stretches, std::uint64_t seed, const
       way = std::max(way, std::abs(release / wanted - 1));
       given_up = std::max(given_up, std::abs(lost));
       straightness = std::max(straightness, off);
+      untorn = std::max(untorn, 1 - torn);
     }
   errors.add("onset", onset);
   errors.add("release_on_the_way", way);
   errors.add("given_up", given_up);
   errors.add("off_the_middle", straightness);
+  errors.add("untorn", untorn);
 }
 
 int wrong_onsets(const std::vector<double>& stretches, double margin, const ExperimentContext& context) {

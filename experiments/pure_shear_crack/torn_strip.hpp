@@ -8,7 +8,7 @@ namespace spherecut::experiments {
 
 /// Strips of both laws, each at the stretches, torn over half of their length by a run of the program. Adds to the
 /// errors what the release is off W H when the tear starts and on its way, how far the front leaves the middle over the
-/// height, and what the strip gives up over W H times the torn area, all as shares.
+/// height, what of the way is not torn, and what the strip gives up over W H times the torn area, all as shares.
 void tear_strips(const std::vector<double>& stretches, std::uint64_t seed, const ExperimentContext& context,
                  ErrorSeries& errors);
 

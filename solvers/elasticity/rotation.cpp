@@ -1,5 +1,6 @@
 #include "solvers/elasticity/rotation.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
@@ -8,7 +9,15 @@ namespace spherecut::solvers {
 
 Matrix3 rotation_of(const Matrix3& deformation) {
   const Eigen::JacobiSVD<Matrix3> parts(deformation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return parts.matrixU() * parts.matrixV().transpose();
+  Matrix3 left = parts.matrixU();
+  if (left.determinant() * parts.matrixV().determinant() < 0) // of the smallest singular value
+    left.col(2) *= -1;
+  return left * parts.matrixV().transpose();
+}
+
+Matrix3 rotation_between(const Matrix3& one, const Matrix3& other) {
+  const Eigen::Quaterniond from(rotation_of(one)), to(rotation_of(other));
+  return from.slerp(0.5, to).toRotationMatrix();
 }
 
 double rotation_degrees(const Matrix3& deformation) {

@@ -9,6 +9,23 @@ namespace spherecut::solvers {
 void deformation_gradients(const int* nodes, int count, const LaneValues* gradients, const double* coefficients,
                            LaneValues* deformation);
 
+/// Calls act(group, lane, F) for every point that weighs something, the groups in order.
+template <class Act>
+void for_each_deformation(const PointTable& table, const VectorX& coefficients, const Act& act) {
+  for (int group = 0; group < table.groups(); ++group) {
+    const std::span<const int> nodes = table.nodes_of(group);
+    LaneValues f[9];
+    deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table.gradients_of(group), coefficients.data(),
+                          f);
+    for (int lane = 0; lane < table.count[group]; ++lane) {
+      Matrix3 deformation;
+      for (int k = 0; k < 9; ++k)
+        deformation.data()[k] = f[k].value[lane];
+      act(group, lane, deformation);
+    }
+  }
+}
+
 /// forces[3 k + i] = sum over points and j of stress(i, j) g_kj, `stress` with the weights in it, N.
 void group_forces(int count, const LaneValues* gradients, const LaneValues* stress, double* forces);
 

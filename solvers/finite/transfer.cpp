@@ -61,11 +61,8 @@ VectorX fitted(const FiniteBody& body, VectorX coefficients, const std::vector<c
   for (int i = 0; i < count; ++i)
     matrix.coeffRef(i, i) *= 1 + held;
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
-  if (factor.info() != Eigen::Success)
-    throw NumericalError(
-        fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
-  const MatrixX change = factor.solve(right);
-  if (!change.allFinite())
+  const MatrixX change = factor.info() == Eigen::Success ? MatrixX(factor.solve(right)) : MatrixX{};
+  if (change.rows() != count || !change.allFinite())
     throw NumericalError(
         fmt::format("state of a body on other nodes: {} free nodes do not reach enough points", count));
   for (std::size_t i = 0; i < free.size(); ++i)
@@ -79,23 +76,14 @@ bool stress_inverted(const FiniteBody& body, const VectorX& coefficients, double
                      std::vector<char>& free, std::vector<double>& emphasis) {
   const PointTable& table = body.points();
   bool has_found = false;
-  for (int group = 0; group < table.groups(); ++group) {
-    const std::span<const int> nodes = table.nodes_of(group);
-    LaneValues f[9];
-    deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table.gradients_of(group), coefficients.data(),
-                          f);
-    for (int lane = 0; lane < table.count[group]; ++lane) {
-      Matrix3 deformation;
-      for (int k = 0; k < 9; ++k)
-        deformation.data()[k] = f[k].value[lane];
-      if (deformation.determinant() >= least_jacobian)
-        continue;
-      has_found = true;
-      emphasis[static_cast<std::size_t>(point_lanes) * group + lane] *= more;
-      for (const int node : nodes)
-        free[node] = 1;
-    }
-  }
+  for_each_deformation(table, coefficients, [&](int group, int lane, const Matrix3& deformation) {
+    if (deformation.determinant() >= least_jacobian)
+      return;
+    has_found = true;
+    emphasis[static_cast<std::size_t>(point_lanes) * group + lane] *= more;
+    for (const int node : table.nodes_of(group))
+      free[node] = 1;
+  });
   return has_found;
 }
 

@@ -30,9 +30,7 @@ double driving_release_rate(const Material& material, const Intensities& k) {
 
 namespace {
 
-constexpr double deepest_inset = 1; // of the tube's shift from the surface, in units of the spacing
-constexpr double least_inset = 0.5; // nearer to the surface nodes do not resolve the field
-constexpr int along_inset = 8;      // points along the front where the shift varies fast
+constexpr int along_inset = 8; // points along the front where the shift varies fast
 
 /// The integral over the usual tube, or a smaller one, or what of the usual one lies in the body; none when the front
 /// is too near to the surface for any.

@@ -51,6 +51,10 @@ std::vector<FrontState> front_states(const Discretisation& body, const Field& fi
                                      const std::function<double(const Vector3&)>& toughness, double spacing,
                                      const std::vector<Vector3>& closed = {}, FrontRules* rules = nullptr);
 
+/// In spacings: over how much of its way to the surface the shift of an integral fades at most, and how near to the
+/// surface a front may come before nodes do not resolve its field.
+inline constexpr double deepest_inset = 1, least_inset = 0.5;
+
 /// How a body tells of a place of its front.
 struct FrontProbe {
   /// By an integral; nothing where no tube fits. `place`: of the samples along the front.

@@ -124,26 +124,18 @@ EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficien
   of_points_.assign(deformations_.size(), 0);
   points_stress_.assign(deformations_.size(), Matrix3::Zero());
   std::vector<double> mean(blocks.volume.size(), 0);
-  for (int group = 0; group < table.groups(); ++group) {
-    LaneValues f[9];
-    const std::span<const int> nodes = table.nodes_of(group);
-    deformation_gradients(nodes.data(), static_cast<int>(nodes.size()), table.gradients_of(group), coefficients.data(),
-                          f);
-    for (int lane = 0; lane < table.count[group]; ++lane) {
-      Matrix3& deformation = deformations_[lanes * group + lane];
-      for (int k = 0; k < 9; ++k)
-        deformation.data()[k] = f[k].value[lane];
-      const double j = deformation.determinant();
-      if (body.minds_volume() && !(j > 0)) {
-        const Vector3& x = table.positions[lanes * group + lane];
-        throw InputError(
-            fmt::format("energy release: J = {:.3g} at ({:.6g}, {:.6g}, {:.6g}) m; the law has no energy there", j,
-                        x.x(), x.y(), x.z()));
-      }
-      if (blocks.size() > 0)
-        mean[blocks.block[group]] += table.weights[group].value[lane] * j / blocks.volume[blocks.block[group]];
+  for_each_deformation(table, coefficients, [&](int group, int lane, const Matrix3& deformation) {
+    deformations_[lanes * group + lane] = deformation;
+    const double j = deformation.determinant();
+    if (body.minds_volume() && !(j > 0)) {
+      const Vector3& x = table.positions[lanes * group + lane];
+      throw InputError(
+          fmt::format("energy release: J = {:.3g} at ({:.6g}, {:.6g}, {:.6g}) m; the law has no energy there", j, x.x(),
+                      x.y(), x.z()));
     }
-  }
+    if (blocks.size() > 0)
+      mean[blocks.block[group]] += table.weights[group].value[lane] * j / blocks.volume[blocks.block[group]];
+  });
   if (blocks.size() > 0) {
     of_blocks_ = of_points_;
     blocks_stress_ = points_stress_;

@@ -65,8 +65,8 @@ class EnergyMomentum {
   struct Shift; // q, the way ahead, and their gradients
   struct FacePlace;
   class LocalShift;
-  template <class ShiftAt>
   /// `about`: A; where there is none it becomes the rotation of the mean of F.
+  template <class ShiftAt>
   [[nodiscard]] EnergyRelease integrate(const ShiftAt& shift_at, ReleasePressure pressure, double load_factor,
                                         std::optional<Matrix3>& about) const;
   void add_faces(const std::vector<FacePlace>& places, const Matrix3& about, double load_factor,

@@ -11,10 +11,6 @@
 namespace spherecut::solvers {
 namespace {
 
-// As of the small-strain integral (solvers/fracture/tearing.cpp):
-constexpr double deepest_inset = 1; // of the tube's shift from the surface, in spacings
-constexpr double least_inset = 0.5; // nearer to the surface nodes do not resolve the field
-
 /// The shift of the wide tube stays whole over one and a half spacings: with one the mean G of a peel is 4 % below the
 /// small-strain integral, with one and a half 1 %. Under a thin layer, which bends and turns within it, and where the
 /// front turns the narrow one serves.
@@ -55,8 +51,10 @@ std::vector<FrontState> front_states(const FiniteBody& body, const VectorX& coef
   const EnergyMomentum momentum(body, coefficients, fibres);
   const auto jump = [&](const Vector3& plus, const Vector3& minus) -> Vector3 {
     const FiniteState above = body.at(plus, coefficients), below = body.at(minus, coefficients);
-    const Matrix3 rotation = rotation_of(0.5 * (above.deformation + below.deformation));
-    return rotation.transpose() * (above.displacement - below.displacement);
+    const Vector3 apart = plus - minus; // at rest
+    return rotation_between(below.deformation, above.deformation).transpose() *
+               (apart + above.displacement - below.displacement) -
+           apart;
   };
   const auto by_jump = [&](const topology::FrontFrame& frame) {
     return displacement_correlation(problem, frame, jump);

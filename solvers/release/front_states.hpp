@@ -5,9 +5,10 @@
 // along the front, direction and motion are those of the linear case, to which all of this goes over as the strain
 // becomes small. The jump is taken in axes that turn with the tissue at the front,
 //
-//   d = R^T (u+ - u-),   R of the polar decomposition of (F+ + F-) / 2,
+//   d = R^T (n + u+ - u-) - n,   n from one face to the other at rest, R halfway between the rotations of F- and F+,
 //
-// because a flap that is folded back would otherwise seem to slide.
+// because a flap that is folded back would otherwise seem to slide. Places without room for the integral, and those
+// behind which faces press on one another, have the intensities of that jump by the constants of small strain.
 #pragma once
 
 #include "solvers/fracture/tearing.hpp"

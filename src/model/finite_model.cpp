@@ -256,10 +256,10 @@ void FiniteModel::go_on_from(const BodyModel& before) {
   equilibrium_.set_coefficients(start, 1, old.pose_, std::move(shares));
 }
 
-// Nodes that both bodies have keep their coefficients; new ones, and those about them, whose shape functions are others
-// now, take those with which the body is strained as it was.
+// Nodes that both bodies have keep their coefficients; new ones, and those about new ones and about some that are gone,
+// whose shape functions are others now, take those with which the body is strained as it was.
 VectorX FiniteModel::state_from(const BodyModel& before) const {
-  constexpr double about = 2; // radii of a new node's sphere
+  constexpr double about = 2; // radii of the sphere of a node that is new, or gone
   const solvers::NodeCloud& nodes = body_.problem().nodes;
   VectorX start(3 * static_cast<Eigen::Index>(nodes.size()));
   if (before.finite == nullptr) {
@@ -270,6 +270,12 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
   const topology::PointTree known(before.nodes().positions), here(nodes.positions);
   std::vector<char> free(nodes.positions.size(), 0);
   std::vector<topology::PointTree::Found> near;
+  const auto free_about = [&](const Vector3& x, double radius) {
+    near.clear();
+    here.within(x, about * radius, near);
+    for (const topology::PointTree::Found& found : near)
+      free[found.index] = 1;
+  };
   for (int i = 0; i < nodes.size(); ++i) {
     const Vector3& x = nodes.positions[i];
     const topology::PointTree::Found nearest = known.nearest(x);
@@ -280,13 +286,23 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
       continue;
     }
     start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(x).displacement;
-    near.clear();
-    here.within(x, about * body_.spheres().radii()[i], near);
-    for (const topology::PointTree::Found& found : near)
-      free[found.index] = 1;
+    free_about(x, body_.spheres().radii()[i]);
   }
+  for (int i = 0; i < before.nodes().size(); ++i) {
+    const Vector3& x = before.nodes().positions[i];
+    const topology::PointTree::Found nearest = here.nearest(x);
+    const double same = same_place * before.nodes().spacings[i];
+    if (nearest.squared_distance >= same * same)
+      free_about(x, before.sphere_radius(i));
+  }
+  const VectorX& old = before.finite->coefficients();
+  solvers::ShapeFunctions shape;
   return solvers::nearest_state(body_, std::move(start), free, [&](const Vector3& x) -> Matrix3 {
-    return Matrix3::Identity() + before.at(x).gradient;
+    Matrix3 deformation = Matrix3::Identity();
+    before.shape_at(x, shape);
+    for (int k = 0; k < shape.size(); ++k)
+      deformation += old.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) * shape.gradient(k).transpose();
+    return deformation;
   });
 }
 
@@ -326,6 +342,17 @@ bool FiniteModel::may_begin_anew() const {
 
 void FiniteModel::begin_anew() {
   equilibrium_.set_coefficients(VectorX::Zero(equilibrium_.coefficients().size()));
+}
+
+FiniteStep FiniteModel::solve_from_rest(double time, const std::optional<topology::ToolPose>& pose) {
+  const VectorX kept = equilibrium_.coefficients();
+  begin_anew();
+  try {
+    return solve(time, pose);
+  } catch (...) {
+    equilibrium_.set_coefficients(kept, 1, pose_);
+    throw;
+  }
 }
 
 std::vector<double> FiniteModel::openings() const {

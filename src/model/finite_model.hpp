@@ -67,6 +67,9 @@ class FiniteModel {
   /// loads, as it does before its first step.
   FiniteStep solve(double time, const std::optional<topology::ToolPose>& pose);
 
+  /// The same from the body at rest. Throws as solve().
+  FiniteStep solve_from_rest(double time, const std::optional<topology::ToolPose>& pose);
+
   /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
   /// from the volume ratio there. Throws InputError where no sphere covers it.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const;

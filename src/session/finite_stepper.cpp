@@ -29,13 +29,17 @@ bool FiniteStepper::solve(const StepSample& sample, bool is_solved) {
     }
     contact_.solve(sample, state_.model);
   } catch (const NumericalError& error) {
-    const bool is_led = state_.leader == Leader::path;
-    throw NumericalError(fmt::format("t = {:g} s: {}. {}What a law cannot bear does that, or steps too long for it{}, "
-                                     "or nodes too coarse for the tool (nodes.fine_spacing)",
-                                     sample.time, error.what(), is_led ? "The rows up to then are kept. " : "",
-                                     is_led ? " (tool.step)" : ""));
+    throw NumericalError(told(sample, error));
   }
   return true;
+}
+
+std::string FiniteStepper::told(const StepSample& sample, const NumericalError& error) const {
+  const bool is_led = state_.leader == Leader::path;
+  return fmt::format("t = {:g} s: {}. {}What a law cannot bear does that, or steps too long for it{}, or nodes too "
+                     "coarse for the tool (nodes.fine_spacing)",
+                     sample.time, error.what(), is_led ? "The rows up to then are kept. " : "",
+                     is_led ? " (tool.step)" : "");
 }
 
 std::vector<Vector3> places_of_contact(const SessionState& state) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/tissue/contact_solver.hpp"
+#include "topology/base/errors.hpp"
 
 namespace spherecut::app {
 
@@ -13,6 +14,8 @@ class FiniteStepper {
   /// Goes on to the step, with the cut that it has made; `is_solved`: the body with that is solved already. False:
   /// nothing acts on the tissue yet. Throws NumericalError, which says what may help.
   bool solve(const StepSample& sample, bool is_solved);
+  /// What a step without equilibrium says: when, why, and what may help.
+  [[nodiscard]] std::string told(const StepSample& sample, const NumericalError& error) const;
 
  private:
   SessionState& state_;

@@ -160,7 +160,11 @@ void Session::Parts::step_finite(const StepSample& sample, std::vector<topology:
   }
   if (is_solved && tears) {
     const StageTimer timer(result.stages.tear);
-    tears->tear(sample, loading, result);
+    try {
+      tears->tear(sample, loading, result);
+    } catch (const NumericalError& error) {
+      throw NumericalError(finite.told(sample, error));
+    }
   }
   if (is_solved)
     report.tell_finite(result);

@@ -345,25 +345,33 @@ class TearPropagation::Loop {
   // at its end; the solution is at either. Intensities go in proportion to the load, at finite strain nearly so: there
   // the place is looked for between a load below it and one above.
   void load_until(double target, const States& full) {
-    constexpr int most_trials = 5;
-    constexpr double near = 0.01; // of the target
+    constexpr int most_trials = 6;
+    constexpr double near = 0.01, margin = 0.05; // of the target; of what is left to look in, from its ends
     States low = states_, high = full;
     double from = share_, to = 1;
-    for (int trial = 0; trial < most_trials; ++trial) {
-      const double part = low && high && low->size() == high->size()
-                              ? solvers::onset_share(state_.scenario.material, *low, *high, target)
-                              : 1;
+    for (int trial = 1;; ++trial) {
+      const bool compare = low && high && low->size() == high->size();
+      double part =
+          compare ? solvers::onset_share(state_.scenario.material, *low, *high, target) : (trial == 1 ? 1.0 : 0.5);
+      if (trial > 1)
+        part = std::clamp(part, margin, 1 - margin);
       const double share = from + (to - from) * part;
-      if (state_.model.finite == nullptr || share >= 1 || trial + 1 == most_trials) {
+      if (state_.model.finite == nullptr || part == 0 || share >= 1 || trial == most_trials) {
         load_to(share);
         return;
       }
-      tears_.contact_.solve(loaded(from_, since_, sample_, share), state_.model);
+      try {
+        tears_.contact_.solve(loaded(from_, since_, sample_, share), state_.model);
+      } catch (const NumericalError&) { // no equilibrium there; there is one below
+        to = share;
+        high.reset();
+        continue;
+      }
       find_states();
       const double drive = states_ ? drive_of(*states_) : 0;
       if (std::abs(drive / target - 1) < near) {
         share_ = share;
-        tears_.book_loading(loaded_sample(), share_ < 1 ? Loading{} : loading_);
+        tears_.book_loading(loaded_sample(), Loading{});
         return;
       }
       (drive < target ? from : to) = share;
@@ -390,9 +398,13 @@ class TearPropagation::Loop {
     since_ = tears->time;
     share_ = 0;
     const States full = states_;
-    tears_.contact_.solve(loaded_sample(), state_.model);
-    find_states();
-    load_until(1, full);
+    try {
+      tears_.contact_.solve(loaded_sample(), state_.model);
+      find_states();
+      load_until(1, full);
+    } catch (const NumericalError&) { // no way back at finite strain: it tears where the step ends
+      load_to(1);
+    }
   }
 
   void add_row() {
@@ -520,10 +532,12 @@ class TearPropagation::Loop {
     const Energies now = energies(state_.model);
     const double free = account().last.potential() - now.potential(), surface = toughness * torn;
     double surplus = free - surface; // of a front that is gone, or comes about, by the energies alone
+    double slipped = 0;              // J, taken by the tool as it rubs on what has moved
     if (!growth.seed && !growth.gives_way && !growth.joins && states_ && !states_->empty()) {
       const std::vector<double> advance = advances(*was_states, growth.moving, growth.longest, fine_);
       const Swept was = swept(*was_states, *was_states, advance), is = swept(*states_, *was_states, advance);
       surplus = 0.5 * (was.surplus + is.surplus) * torn;
+      slipped = tool_load(state_.model).friction;
       if (growth.longest >= told * stride_) {
         account().decay = std::max(0.0, std::log(was.drive / std::max(is.drive, 1e-3)) / growth.longest);
         kept_ += drive_of(*states_) >= kept_drive * start_ ? 1 : 0;
@@ -533,7 +547,7 @@ class TearPropagation::Loop {
     ledger.loads += now.loads - account().last.loads;
     ledger.elastic += now.elastic - account().last.elastic;
     ledger.surface += surface;
-    ledger.dissipation += std::max(0.0, surplus);
+    ledger.dissipation += std::max(0.0, surplus) + slipped;
     account().last = now;
     account().force = tool_load(state_.model).force;
     account().area += torn;

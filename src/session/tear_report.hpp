@@ -12,7 +12,7 @@ namespace spherecut::app {
 
 /// Where the work of a run has gone since its first solution, J.
 struct EnergyLedger {
-  double tool = 0;    // work of the tool on the body, from its force and motion
+  double tool = 0;    // work of the tool on the body, from its force and the motion of its point
   double loads = 0;   // work of gravity, of the pressure in cuts, and of a linear body's pre-strain as the load that
                       // it stands for
   double elastic = 0; // change of the energy of the strain; of a linear body by which it differs from its given shape

@@ -49,8 +49,7 @@ void solve_finite(double time, const std::optional<topology::ToolPose>& pose, Bo
   } catch (const NumericalError&) {
     if (model.finite->coefficients().isZero(0) || !model.finite->may_begin_anew()) // it has begun there
       throw;
-    model.finite->begin_anew();
-    model.finite->solve(time, pose);
+    model.finite->solve_from_rest(time, pose);
   }
   model.field.coefficients = model.finite->coefficients();
 }

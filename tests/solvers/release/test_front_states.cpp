@@ -1,4 +1,5 @@
 // What drives a front at finite strain, and the state that a body with a longer cut begins from.
+#include "solvers/elasticity/rotation.hpp"
 #include "solvers/finite/transfer.hpp"
 #include "solvers/release/front_states.hpp"
 #include "tests/solvers/release/cut_strip.hpp"
@@ -66,6 +67,18 @@ TEST_CASE("A front that turns with its body is driven as before") {
     CHECK(std::abs(before[k].intensities[1]) > 0.1 * before[k].intensities[0]); // both modes are there
     CHECK((after[k].intensities - before[k].intensities).norm() < 1e-3 * before[k].intensities.norm());
   }
+}
+
+TEST_CASE("The rotation between two faces is halfway, also where they have turned from one another") {
+  const Vector3 axis = Vector3(1, 2, -0.5).normalized();
+  const auto turn = [&](double degrees) -> Matrix3 {
+    return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis).toRotationMatrix();
+  };
+  const Matrix3 stretch = Vector3(2, 0.7, 0.9).asDiagonal();
+  for (const double apart : {0.0, 40.0, 150.0, 170.0})
+    CHECK((rotation_between(turn(10) * stretch, turn(10 + apart) * stretch) - turn(10 + 0.5 * apart)).norm() < 1e-9);
+  const Matrix3 mirrored = Vector3(-2, 0.5, 1).asDiagonal();
+  CHECK(rotation_of(mirrored).determinant() == Approx(1));
 }
 
 TEST_CASE("A body with a longer cut begins from the strain of the one before, and nothing of it is inverted") {
