@@ -192,10 +192,19 @@ function countBeside(picture: Picture, kind: Kind, open: Mask, places: readonly 
   return [all, found];
 }
 
+const isSame = (one: ArrayLike<number>, other: ArrayLike<number>): boolean => one.length === other.length && Array.from(one).every((value, i) => value === other[i]);
+
 /** Takes a picture and counts what is seen in it against what the camera should see. */
 export async function see(tab: Tab, wait = 10): Promise<Seen> {
-  const picture = await composited(tab, wait);
-  const told = await scene(tab);
+  // On a busy machine a frame may come between the picture and what the page tells of it: then both are taken again.
+  let told = await scene(tab);
+  let picture = await composited(tab, wait);
+  for (let attempt = 0; attempt < 6; ++attempt) {
+    const before = told;
+    told = await scene(tab);
+    if (isSame(before.camera, told.camera) && isSame(before.positions, told.positions)) break;
+    picture = await composited(tab, wait);
+  }
   const chart = await box(tab, 'chart');
   const { ratio, width } = picture;
   const project = (x: number, y: number, z: number): [number, number] => {
