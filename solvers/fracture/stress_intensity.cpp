@@ -3,6 +3,7 @@
 #include "solvers/body/elastic_body.hpp"
 #include "solvers/fracture/inset_integral.hpp"
 #include "solvers/fracture/local_values.hpp"
+#include "solvers/fracture/virtual_shift.hpp"
 #include "solvers/shapes/functions.hpp"
 #include "topology/base/errors.hpp"
 
@@ -161,17 +162,6 @@ class Tube {
   double curvature_;
 };
 
-/// Curvature of the front in the plane of the cut, 1/m: positive where the way ahead fans out.
-double curvature_of(const topology::Incision& incision, const FrontFrame& front, double h) {
-  const auto before = incision.front_frame(front.point - h * front.tangent, 2 * h);
-  const auto after = incision.front_frame(front.point + h * front.tangent, 2 * h);
-  if (!before || !after)
-    return 0;
-  const double length = (after->point - before->point).norm();
-  return length > 0.5 * h ? (after->ahead - before->ahead).dot(front.tangent) / length : 0;
-}
-
-constexpr double widest_turn = 0.9;   // of the radius of curvature of the front: the tube's outer radius
 constexpr double longest_arc = 0.35;  // of the same: half the tube's length, where that is above the shortest
 constexpr double shortest_half = 1;   // of the tube's length, in spacings, down to which it is shortened
 constexpr double shortened_by = 0.25; // spacings, at a time
@@ -200,11 +190,11 @@ class InteractionRule {
   InteractionRule(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
                   double inset_spacings)
       : incision_(incision_of(body.problem())), problem_(body.problem()), front_(front), options_(options),
-        h_(spacing_at(body.problem().nodes, front.point)), tube_(front, curvature_of(incision_, front, h_)),
+        h_(spacing_at(body.problem().nodes, front.point)), tube_(front, front_curvature(incision_, front, h_)),
         inset_(inset_spacings * h_) {
     size_tube();
     for (const auto& [s, ds] : along_front())
-      total_ += ds * bump(s).first * cover(tube_.at(0, 0, s).position).share;
+      total_ += ds * bump(s).value * covered(tube_.at(0, 0, s).position).share;
     if (!(total_ > 0))
       throw InputError(fmt::format("no part of a front of {:.3g} m lies deeper in the body than the integral begins",
                                    2 * half_length_));
@@ -239,10 +229,6 @@ class InteractionRule {
   struct Section {
     double s, ds, r, dr;
   };
-  struct Cover {
-    double share = 1;
-    Vector3 gradient = Vector3::Zero(); // 1/m
-  };
 
   [[nodiscard]] int cells_radial() const { return std::max(1, options_.radial / 2); }
   [[nodiscard]] int cells_around() const { return std::max(1, options_.around / 2); }
@@ -267,29 +253,10 @@ class InteractionRule {
     return places;
   }
 
-  /// Of the shift across the tube, with its derivative.
-  [[nodiscard]] std::pair<double, double> fade(double r) const {
-    const double t = std::clamp((outer_ - r) / (outer_ - inner_), 0.0, 1.0);
-    return {t * t * (3 - 2 * t), r > inner_ && r < outer_ ? -6 * t * (1 - t) / (outer_ - inner_) : 0.0};
-  }
-  /// And along it.
-  [[nodiscard]] std::pair<double, double> bump(double s) const {
-    const double t = s / half_length_;
-    return {(1 - t * t) * (1 - t * t), -4 * t * (1 - t * t) / half_length_};
-  }
-  /// And near the surface of the body, where it has to vanish.
-  [[nodiscard]] Cover cover(const Vector3& x) const {
-    Cover result;
-    if (!(inset_ > 0))
-      return result;
-    const double t = -problem_.domain->signed_distance(x) / inset_;
-    if (t >= 1)
-      return result;
-    result.share = t > 0 ? t * t * (3 - 2 * t) : 0;
-    if (t > 0)
-      result.gradient = -6 * t * (1 - t) / inset_ * problem_.domain->normal(x);
-    return result;
-  }
+  /// Of the shift across the tube and along it, and near the surface of the body, where it has to vanish.
+  [[nodiscard]] Faded fade(double r) const { return faded_across(r, inner_, outer_); }
+  [[nodiscard]] Faded bump(double s) const { return faded_along(s, half_length_); }
+  [[nodiscard]] Cover covered(const Vector3& x) const { return cover(*problem_.domain, x, inset_); }
 
   /// Where the sheet bends off the plane of the front (a tear kinks), a point belongs to the side of the sheet it is
   /// on.
@@ -356,18 +323,18 @@ std::optional<Sample> InteractionRule::around(const Section& section, int c) con
   if (ahead < 0 && std::abs(above) < -ahead)
     if (const double side = side_of(place.position, r, above); side * above < 0)
       above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
-  const Cover covered = cover(place.position);
-  if (covered.share == 0)
+  const Cover left = covered(place.position);
+  if (left.share == 0)
     return std::nullopt;
-  const double q_r = fade_r * covered.share;
+  const double q_r = fade_r * left.share;
   const double weight = r * (std::numbers::pi / cells_around()) * section.ds * section.dr * place.stretch;
   Sample sample;
   sample.position = place.position;
   // Gradient of xi = q e in the axes of the place; e turns along the front.
   Matrix3 shift = Matrix3::Zero();
-  shift.row(0) = covered.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta),
-                                         fade_r * dq_s / place.stretch) +
-                 fade_r * q_s * place.axes.transpose() * covered.gradient;
+  shift.row(0) =
+      left.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta), fade_r * dq_s / place.stretch) +
+      fade_r * q_s * place.axes.transpose() * left.gradient;
   shift(2, 2) = q_r * q_s * tube_.curvature() / place.stretch;
   for (int m = 0; m < 3; ++m) {
     const TipField local = tip_field(material, modes_[m], ahead, above);
@@ -392,12 +359,12 @@ std::optional<Sample> InteractionRule::around(const Section& section, int c) con
 /// The point of a ring on one face.
 std::optional<Sample> InteractionRule::on_face(const Section& section, double side) const {
   const Material& material = problem_.material;
-  const double r = section.r, q_s = bump(section.s).first;
+  const double r = section.r, q_s = bump(section.s).value;
   const double off = std::min(lip_offset * h_, 1e-3 * r);
   Tube::Place place = tube_.at(-r, side * off, section.s);
   if (const auto face = incision_.closest(tube_.at(-r, 0, section.s).position, 0.5 * r); face && !face->on_border)
     place.position = face->point + side * off * face->normal;
-  const double q_r = fade(r).first * cover(place.position).share;
+  const double q_r = fade(r).value * covered(place.position).share;
   if (q_r == 0)
     return std::nullopt;
   const Vector3 outward = -side * front_.normal;

@@ -2,6 +2,8 @@
 
 #include "solvers/elasticity/rotation.hpp"
 #include "solvers/finite/point_kernels.hpp"
+#include "solvers/fracture/local_values.hpp"
+#include "solvers/fracture/virtual_shift.hpp"
 #include "topology/base/errors.hpp"
 
 #include <Eigen/LU>
@@ -14,33 +16,14 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double widest_release_turn = 0.9; // of the front's radius of curvature: the tube's outer radius
-constexpr double parallel_skin = 0.05;      // cosine between the way ahead and a normal of the surface that it is along
+constexpr double parallel_skin = 0.05; // cosine between the way ahead and a normal of the surface that it is along
 constexpr int face_points = 24, front_points = 96;
-
-double spacing_at_front(const NodeCloud& nodes, const Vector3& x) {
-  int best = 0;
-  for (int i = 1; i < nodes.size(); ++i)
-    if ((nodes.positions[i] - x).squaredNorm() < (nodes.positions[best] - x).squaredNorm())
-      best = i;
-  return nodes.spacings[best];
-}
 
 const topology::Incision& incision_with_front(const FiniteBody& body) {
   const topology::Incision* incision = body.problem().incision.get();
   if (incision == nullptr || incision->front().empty())
     throw InputError("energy release: the body has no cut that ends in it");
   return *incision;
-}
-
-/// Curvature of the front in the plane of the cut, 1/m: positive where the way ahead fans out.
-double front_curvature(const topology::Incision& incision, const topology::FrontFrame& front, double h) {
-  const auto before = incision.front_frame(front.point - h * front.tangent, 2 * h);
-  const auto after = incision.front_frame(front.point + h * front.tangent, 2 * h);
-  if (!before || !after)
-    return 0;
-  const double length = (after->point - before->point).norm();
-  return length > 0.5 * h ? (after->ahead - before->ahead).dot(front.tangent) / length : 0;
 }
 
 void check_release(const ReleaseOptions& options) {
@@ -54,35 +37,6 @@ void check_release(const ReleaseOptions& options) {
   if (!(options.inset >= 0) || !std::isfinite(options.inset))
     throw InputError(
         fmt::format("energy release: a shift that fades over {} spacings; it must not be negative", options.inset));
-}
-
-struct Faded {
-  double value = 0, slope = 0;
-};
-
-/// One below `inner`, none above `outer`.
-Faded faded(double r, double inner, double outer) {
-  const double t = std::clamp((outer - r) / (outer - inner), 0.0, 1.0);
-  return {t * t * (3 - 2 * t), r > inner && r < outer ? -6 * t * (1 - t) / (outer - inner) : 0};
-}
-
-struct Covered {
-  double value = 1;
-  Vector3 gradient = Vector3::Zero(); // 1/m
-};
-
-/// What is left of a shift near the surface of the body.
-Covered covered(const topology::Domain& domain, const Vector3& x, double inset) {
-  Covered result;
-  if (!(inset > 0))
-    return result;
-  const double t = -domain.signed_distance(x) / inset;
-  if (t >= 1)
-    return result;
-  result.value = t > 0 ? t * t * (3 - 2 * t) : 0;
-  if (t > 0)
-    result.gradient = -6 * t * (1 - t) / inset * domain.normal(x);
-  return result;
 }
 
 [[noreturn]] void throw_leaves(const Vector3& front, double outer) {
@@ -234,11 +188,11 @@ void EnergyMomentum::add_faces(const std::vector<FacePlace>& places, const Matri
 class EnergyMomentum::LocalShift {
  public:
   LocalShift(const FiniteBody& body, const topology::FrontFrame& front, const ReleaseOptions& options)
-      : domain_(*body.problem().domain), front_(front), h_(spacing_at_front(body.problem().nodes, front.point)),
+      : domain_(*body.problem().domain), front_(front), h_(spacing_at(body.problem().nodes, front.point)),
         inner_(options.inner * h_), outer_(options.outer * h_), half_(*options.half_length * h_),
         inset_(options.inset * h_), curvature_(front_curvature(incision_with_front(body), front, h_)) {
     const Vector3& at = front.point;
-    if (std::abs(curvature_) * std::max(outer_, half_) > widest_release_turn)
+    if (std::abs(curvature_) * std::max(outer_, half_) > widest_turn)
       throw InputError(fmt::format("energy release: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
                                    at.x(), at.y(), at.z()));
     if (inset_ == 0)
@@ -269,11 +223,6 @@ class EnergyMomentum::LocalShift {
     const double sag = std::abs(turn) < 1e-4 ? 0.5 * turn * s : (1 - std::cos(turn)) / curvature_;
     return front_.point + (chord * front_.tangent - sag * front_.ahead);
   }
-  /// Of the shift along the front.
-  [[nodiscard]] Faded bump(double s) const {
-    const double t = s / half_, rest = 1 - t * t;
-    return std::abs(t) < 1 ? Faded{rest * rest, -4 * t * rest / half_} : Faded{};
-  }
   void axes_at(double s, Shift& shift) const {
     const double c = std::cos(curvature_ * s), sine = std::sin(curvature_ * s);
     shift.ahead = c * front_.ahead + sine * front_.tangent;
@@ -303,17 +252,17 @@ EnergyMomentum::Shift EnergyMomentum::LocalShift::operator()(const Vector3& x) c
     stretch = 1 + curvature_ * ahead;
   }
   const double r = std::hypot(ahead, above);
-  const Faded across = faded(r, inner_, outer_), lengthwise = bump(along);
-  const Covered cover = covered(domain_, x, inset_);
-  shift.q = across.value * lengthwise.value * cover.value;
+  const Faded across = faded_across(r, inner_, outer_), lengthwise = faded_along(along, half_);
+  const Cover left = cover(domain_, x, inset_);
+  shift.q = across.value * lengthwise.value * left.share;
   if (shift.q == 0)
     return shift;
   axes_at(along, shift);
   shift.turn = curvature_ / stretch;
-  shift.gradient = across.value * lengthwise.value * cover.gradient +
-                   across.value * cover.value * lengthwise.slope / stretch * shift.tangent;
+  shift.gradient = across.value * lengthwise.value * left.gradient +
+                   across.value * left.share * lengthwise.slope / stretch * shift.tangent;
   if (across.slope != 0)
-    shift.gradient += across.slope * lengthwise.value * cover.value / r * (ahead * shift.ahead + above * shift.normal);
+    shift.gradient += across.slope * lengthwise.value * left.share / r * (ahead * shift.ahead + above * shift.normal);
   return shift;
 }
 
@@ -321,7 +270,7 @@ double EnergyMomentum::LocalShift::length() const {
   double length = 0;
   for (int a = 0; a < front_points; ++a) {
     const double s = half_ * ((2 * a + 1.0) / front_points - 1), ds = 2 * half_ / front_points;
-    length += ds * bump(s).value * covered(domain_, along_front(s), inset_).value;
+    length += ds * faded_along(s, half_).value * cover(domain_, along_front(s), inset_).share;
   }
   if (!(length > 0))
     throw InputError(
@@ -341,8 +290,8 @@ std::vector<EnergyMomentum::FacePlace> EnergyMomentum::LocalShift::faces() const
       Shift axes;
       axes_at(s, axes);
       FacePlace place{along_front(s) - r * axes.ahead, axes.ahead, axes.normal};
-      place.weight = ds * 2 * outer_ * t / face_points * (1 - curvature_ * r) * faded(r, inner_, outer_).value *
-                     bump(s).value * covered(domain_, place.position, inset_).value;
+      place.weight = ds * 2 * outer_ * t / face_points * (1 - curvature_ * r) * faded_across(r, inner_, outer_).value *
+                     faded_along(s, half_).value * cover(domain_, place.position, inset_).share;
       place.off = std::min(lip_offset * h_, 1e-3 * r);
       if (place.weight != 0)
         faces.push_back(place);
@@ -372,7 +321,7 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
   const std::vector<topology::FrontSegment>& front = incision.front();
   double longest = 0;
   for (const topology::FrontSegment& segment : front)
-    longest = std::max({longest, spacing_at_front(nodes, segment.from), spacing_at_front(nodes, segment.to)});
+    longest = std::max({longest, spacing_at(nodes, segment.from), spacing_at(nodes, segment.to)});
   const double inner = options.inner * longest, outer = options.outer * longest, inset = options.inset * longest;
   const auto shift_at = [&](const Vector3& x) {
     Shift shift;
@@ -381,9 +330,9 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
       return shift;
     const Vector3 away = x - frame->point;
     const double ahead = away.dot(frame->ahead), above = away.dot(frame->normal), r = std::hypot(ahead, above);
-    const Faded across = faded(r, inner, outer);
-    const Covered cover = covered(domain, x, inset);
-    shift.q = across.value * cover.value;
+    const Faded across = faded_across(r, inner, outer);
+    const Cover left = cover(domain, x, inset);
+    shift.q = across.value * left.share;
     if (shift.q == 0)
       return shift;
     shift.ahead = frame->ahead;
@@ -391,9 +340,9 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
     shift.tangent = frame->tangent;
     const double curvature = front_curvature(incision, *frame, longest);
     shift.turn = curvature / std::max(0.1, 1 + curvature * ahead);
-    shift.gradient = across.value * cover.gradient;
+    shift.gradient = across.value * left.gradient;
     if (across.slope != 0)
-      shift.gradient += across.slope * cover.value / r * (ahead * shift.ahead + above * shift.normal);
+      shift.gradient += across.slope * left.share / r * (ahead * shift.ahead + above * shift.normal);
     return shift;
   };
   std::optional<Matrix3> about = Matrix3::Identity();
@@ -405,9 +354,9 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
     const int parts = std::max(1, static_cast<int>(std::ceil(length / step)));
     for (int a = 0; a < parts; ++a) {
       const topology::FrontFrame frame = incision.front_frame_at(k, (a + 0.5) / parts);
-      sum.length += length / parts * covered(domain, frame.point, inset).value;
+      sum.length += length / parts * cover(domain, frame.point, inset).share;
       const double curvature = front_curvature(incision, frame, longest);
-      if (std::abs(curvature) * outer > widest_release_turn)
+      if (std::abs(curvature) * outer > widest_turn)
         throw InputError(fmt::format("energy release: the front at ({:.6g}, {:.6g}, {:.6g}) m turns within the tube",
                                      frame.point.x(), frame.point.y(), frame.point.z()));
       if (inset == 0)
@@ -423,7 +372,7 @@ EnergyRelease EnergyMomentum::mean(const ReleaseOptions& options, double load_fa
         if (domain.signed_distance(place.position) > 0)
           continue;
         place.weight = length / parts * 2 * outer * t / face_points * (1 - curvature * r) *
-                       faded(r, inner, outer).value * covered(domain, place.position, inset).value;
+                       faded_across(r, inner, outer).value * cover(domain, place.position, inset).share;
         place.off = std::min(lip_offset * longest, 1e-3 * r);
         if (place.weight != 0)
           faces.push_back(place);
