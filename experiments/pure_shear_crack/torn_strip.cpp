@@ -1,6 +1,6 @@
 #include "experiments/pure_shear_crack/torn_strip.hpp"
 
-#include "solvers/elasticity/homogeneous.hpp"
+#include "experiments/pure_shear_crack/strip_scenario.hpp"
 #include "src/session/session.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 constexpr double height = 0.05, shear = 2000, nu = 0.49; // m, Pa
 
 struct StripLaw {
-  std::string name, keys;
+  std::string name, constants;
   solvers::LawSpec spec;
 };
 
@@ -28,61 +28,29 @@ std::vector<StripLaw> strip_laws() {
            {solvers::YeohLaw{0.5 * shear, 0.1 * shear, 0.01 * shear}, bulk, {}}}};
 }
 
-/// W H, J per m2 of the strip as it is given, stretched.
 double wanted_release(const StripLaw& law, double stretch) {
-  const Matrix3 gradient = solvers::homogeneous::pure_shear(law.spec, stretch).gradient;
-  double energy = 0;
-  Matrix3 stress;
-  solvers::make_law(law.spec)->evaluate({&gradient, 1}, {}, {&energy, 1}, {&stress, 1});
-  return energy / stretch * height;
+  return strip_release(law.spec, stretch, height);
 }
 
+/// Six times as long as high; it tears over half of that, quick over a twelfth.
 app::Scenario strip(const StripLaw& law, double stretch, double toughness, std::uint64_t seed, bool quick) {
-  return app::read_scenario_text("strip.toml", fmt::format(R"([organ]
-shape = "block"
-size = [{0}, {1}, {2}]
-[material]
-law = "{3}"
-{4}
-poisson_ratio = {5}
-pretension = [0, {6}, 0]
-toughness = {7}
-[[fixed]]
-region = "half_space"
-point = [0, {8}, 0]
-normal = [0, 1, 0]
-axes = ["x", "y"]
-[[fixed]]
-region = "half_space"
-point = [0, {9}, 0]
-normal = [0, -1, 0]
-axes = ["x", "y"]
-[[fixed]]
-region = "half_space"
-point = [0, 0, 1e-6]
-normal = [0, 0, 1]
-axes = ["z"]
-[nodes]
-fine_spacing = {10}
-coarse_spacing = {11}
-random_seed = {12}
-[[precut]]
-shape = "rectangle"
-centre = [{13}, 0, {14}]
-normal = [0, 1, 0]
-up = [0, 0, 1]
-width = {15}
-height = {16}
-[tearing]
-step = 1
-most_increments = 200
-most_area = {17}
-)",
-                                                           6 * height, height, 0.2 * height, law.name, law.keys, nu,
-                                                           stretch - 1, toughness, -0.5 * height + 1e-6,
-                                                           0.5 * height - 1e-6, quick ? 0.12 * height : 0.07 * height,
-                                                           0.2 * height, seed, -2.5 * height, 0.1 * height, 2 * height,
-                                                           0.4 * height, (quick ? 0.5 : 3) * height * 0.2 * height));
+  const StripScenario scenario{
+      .law = law.name,
+      .constants = law.constants,
+      .poisson_ratio = nu,
+      .stretch = stretch,
+      .toughness = toughness,
+      .height = height,
+      .length = 6 * height,
+      .thickness = 0.2 * height,
+      .crack = 1.5 * height,
+      .fine = (quick ? 0.12 : 0.07) * height,
+      .coarse = 0.2 * height,
+      .seed = seed,
+      .tearing =
+          fmt::format("step = 1\nmost_increments = 200\nmost_area = {}\n", (quick ? 0.5 : 3) * height * 0.2 * height),
+  };
+  return app::read_scenario_text("strip.toml", scenario.text());
 }
 
 } // namespace

@@ -1,8 +1,9 @@
-// Sessions in virtual time that must come out the same twice.
+// Sessions in virtual time: that must come out the same twice, that tear.
 #pragma once
 
 #include "src/live/virtual_loop.hpp"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <string>
 #include <vector>
@@ -51,6 +52,34 @@ inline app::LoopRecords run_twice(const app::Scenario& scenario, const std::vect
     same = same && first.ticks[i].force == second.ticks[i].force && first.ticks[i].torque == second.ticks[i].torque;
   CHECK(same);
   return first;
+}
+
+/// What a scripted session has torn, solved every 100 ticks, its force neither limited nor watched.
+struct TearingLoop {
+  int tearing = 0;           // solves
+  double peak = 0, jump = 0; // N, of the tissue's force; from tick to tick
+};
+
+inline TearingLoop tear_in_loop(const app::Scenario& scenario, std::uint64_t ticks) {
+  app::HapticSettings settings;
+  settings.passivity = false;
+  settings.limits.force = settings.limits.slew = 1e6;
+  app::HapticSimulation simulation(scenario);
+  app::ScriptedPath device(simulation.path(), settings.rate);
+  const app::LoopRecords records =
+      app::run_virtual(settings, simulation, device, app::regular_solves(ticks, 100, 50), ticks);
+  TearingLoop loop;
+  for (const app::SolveRecord& solve : records.solves) {
+    INFO(solve.reason);
+    CHECK_FALSE(solve.failed);
+    loop.tearing += solve.cut_triangles > 0 ? 1 : 0;
+  }
+  for (std::size_t k = 1; k < records.ticks.size(); ++k) {
+    loop.peak = std::max(loop.peak, records.ticks[k].tissue.norm());
+    if (records.ticks[k - 1].sequence > 0)
+      loop.jump = std::max(loop.jump, (records.ticks[k].tissue - records.ticks[k - 1].tissue).norm());
+  }
+  return loop;
 }
 
 } // namespace spherecut::tests

@@ -1,10 +1,10 @@
 // Bodies whose law is not linear that tear: a strip in pure shear against its closed form, a peel at small strain
 // against the linear one, a flap that is folded back.
-#include "solvers/elasticity/prestrained_law.hpp"
-#include "src/live/virtual_loop.hpp"
+#include "experiments/pure_shear_crack/strip_scenario.hpp"
 #include "src/model/finite_model.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
+#include "tests/src/virtual_session.hpp"
 #include "topology/wound/piece_audit.hpp"
 
 #include <catch2/catch.hpp>
@@ -17,56 +17,23 @@ using Catch::Contains;
 
 namespace {
 
-constexpr double modulus = 6000, nu = 0.45, height = 0.05, pull = 0.3; // Pa; m; of the strip
+constexpr double shear = 2000, nu = 0.45, stretch = 1.3, height = 0.05; // Pa, m; of the strip
 
-/// A strip between clamps that is given as stretched by 1 + pull, with a crack along its middle.
-std::string stretched_strip(double toughness, const std::string& more) {
-  return fmt::format(R"([organ]
-shape = "block"
-size = [0.2, {}, 0.02]
-[material]
-law = "neo_hookean"
-young_modulus = {}
-poisson_ratio = {}
-pretension = [0, {}, 0]
-toughness = {}
-[[fixed]]
-region = "half_space"
-point = [0, {}, 0]
-normal = [0, 1, 0]
-axes = ["x", "y"]
-[[fixed]]
-region = "half_space"
-point = [0, {}, 0]
-normal = [0, -1, 0]
-axes = ["x", "y"]
-[[fixed]]
-region = "half_space"
-point = [0, 0, 1e-6]
-normal = [0, 0, 1]
-axes = ["z"]
-)",
-                     height, modulus, nu, pull, toughness, -0.5 * height + 1e-6, 0.5 * height - 1e-6) +
-         node_spacings("0.006", "0.012") +
-         rectangle_precut("[-0.06, 0, 0.01]", "[0, 1, 0]", "[0, 0, 1]", "0.08", "0.04") +
-         "[tearing]\nmost_increments = 4\n" + more;
+double strip_release() {
+  return experiments::strip_release({solvers::NeoHookeanLaw{shear}, solvers::bulk_modulus_of(shear, nu), {}}, stretch,
+                                    height);
 }
 
-/// Energy of the strip far ahead of the crack: its thickness is free.
-double pure_shear_energy() {
-  const double mu = modulus / (2 * (1 + nu));
-  const auto law =
-      solvers::prestrained(solvers::make_law({solvers::NeoHookeanLaw{mu}, solvers::bulk_modulus_of(mu, nu), {}}),
-                           Matrix3(Vector3(1, 1 + pull, 1).asDiagonal()));
-  double least = std::numeric_limits<double>::infinity();
-  for (double thinner = 0.7; thinner <= 1; thinner += 1e-5) {
-    const Matrix3 deformation = Vector3(1, 1, thinner).asDiagonal();
-    double energy = 0;
-    Matrix3 stress;
-    law->evaluate({&deformation, 1}, {}, {&energy, 1}, {&stress, 1});
-    least = std::min(least, energy);
-  }
-  return least;
+/// A neo-Hookean strip; `toughness`: over W H.
+std::string stretched_strip(double toughness, const std::string& more = "") {
+  const experiments::StripScenario strip{.law = "neo_hookean",
+                                         .constants = fmt::format("young_modulus = {}", 2 * (1 + nu) * shear),
+                                         .poisson_ratio = nu,
+                                         .stretch = stretch,
+                                         .toughness = toughness * strip_release(),
+                                         .height = height,
+                                         .tearing = "most_increments = 4\n"};
+  return strip.text() + more;
 }
 
 /// The half of a block above a cut is drawn up by so many metres; `law`: a line of the material, may be empty.
@@ -104,13 +71,13 @@ const std::string neo_hookean = "law = \"neo_hookean\"\n";
 } // namespace
 
 TEST_CASE("A strip of a law in pure shear tears where W H reaches the toughness, and straight on") {
-  const double wanted = pure_shear_energy() * height;
-  Session tough(scenario_of(stretched_strip(1.05 * wanted, "")));
+  const double wanted = strip_release();
+  Session tough(scenario_of(stretched_strip(1.05)));
   const StepResult rests = tough.step(tough.steps().front());
   INFO("W H = " << wanted << " J/m2, G = " << rests.tear->increments.front().release);
   CHECK(rests.tear->area == 0);
   CHECK(rests.tear->increments.front().release == Approx(wanted).epsilon(0.04));
-  Session weak(scenario_of(stretched_strip(0.95 * wanted, "")));
+  Session weak(scenario_of(stretched_strip(0.95)));
   const StepResult runs = weak.step(weak.steps().front());
   CHECK(runs.tear->increments.size() == 5);
   CHECK(runs.tear->unstable); // as it goes on, the strip ahead stays as it is
@@ -179,8 +146,7 @@ TEST_CASE("The load at which a law tears does not depend on the step") {
 }
 
 TEST_CASE("In the real-time loop a strip of a law tears solve by solve") {
-  const double wanted = pure_shear_energy() * height;
-  const Scenario scenario = scenario_of(stretched_strip(0.9 * wanted, R"([tool]
+  const TearingLoop loop = tear_in_loop(scenario_of(stretched_strip(0.9, R"([tool]
 shape = "sphere_tip"
 radius = 0.01
 step = 0.1
@@ -192,20 +158,9 @@ time = 1
 position = [0.06, 0.0, 0.026]
 [output]
 figures = false
-)"));
-  HapticSettings settings;
-  settings.passivity = false;
-  HapticSimulation simulation(scenario);
-  ScriptedPath device(simulation.path(), settings.rate);
-  constexpr std::uint64_t ticks = 600, period = 100;
-  const LoopRecords records = run_virtual(settings, simulation, device, regular_solves(ticks, period, 50), ticks);
-  int tearing = 0;
-  for (const SolveRecord& solve : records.solves) {
-    INFO(solve.reason);
-    CHECK_FALSE(solve.failed);
-    tearing += solve.cut_triangles > 0 ? 1 : 0;
-  }
-  CHECK(tearing >= 3);
+)")),
+                                        600);
+  CHECK(loop.tearing >= 3);
 }
 
 TEST_CASE("A grasper in a hand draws a body of a law as one on a path does, and lets it go") {
@@ -237,29 +192,11 @@ TEST_CASE("A grasper in a hand draws a body of a law as one on a path does, and 
 }
 
 TEST_CASE("In the real-time loop a grasper tears a body of a law and its force stays continuous") {
-  const Scenario scenario = scenario_of(replaced(peel(neo_hookean, 0.4, 0.008), "step = 0.25", "step = 0.05"));
-  HapticSettings settings;
-  settings.passivity = false;
-  settings.limits.force = settings.limits.slew = 1e6;
-  HapticSimulation simulation(scenario);
-  ScriptedPath device(simulation.path(), settings.rate);
-  constexpr std::uint64_t ticks = 900, period = 100;
-  const LoopRecords records = run_virtual(settings, simulation, device, regular_solves(ticks, period, 50), ticks);
-  int tearing = 0;
-  for (const SolveRecord& solve : records.solves) {
-    INFO(solve.reason);
-    CHECK_FALSE(solve.failed);
-    tearing += solve.cut_triangles > 0 ? 1 : 0;
-  }
-  CHECK(tearing >= 1);
-  double peak = 0, jump = 0;
-  for (std::size_t k = 1; k < records.ticks.size(); ++k) {
-    peak = std::max(peak, records.ticks[k].tissue.norm());
-    if (records.ticks[k - 1].sequence > 0)
-      jump = std::max(jump, (records.ticks[k].tissue - records.ticks[k - 1].tissue).norm());
-  }
-  CHECK(peak > 0.01);
-  CHECK(jump < 0.02 * peak); // a hand-over takes 20 ticks
+  const TearingLoop loop =
+      tear_in_loop(scenario_of(replaced(peel(neo_hookean, 0.4, 0.008), "step = 0.25", "step = 0.05")), 900);
+  CHECK(loop.tearing >= 1);
+  CHECK(loop.peak > 0.01);
+  CHECK(loop.jump < 0.02 * loop.peak); // a hand-over takes 20 ticks
 }
 
 TEST_CASE("Tears that a law does not go with are refused in words") {

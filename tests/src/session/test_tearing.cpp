@@ -1,9 +1,9 @@
 // Tears in runs: a grasper that pulls, pre-strain that drives, growth that runs away, starts without a cut, accounts.
-#include "src/live/virtual_loop.hpp"
 #include "src/output/run_output.hpp"
 #include "src/session/session.hpp"
 #include "tests/src/scenario_session.hpp"
 #include "tests/src/scenario_text.hpp"
+#include "tests/src/virtual_session.hpp"
 #include "tests/support/mesh_checks.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -344,29 +344,11 @@ TEST_CASE("A hand closes and opens the grasper whatever the scenario's times") {
 }
 
 TEST_CASE("In the real-time loop a tear goes on solve by solve and the force stays continuous") {
-  const Scenario scenario = scenario_of(replaced(replaced(peel, "0.033]", "0.036]"), "step = 0.5", "step = 0.05"));
-  HapticSettings settings;
-  settings.passivity = false;
-  settings.limits.force = settings.limits.slew = 1e6;
-  HapticSimulation simulation(scenario);
-  ScriptedPath device(simulation.path(), settings.rate);
-  constexpr std::uint64_t ticks = 900, period = 100;
-  const LoopRecords records = run_virtual(settings, simulation, device, regular_solves(ticks, period, 50), ticks);
-  int tearing = 0;
-  for (const SolveRecord& solve : records.solves) {
-    INFO(solve.reason);
-    CHECK_FALSE(solve.failed);
-    tearing += solve.cut_triangles > 0 ? 1 : 0;
-  }
-  CHECK(tearing >= 2);
-  double peak = 0, jump = 0;
-  for (std::size_t k = 1; k < records.ticks.size(); ++k) {
-    peak = std::max(peak, records.ticks[k].tissue.norm());
-    if (records.ticks[k - 1].sequence > 0)
-      jump = std::max(jump, (records.ticks[k].tissue - records.ticks[k - 1].tissue).norm());
-  }
-  CHECK(peak > 0.02);
-  CHECK(jump < 0.02 * peak); // a hand-over takes 20 ticks
+  const TearingLoop loop =
+      tear_in_loop(scenario_of(replaced(replaced(peel, "0.033]", "0.036]"), "step = 0.5", "step = 0.05")), 900);
+  CHECK(loop.tearing >= 2);
+  CHECK(loop.peak > 0.02);
+  CHECK(loop.jump < 0.02 * loop.peak); // a hand-over takes 20 ticks
 }
 
 TEST_CASE("Tears under random loads: no crash, nothing that is not finite, surfaces stay closed") {
