@@ -185,6 +185,7 @@ BladePatch condense_blade(const Discretisation& body, const Field& base, const s
     patch.compliance = 0.5 * (compliance + compliance.transpose());
   }
   patch.base = body.pattern_displacements(patterns, {base}).col(0);
+  patch.free = patch.base;
   if (patch.dragged)
     condense_drag_torque(body, base, is_same ? &before : nullptr, patch);
   if (!patch.compliance.allFinite())
@@ -210,6 +211,8 @@ BladeState push_blade(const BladePatch& patch, const VectorX& advance, double dr
   state.converged = solution.converged;
   state.displacements = patch.base + patch.compliance * state.forces;
   state.driving = quadratic(touching, solution.forces);
+  if (patch.energy != 0 && !solution.forces.head(m).isZero(0))
+    state.driving += patch.energy;
   if (n > m) { // lips that the body's own loads press together hold energy without the blade as well
     const ComplementaritySolution lips =
         solve_complementarity(touching.bottomRightCorner(n - m, n - m), free.segment(m, n - m), {}, contact_tolerance);
@@ -217,7 +220,7 @@ BladeState push_blade(const BladePatch& patch, const VectorX& advance, double dr
   }
   state.stored = state.driving;
   if (patch.dragged)
-    state.stored += drag * (state.displacements[n] - patch.base[n]) - 0.5 * drag * drag * patch.compliance(n, n);
+    state.stored += drag * (state.displacements[n] - patch.free[n]) - 0.5 * drag * drag * patch.compliance(n, n);
   for (Eigen::Index c = 0; c < m; ++c)
     state.edge_force -= state.forces[c] * patch.contacts[static_cast<std::size_t>(c)].push;
   state.blade_force = state.edge_force - drag * patch.drag;

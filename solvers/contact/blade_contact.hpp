@@ -80,7 +80,11 @@ struct BladePatch {
   MatrixX drag_torques;
   MatrixX compliance;
   VectorX base;
-  std::vector<Field> responses;
+  VectorX free; // m, one an entry: its displacement without blade
+  /// J, of edge and lips beyond forces * compliance * forces / 2 where the edge presses: not 0 where the entries are
+  /// those of small motions about a state at finite strain.
+  double energy = 0;
+  std::vector<Field> responses; // none at finite strain
 };
 
 /// Condenses onto contacts, pairs (may be empty) and drag (may hold no points). `base` is the field without blade.

@@ -25,6 +25,7 @@ constexpr int most_times = 20;                    // the iterations of a round, 
 constexpr int most_factorisations = 200;          // before a solve gives up
 constexpr double stride_of_friction = 0.1;        // of the tool's tip radius, at most, in one step
 constexpr double stride_of_bonding = 0.5;         // likewise
+constexpr int first_edge_key = -1'000'000'000;    // far below those of lips
 constexpr double floor_of_forces = 1e-8;          // mu h^2 of it: forces below are none
 
 /// Whether a solve has taken all that it may by this method.
@@ -106,6 +107,25 @@ void Equilibrium::set_lips(std::vector<LipPair> pairs) {
   has_before_ = false;
 }
 
+void Equilibrium::set_edges(std::vector<UnilateralMean> edges, std::vector<double> forces) {
+  if (!forces.empty() && forces.size() != edges.size())
+    throw InputError(fmt::format("{} forces of {} pieces of an edge", forces.size(), edges.size()));
+  edges_.reset();
+  responses_.erase(responses_.begin(), responses_.upper_bound(first_edge_key));
+  memory_.clear();
+  has_before_ = false;
+  forces.resize(edges.size(), 0);
+  state_.edge_forces = std::move(forces);
+  state_.advances = VectorX::Zero(std::ssize(edges));
+  if (edges.empty())
+    return;
+  edges_.emplace(first_edge_key);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    state_.advances[static_cast<Eigen::Index>(e)] = edges[e].direction.dot(edges[e].mean.of(state_.coefficients));
+    edges_->add(std::move(edges[e]));
+  }
+}
+
 void Equilibrium::set_coefficients(const VectorX& coefficients, double load_factor,
                                    const std::optional<topology::ToolPose>& tool, std::vector<ContactShare> shares) {
   if (coefficients.size() != 3 * static_cast<Eigen::Index>(body_.size()) || !coefficients.allFinite())
@@ -125,6 +145,8 @@ void Equilibrium::set_coefficients(const VectorX& coefficients, double load_fact
   state_.shares = std::move(shares);
   state_.gripped = 0;
   std::fill(state_.lip_forces.begin(), state_.lip_forces.end(), 0.0);
+  std::fill(state_.edge_forces.begin(), state_.edge_forces.end(), 0.0);
+  state_.forces.resize(0);
   reactions_.assign(body_.held().entries().size(), Vector3::Zero());
   state_.prescribed.clear();
   for (const DisplacementMean& mean : body_.held().means())
@@ -153,6 +175,15 @@ Equilibrium::State Equilibrium::target_of(const FiniteLoading& loading) const {
   }
   target.shares = state_.shares;
   target.lip_forces = state_.lip_forces;
+  target.edge_forces = state_.edge_forces;
+  if (loading.forces.size() > 0 && (loading.forces.size() != state_.coefficients.size() || !loading.forces.allFinite()))
+    throw InputError(fmt::format("{} nodal forces; {} finite numbers are wanted, N", loading.forces.size(),
+                                 state_.coefficients.size()));
+  target.forces = loading.forces;
+  target.advances = loading.advances.size() > 0 ? loading.advances : state_.advances;
+  if (target.advances.size() != state_.advances.size() || !target.advances.allFinite())
+    throw InputError(fmt::format("{} advances of an edge of {} pieces; one finite number a piece is wanted, m",
+                                 target.advances.size(), state_.advances.size()));
   return target;
 }
 
@@ -161,6 +192,12 @@ Equilibrium::State Equilibrium::between(const State& from, const State& to, doub
   for (std::size_t k = 0; k < to.prescribed.size(); ++k)
     state.prescribed[k] = (1 - part) * from.prescribed[k] + part * to.prescribed[k];
   state.load_factor = (1 - part) * from.load_factor + part * to.load_factor;
+  state.advances = (1 - part) * from.advances + part * to.advances;
+  if (from.forces.size() > 0 || to.forces.size() > 0) {
+    const VectorX none = VectorX::Zero(from.coefficients.size());
+    state.forces =
+        (1 - part) * (from.forces.size() > 0 ? from.forces : none) + part * (to.forces.size() > 0 ? to.forces : none);
+  }
   if (from.tool && to.tool) {
     state.tool->point = (1 - part) * from.tool->point + part * to.tool->point;
     const Vector3 axis = (1 - part) * from.tool->axis + part * to.tool->axis;
@@ -173,7 +210,8 @@ Equilibrium::State Equilibrium::between(const State& from, const State& to, doub
 /// Everything that moves, as lengths: the way from one state to another.
 VectorX Equilibrium::motion(const State& from, const State& to) const {
   const auto entries = static_cast<Eigen::Index>(to.prescribed.size());
-  VectorX way = VectorX::Zero(3 * entries + 7);
+  VectorX way = VectorX::Zero(3 * entries + 7 + to.advances.size());
+  way.tail(to.advances.size()) = to.advances - from.advances;
   for (Eigen::Index k = 0; k < entries; ++k)
     way.segment<3>(3 * k) = to.prescribed[k] - from.prescribed[k];
   const double size = std::cbrt(body_.volume());
@@ -203,6 +241,9 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
   const bool had_before = has_before_;
   const std::vector<Vector3> reactions = reactions_;
   EquilibriumStatus status;
+  if (!(loading.tolerance >= 0 && loading.tolerance < 1))
+    throw InputError(fmt::format("tolerance {} of the unbalanced forces; allowed: 0 to below 1", loading.tolerance));
+  tolerance_ = loading.tolerance > 0 ? loading.tolerance : options_.tolerance;
   least_seen_ = last_residual_ = 1;
   last_unsettled_ = 0;
   const auto go_back = [&] {
@@ -233,15 +274,15 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
         "no equilibrium found: {:.3g} of the step was reached in {} iterations and {} halvings; the unbalanced force "
         "is {:.3g} of the acting ones (limit {:.3g}), the least volume ratio {:.3g}{}{}{}; the condition of the rest "
         "stiffness is {:.3g}",
-        reached, status.iterations, status.halvings, last_residual_, options_.tolerance, least_seen_,
+        reached, status.iterations, status.halvings, last_residual_, tolerance_, least_seen_,
         least_seen_ <= options_.least_jacobian ? ": the body is about to be inverted" : "",
-        last_residual_ < options_.tolerance && deepest(target) > options_.penetration
+        last_residual_ < tolerance_ && deepest(target) > options_.penetration
             ? fmt::format(", the surface {:.3g} spacings deep in {} (limit {:.3g})", deepest(target),
                           contact_ && target.tool && contact_->deepest() > options_.penetration ? "the tool"
                                                                                                 : "itself at a cut",
                           options_.penetration)
             : "",
-        last_residual_ < options_.tolerance && last_unsettled_ > 0
+        last_residual_ < tolerance_ && last_unsettled_ > 0
             ? fmt::format(", friction or bonds still change by {:.3g} of the acting forces a round", last_unsettled_)
             : "",
         rest_.condition()));
@@ -340,7 +381,7 @@ MatrixX Equilibrium::contact_compliance(const std::vector<int>& chosen) {
           map_of(i) * rest_compliance_.matrix.block<3, 3>(3 * i, 3 * j) * map_of(j).transpose();
   std::vector<ActiveConstraint> closed;
   if (lips_)
-    lips_->append_active(maps, closed);
+    lips_->contact().append_active(maps, closed);
   if (closed.empty())
     return carried;
   const auto count = std::ssize(closed);
@@ -404,7 +445,16 @@ bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus&
     if (ahead != 0 && before_.lip_forces.size() == forces.size())
       for (std::size_t p = 0; p < forces.size(); ++p)
         forces[p] = std::max(0.0, forces[p] + ahead * (forces[p] - before_.lip_forces[p]));
-    lips_->set_known_forces(forces);
+    lips_->contact().set_known_forces(forces);
+  }
+  if (edges_) {
+    std::vector<double> forces = state_.edge_forces;
+    if (ahead != 0 && before_.edge_forces.size() == forces.size())
+      for (std::size_t e = 0; e < forces.size(); ++e)
+        forces[e] = std::max(0.0, forces[e] + ahead * (forces[e] - before_.edge_forces[e]));
+    edges_->set_known_forces(forces);
+    for (std::size_t e = 0; e < edges_->means().size(); ++e)
+      edges_->mean(e).at_rest = -target.advances[static_cast<Eigen::Index>(e)] * edges_->means()[e].direction;
   }
   double part = 1;
   for (int trial = 0; trial < 7; ++trial, part *= 0.5) {
@@ -423,12 +473,12 @@ bool Equilibrium::begin_step(const State& target, Trial& now, EquilibriumStatus&
 /// then, and friction keeps the limits of the forces as they are then.
 bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, EquilibriumStatus& status) {
   const bool grips = minds_way() && target.tool;
-  bool converged = iterate(target, method, options_.tolerance, now, status);
+  bool converged = iterate(target, method, tolerance_, now, status);
   for (int round = 0; converged; ++round) {
     std::vector<double> balanced; // forces of the lips along the normals so far
     bool caught = false;
     if (lips_) {
-      balanced = lips_->forces();
+      balanced = lips_->contact().forces();
       lips_->turn(body_.piola_maps(now.coefficients));
     }
     if (grips)
@@ -437,7 +487,7 @@ bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, E
       evaluate(now.coefficients, target, now, status);
       status.residual = now.residual.norm() / now.acting;
     }
-    if (status.residual < options_.tolerance && deepest(target) <= options_.penetration && is_settled(target, now))
+    if (status.residual < tolerance_ && deepest(target) <= options_.penetration && is_settled(target, now))
       break;
     if (round == most_contact_rounds)
       return false;
@@ -446,12 +496,14 @@ bool Equilibrium::settle(const State& target, FiniteMethod method, Trial& now, E
     else if (contact_)
       contact_->accept_forces();
     if (lips_)
-      lips_->set_known_forces(balanced);
+      lips_->contact().set_known_forces(balanced);
+    if (edges_)
+      edges_->accept_forces();
     // The forces of contact have risen by what is unbalanced now. Where loads or a pre-strain are much larger, that may
     // be below the tolerance; the body has to yield to it all the same before they rise again.
     evaluate(now.coefficients, target, now, status);
     const double risen = now.residual.norm() / now.acting;
-    converged = iterate(target, method, std::min(options_.tolerance, left_of_a_rise * risen), now, status);
+    converged = iterate(target, method, std::min(tolerance_, left_of_a_rise * risen), now, status);
   }
   return converged;
 }
@@ -464,7 +516,7 @@ bool Equilibrium::is_settled(const State& target, const Trial& now) const {
   if (!contact_ || !target.tool)
     return true;
   const double gripping = std::max(contact_->force_norm(), state_.gripped); // loads may be far larger
-  return contact_->unsettled() <= std::max(options_.unsettled * gripping, options_.tolerance * now.acting);
+  return contact_->unsettled() <= std::max(options_.unsettled * gripping, tolerance_ * now.acting);
 }
 
 /// The state becomes that of the trial, which is in equilibrium.
@@ -484,9 +536,14 @@ void Equilibrium::accept_step(const State& target, const Trial& now, Equilibrium
     status.tool_torque = contact_->tool_torque();
   }
   if (lips_) {
-    lips_->accept_forces();
-    next.lip_forces = lips_->known_forces();
-    status.closed = lips_->touching();
+    lips_->contact().accept_forces();
+    next.lip_forces = lips_->contact().known_forces();
+    status.closed = lips_->contact().touching();
+  }
+  if (edges_) {
+    edges_->accept_forces();
+    next.edge_forces = edges_->known_forces();
+    status.pressing = edges_->touching();
   }
   status.penetration = deepest(target);
   before_ = std::move(state_);
@@ -524,8 +581,17 @@ void Equilibrium::evaluate(const VectorX& coefficients, const State& target, Tri
     contact_->release();
   }
   if (lips_) {
-    trial.energy += lips_->add(trial.coefficients, residual);
-    trial.acting = std::max(trial.acting, lips_->force_norm());
+    trial.energy += lips_->contact().add_forces(trial.coefficients, residual);
+    trial.acting = std::max(trial.acting, lips_->contact().force_norm());
+  }
+  if (edges_) {
+    trial.energy += edges_->add_forces(trial.coefficients, residual);
+    trial.acting = std::max(trial.acting, edges_->force_norm());
+  }
+  if (target.forces.size() > 0) {
+    residual -= target.forces;
+    trial.energy -= target.forces.dot(trial.coefficients);
+    trial.acting = std::max(trial.acting, target.forces.norm());
   }
   residual -= target.load_factor * body_.loads();
   trial.energy -= target.load_factor * body_.loads().dot(trial.coefficients);
@@ -576,15 +642,18 @@ VectorX Equilibrium::predict(const State& target) {
 }
 
 double Equilibrium::deepest(const State& target) const {
-  return std::max(contact_ && target.tool ? contact_->deepest() : 0.0, lips_ ? lips_->deepest() : 0.0);
+  return std::max({contact_ && target.tool ? contact_->deepest() : 0.0, lips_ ? lips_->contact().deepest() : 0.0,
+                   edges_ ? edges_->deepest() : 0.0});
 }
 
-std::vector<ActiveConstraint> Equilibrium::active_constraints(const std::vector<Matrix3>& maps) const {
+std::vector<ActiveConstraint> Equilibrium::active_constraints(const std::vector<Matrix3>& maps, bool with_edges) const {
   std::vector<ActiveConstraint> constraints;
   if (contact_)
     contact_->append_active(maps, constraints);
   if (lips_)
-    lips_->append_active(maps, constraints);
+    lips_->contact().append_active(maps, constraints);
+  if (edges_ && with_edges)
+    edges_->append_active(maps, constraints);
   return constraints;
 }
 
@@ -595,16 +664,30 @@ std::vector<int> Equilibrium::touching() const {
   return keys;
 }
 
-VectorX Equilibrium::precondition(const VectorX& residual) {
-  VectorX carried(residual.size()), answer;
-  for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
-    carried.segment<3>(3 * i) = maps_[i].transpose() * residual.segment<3>(3 * i);
+VectorX Equilibrium::answer_of(const VectorX& forces, const std::vector<Matrix3>& maps,
+                               const std::vector<ActiveConstraint>& constraints) {
+  VectorX carried(forces.size()), answer;
+  for (Eigen::Index i = 0; i < std::ssize(maps); ++i)
+    carried.segment<3>(3 * i) = maps[i].transpose() * forces.segment<3>(3 * i);
   preconditioner().solve(carried, answer);
-  correct(preconditioner(), active_constraints(maps_), responses_, answer);
-  for (Eigen::Index i = 0; i < std::ssize(maps_); ++i)
-    answer.segment<3>(3 * i) = (maps_[i] * answer.segment<3>(3 * i)).eval();
+  correct(preconditioner(), constraints, responses_, answer);
+  for (Eigen::Index i = 0; i < std::ssize(maps); ++i)
+    answer.segment<3>(3 * i) = (maps[i] * answer.segment<3>(3 * i)).eval();
   body_.held().complete(answer, {});
   return answer;
+}
+
+VectorX Equilibrium::precondition(const VectorX& residual) {
+  return answer_of(residual, maps_, active_constraints(maps_));
+}
+
+MatrixX Equilibrium::responses(const MatrixX& forces) {
+  const std::vector<Matrix3> maps = carrying(body_.piola_maps(state_.coefficients));
+  const std::vector<ActiveConstraint> touching = active_constraints(maps, false);
+  MatrixX moved(forces.rows(), forces.cols());
+  for (Eigen::Index j = 0; j < forces.cols(); ++j)
+    moved.col(j) = answer_of(forces.col(j), maps, touching);
+  return moved;
 }
 
 VectorX Equilibrium::newton_direction(const Trial& now, EquilibriumStatus& status) {

@@ -42,9 +42,12 @@ struct EquilibriumOptions {
 
 /// What the body is to be in equilibrium with.
 struct FiniteLoading {
-  std::vector<Vector3> prescribed;        // m, one per entry of the problem; empty: those of the problem
-  double load_factor = 1;                 // of the problem's loads
-  std::optional<topology::ToolPose> tool; // needs a contact; empty: no tool
+  std::vector<Vector3> prescribed;          // m, one per entry of the problem; empty: those of the problem
+  double load_factor = 1;                   // of the problem's loads
+  std::optional<topology::ToolPose> tool{}; // needs a contact; empty: no tool
+  VectorX forces{};                         // N, 3 a node, dead, beside those of the loads; empty: none
+  double tolerance = 0;                     // in place of that of the options; 0: that it is
+  VectorX advances{};                       // m, of each edge (set_edges()); empty: they are where they were
 };
 
 struct EquilibriumStatus {
@@ -56,6 +59,7 @@ struct EquilibriumStatus {
   double energy = 0;                     // J, strain energy
   int touching = 0;                      // shares that touch the tool
   int closed = 0;                        // pairs of lips that touch each other
+  int pressing = 0;                      // edges that press
   double penetration = 0;                // in spacings, of the tool or of lips, or of what is bonded off its place
   Vector3 tool_force = Vector3::Zero();  // N, of the body on the tool
   Vector3 tool_torque = Vector3::Zero(); // N m, of the same about the tool's point
@@ -81,6 +85,11 @@ class Equilibrium {
   /// Faces of a cut that do not go through each other; as FiniteLips.
   void set_lips(std::vector<LipPair> pairs);
 
+  /// Pieces of the edge of a blade, in place of those before, and the forces that they are taken to bear at first, N:
+  /// each keeps its mean, along its direction, beyond its advance (FiniteLoading::advances). None: there is no blade.
+  void set_edges(std::vector<UnilateralMean> edges, std::vector<double> forces = {});
+  [[nodiscard]] const UnilateralMeans* edges() const { return edges_ ? &*edges_ : nullptr; }
+
   /// Goes from the present state to equilibrium with the loading. Throws NumericalError in words when there is none to
   /// be found (with residual, least J, the part of the step reached and the condition of the rest operator), InputError
   /// for a loading that does not fit the body, and what a law of functions throws: the state is then what it was
@@ -104,6 +113,9 @@ class Equilibrium {
   /// `chosen`: places in contact()->candidates(). 3 rows and columns each, symmetric, m/N. Throws InputError without a
   /// contact.
   [[nodiscard]] MatrixX contact_compliance(const std::vector<int>& chosen);
+  /// Displacements that small nodal forces, N, 3 a node, cause in the present state, tool and lips as they touch, edges
+  /// taken away: a column each, m. By the rest operator, as contact_compliance().
+  [[nodiscard]] MatrixX responses(const MatrixX& forces);
   [[nodiscard]] const FiniteLips* lips() const { return lips_ ? &*lips_ : nullptr; }
 
  private:
@@ -113,8 +125,9 @@ class Equilibrium {
     double load_factor = 0;
     std::optional<topology::ToolPose> tool;
     std::vector<ContactShare> shares; // of the contact
-    std::vector<double> lip_forces;
-    double gripped = 0; // N, norm of the nodal forces of a tool that is not without friction
+    std::vector<double> lip_forces, edge_forces;
+    VectorX forces, advances; // as those of the loading
+    double gripped = 0;       // N, norm of the nodal forces of a tool that is not without friction
   };
   struct CarriedTangent { // at a state that has been
     CarriedTangent(RestOperator tangent, std::vector<Matrix3> maps_back)
@@ -148,7 +161,11 @@ class Equilibrium {
   [[nodiscard]] double extrapolation(const State& target) const;
   [[nodiscard]] VectorX predict(const State& target);
   [[nodiscard]] VectorX precondition(const VectorX& residual);
-  [[nodiscard]] std::vector<ActiveConstraint> active_constraints(const std::vector<Matrix3>& maps) const;
+  [[nodiscard]] std::vector<ActiveConstraint> active_constraints(const std::vector<Matrix3>& maps,
+                                                                 bool with_edges = true) const;
+  /// What nodal forces move the body by, with these maps that carry the preconditioner's and these constraints.
+  [[nodiscard]] VectorX answer_of(const VectorX& forces, const std::vector<Matrix3>& maps,
+                                  const std::vector<ActiveConstraint>& constraints);
   /// Keys of the constraints that were active at the last evaluation.
   [[nodiscard]] std::vector<int> touching() const;
   /// Deepest that the tool lies in the body or lips in each other at the last evaluation, spacings.
@@ -163,6 +180,7 @@ class Equilibrium {
   RestOperator rest_;
   std::optional<FiniteContact> contact_;
   std::optional<FiniteLips> lips_;
+  std::optional<UnilateralMeans> edges_;
   std::unique_ptr<CarriedTangent> tangent_; // null: the rest operator preconditions
   int excess_ = 0;                          // iterations beyond the few of a step since that was chosen
   ConstraintResponses responses_;           // of the preconditioner
@@ -178,6 +196,7 @@ class Equilibrium {
   FiniteForces forces_;
   std::vector<Vector3> reactions_;
   double least_seen_ = 1, last_residual_ = 0, last_unsettled_ = 0;
+  double tolerance_ = 0; // of this solve
   double prestrain_forces_ = 0; // N, norm of those that the pre-strain of the body at rest exerts
 };
 

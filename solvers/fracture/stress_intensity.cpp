@@ -54,6 +54,16 @@ double energy_release_rate(const Material& material, const Intensities& k) {
   return (k[0] * k[0] + k[1] * k[1]) / plane_strain_modulus(material) + k[2] * k[2] / (2 * material.shear_modulus());
 }
 
+Intensities at_kink(const Intensities& k, double angle) {
+  const double c = std::cos(angle / 2), s = std::sin(angle / 2), c3 = std::cos(1.5 * angle), s3 = std::sin(1.5 * angle);
+  return {0.25 * (3 * c + c3) * k[0] - 0.75 * (s + s3) * k[1], 0.25 * (s + s3) * k[0] + 0.25 * (c + 3 * c3) * k[1],
+          k[2]};
+}
+
+double angle_across(const FrontFrame& frame, const Vector3& direction) {
+  return std::atan2(direction.dot(frame.normal), direction.dot(frame.ahead));
+}
+
 std::vector<FrontFrame> front_samples(const topology::Incision& incision, double spacing, double margin) {
   if (!(spacing > 0))
     throw InputError(fmt::format("front samples {} m apart: the distance must be positive", spacing));
@@ -90,6 +100,7 @@ Intensities displacement_correlation(const Problem& problem, const FrontFrame& f
   const double h = spacing_at(problem.nodes, front.point);
   Eigen::Matrix2d normal_matrix = Eigen::Matrix2d::Zero();
   Eigen::Matrix<double, 2, 3> right = Eigen::Matrix<double, 2, 3>::Zero();
+  Vector3 normal = Vector3::Zero();
   for (int k = 0; k < options.samples; ++k) {
     const double s = h * (options.from + (options.to - options.from) * (k + 0.5) / options.samples);
     const auto face = incision.closest(front.point - s * front.ahead, 0.5 * s);
@@ -99,17 +110,22 @@ Intensities displacement_correlation(const Problem& problem, const FrontFrame& f
                                    s, front.point.x(), front.point.y(), front.point.z()));
     const Vector3 off = lip_offset * h * face->normal;
     const Vector3 apart = jump(face->point + off, face->point - off);
-    const Eigen::Vector2d terms(std::sqrt(s), s * std::sqrt(s));
-    const double weight = 1 / std::sqrt(s);
+    const double away = (front.point - face->point).norm();
+    const Eigen::Vector2d terms(std::sqrt(away), away * std::sqrt(away));
+    const double weight = 1 / std::sqrt(away);
     normal_matrix += weight * terms * terms.transpose();
-    right +=
-        weight * terms * Vector3(apart.dot(front.normal), apart.dot(front.ahead), apart.dot(front.tangent)).transpose();
+    right += weight * terms * apart.transpose();
+    normal += face->normal;
   }
-  const Vector3 leading = normal_matrix.inverse().row(0) * right;
+  // Of the sheet behind, in the plane across the front.
+  normal = (normal - normal.dot(front.tangent) * front.tangent).normalized();
+  const Vector3 ahead = front.tangent.cross(normal);
+  const Vector3 leading = (normal_matrix.inverse().row(0) * right).transpose();
   const Material& material = problem.material;
   const double plane = plane_strain_modulus(material) * std::sqrt(2 * std::numbers::pi) / 8;
-  return {plane * leading[0], plane * leading[1],
-          material.shear_modulus() * std::sqrt(2 * std::numbers::pi) / 4 * leading[2]};
+  const Intensities behind(plane * leading.dot(normal), plane * leading.dot(ahead),
+                           material.shear_modulus() * std::sqrt(2 * std::numbers::pi) / 4 * leading.dot(front.tangent));
+  return at_kink(behind, -angle_across(front, ahead));
 }
 
 namespace {

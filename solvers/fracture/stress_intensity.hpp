@@ -19,11 +19,20 @@ TipField tip_field(const Material& material, const Intensities& k, double ahead,
 /// G = (K_I^2 + K_II^2)(1 - nu^2)/E + K_III^2/(2 mu), J/m2.
 double energy_release_rate(const Material& material, const Intensities& k);
 
+/// Intensities at the tip of a short kink off a front, in the plane across it; `angle` rad, positive to the + side
+/// [Cotterell and Rice 1980].
+Intensities at_kink(const Intensities& k, double angle);
+
+/// Angle from the way ahead of `frame` to a direction, rad, in the plane across the front, positive to the + side.
+double angle_across(const topology::FrontFrame& frame, const Vector3& direction);
+
 /// Frames of points along the front, about `spacing` m apart and no nearer than `margin` m to the surface of the body.
 std::vector<topology::FrontFrame> front_samples(const topology::Incision& incision, double spacing, double margin = 0);
 
 /// The jump u+ - u- at distances s = h .. 4 h behind the front, components (normal, ahead, tangent) fitted by
-/// A s^(1/2) + B s^(3/2): K from A.
+/// A s^(1/2) + B s^(3/2): K from A. The components are those of the sheet as it lies there, in the mean; where the front
+/// has turned since, it is taken as the tip of a short kink (at_kink()): a front that followed the jump in its own
+/// axes would turn back by twice the angle, and so from side to side.
 struct CorrelationOptions {
   double from = 1, to = 4; // in units of the node spacing at the front
   int samples = 9;

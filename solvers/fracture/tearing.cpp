@@ -149,23 +149,6 @@ std::vector<FrontState> front_states(const Problem& problem, const std::vector<F
   return states;
 }
 
-namespace {
-
-/// Intensities at the tip of a short kink off a front, in the plane across it; `angle` rad, positive to the + side
-/// [Cotterell and Rice 1980].
-Intensities turned(const Intensities& k, double angle) {
-  const double c = std::cos(angle / 2), s = std::sin(angle / 2), c3 = std::cos(1.5 * angle), s3 = std::sin(1.5 * angle);
-  return {0.25 * (3 * c + c3) * k[0] - 0.75 * (s + s3) * k[1], 0.25 * (s + s3) * k[0] + 0.25 * (c + 3 * c3) * k[1],
-          k[2]};
-}
-
-/// Angle in the plane across `frame` of a direction, rad.
-double angle_of(const FrontFrame& frame, const Vector3& direction) {
-  return std::atan2(direction.dot(frame.normal), direction.dot(frame.ahead));
-}
-
-} // namespace
-
 std::vector<FrontState> averaged(const Material& material, const std::vector<FrontState>& states, double length) {
   std::vector<FrontState> result = states;
   for (FrontState& state : result) {
@@ -175,7 +158,7 @@ std::vector<FrontState> averaged(const Material& material, const std::vector<Fro
       if (other.frame.normal.dot(state.frame.normal) < 0.5)
         continue; // of another front
       const double weight = std::exp(-0.5 * (other.frame.point - state.frame.point).squaredNorm() / (length * length));
-      sum += weight * turned(other.intensities, -angle_of(state.frame, other.frame.ahead));
+      sum += weight * at_kink(other.intensities, -angle_across(state.frame, other.frame.ahead));
       weights += weight;
     }
     state.intensities = sum / weights;
@@ -291,7 +274,7 @@ std::function<Vector3(const FrontFrame&)> tear_motion(std::vector<FrontState> st
     if (!(weights > 0))
       return Vector3::Zero();
     length /= weights;
-    const double angle = angle_of(frame, direction);
+    const double angle = angle_across(frame, direction);
     return length * (std::cos(angle) * frame.ahead + std::sin(angle) * frame.normal);
   };
 }

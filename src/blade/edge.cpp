@@ -1,6 +1,7 @@
 // Where the edge of a blade meets the body: contacts, lips beside it, drag of its flanks, how far it pushes.
 #include "src/blade/edge.hpp"
 
+#include "src/model/finite_model.hpp"
 #include "src/scenario/schedule.hpp"
 #include "topology/base/errors.hpp"
 
@@ -201,6 +202,7 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
     return meeting;
   const solvers::BladePatch* known = last.is_with(body) ? &last.patch : nullptr;
   meeting.body = body.body.get();
+  meeting.finite = body.finite.get();
   meeting.incision = body.incision;
   meeting.nodes = body.sprinkling.nodes.positions;
   for (std::size_t c = 0; known != nullptr && c < contacts.size(); ++c) { // rounding moves them from step to step
@@ -217,6 +219,10 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
     course += contact.length * contact.push;
   meeting.drawn_back = (poses.back().position - poses[poses.size() - 2].position).dot(course) < 0;
   const solvers::ForcePattern flanks = drag(body, contacts, meeting.drawn_back ? Vector3(-course) : course);
+  if (body.finite != nullptr) {
+    meeting.patch = body.finite->edge_patch(contacts, half_width_, flanks);
+    return meeting;
+  }
   const solvers::Field base = without_lips(body);
   std::vector<solvers::LipPair> pairs;
   std::vector<char> used(body.pairs.size(), 0);
@@ -289,7 +295,7 @@ double BladeEdge::reach(const EdgeMeeting& meeting, Eigen::Index contact, const 
       is_cut_ahead = !on->on_border;
   if (!is_cut_ahead)
     depth = std::max(depth, -domain_->signed_distance(x - (there.push.dot(x - there.point) + spacing_) * there.push));
-  return meeting.patch.base[contact] + depth_factor * std::max(0.0, depth);
+  return meeting.patch.free[contact] + depth_factor * std::max(0.0, depth);
 }
 
 VectorX BladeEdge::advances(const EdgeMeeting& meeting, const BodyModel& body, const topology::BladePose& pose) const {
@@ -309,7 +315,7 @@ bool BladeEdge::pushes(const EdgeMeeting& meeting, const BodyModel& body, const 
   for (Eigen::Index c = 0; c < motion.size(); ++c) {
     const int piece = meeting.pieces[static_cast<std::size_t>(c)];
     const Vector3 x = placed(pose, pieces_[static_cast<std::size_t>(piece)].point);
-    if (motion[c] > meeting.patch.base[c] && motion[c] < reach(meeting, c, body, to_rest, x))
+    if (motion[c] > meeting.patch.free[c] && motion[c] < reach(meeting, c, body, to_rest, x))
       return true;
   }
   return false;

@@ -25,10 +25,12 @@ struct EdgeMeeting {
   bool drawn_back = false;   // the blade goes back: its flanks drag the other way
   // The body, whose patch serves for the next meeting as well.
   const solvers::Discretisation* body = nullptr;
+  const FiniteModel* finite = nullptr;
   std::shared_ptr<const topology::Incision> incision;
   std::vector<Vector3> nodes; // m
   [[nodiscard]] bool is_with(const BodyModel& model) const {
-    return body == model.body.get() && incision == model.incision && nodes == model.sprinkling.nodes.positions;
+    return body == model.body.get() && finite == model.finite.get() && incision == model.incision &&
+           nodes == model.sprinkling.nodes.positions;
   }
 };
 
@@ -62,7 +64,7 @@ class BladeEdge {
   /// Whether all of it that is inside lies in the open cut, away from its front.
   [[nodiscard]] bool is_in_open_cut(const topology::BladePose& pose, const BodyModel& body) const;
   /// The body where the edge meets it on its way from poses[front] to the last. What is as it was in the `last` meeting
-  /// is not solved for again.
+  /// is not solved for again. At finite strain the patch is that of a body without blade.
   [[nodiscard]] EdgeMeeting meet(const BodyModel& body, const BladePoses& poses, std::size_t front,
                                  const EdgeMeeting& last) const;
   /// Of each piece of the edge that meets something, past its contact's rest position, m.

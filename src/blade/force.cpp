@@ -1,7 +1,9 @@
 // How a blade goes on against tissue that resists it, and cuts.
 #include "src/blade/force.hpp"
 
+#include "src/model/finite_model.hpp"
 #include "src/scenario/schedule.hpp"
+#include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -29,9 +31,18 @@ void BladeForce::go_to(std::span<const topology::BladePose> poses, const BodyMod
   if (tears_ && !proposal_)
     way_.skip_open_cut(edge_, body);
   meeting_ = edge_.meet(body, way_.poses(), 0, meeting_);
-  if (proposal_)
-    proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, proposal_->meeting);
   press(body);
+  if (!proposal_)
+    return;
+  const EdgeMeeting last = proposal_->meeting;
+  proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, last);
+  try {
+    press_proposal();
+  } catch (const NumericalError&) { // small motions about the last equilibrium have to do
+    if (last.pieces != proposal_->meeting.pieces)
+      throw;
+    proposal_->meeting = last;
+  }
 }
 
 void BladeForce::meet_again(const BodyModel& now) {
@@ -67,12 +78,26 @@ void BladeForce::lift() {
   ledger_.stored = 0;
 }
 
+// A body at finite strain is solved with the edge there, and its patch becomes that of small motions about this state.
+solvers::BladeState BladeForce::state_at(EdgeMeeting& meeting, const BodyModel& body, const VectorX& advance) {
+  if (body.finite != nullptr)
+    body.finite->press_edge(advance, drag_of(meeting), meeting.patch);
+  return solvers::push_blade(meeting.patch, advance, drag_of(meeting));
+}
+
 // The state of the edge where it is.
 void BladeForce::press(const BodyModel& now) {
   state_.reset();
   if (!meeting_.pieces.empty())
-    state_ =
-        solvers::push_blade(meeting_.patch, edge_.advances(meeting_, now, way_.at()), meeting_.patch.dragged ? 1 : 0);
+    state_ = state_at(meeting_, now, edge_.advances(meeting_, now, way_.at()));
+  else if (now.finite != nullptr)
+    now.finite->leave_edge();
+}
+
+void BladeForce::press_proposal() {
+  EdgeMeeting& meeting = proposal_->meeting;
+  if (proposal_->body.finite != nullptr && !meeting.pieces.empty())
+    static_cast<void>(state_at(meeting, proposal_->body, edge_.advances(meeting, proposal_->body, way_.at())));
 }
 
 std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
@@ -164,8 +189,14 @@ void BladeForce::propose(BodyModel body, std::size_t poses, double drawn) {
   next.way = way_.travel(edge_, 0, way_.last());
   next.poses = poses + (proposal_ ? proposal_->poses : 0);
   next.body = std::move(body);
-  proposal_ = std::move(next);
-  proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, {});
+  std::optional<Proposal> before = std::exchange(proposal_, std::move(next));
+  try {
+    proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, {});
+    press_proposal();
+  } catch (...) {
+    proposal_ = std::move(before);
+    throw;
+  }
   proposal_->through = !edge_.inside(way_.poses()[proposal_->poses], proposal_->body);
 }
 
@@ -208,8 +239,7 @@ void BladeForce::stroke(const BodyModel& now, const topology::BladePose& target,
   const double slide = (target.position - from.position).norm();
   for (int k = 1; k <= stroke_parts; ++k) {
     const double part = share * k / stroke_parts;
-    const solvers::BladeState next =
-        solvers::push_blade(meeting_.patch, start + part * (end - start), meeting_.patch.dragged ? 1 : 0);
+    const solvers::BladeState next = state_at(meeting_, now, start + part * (end - start));
     ledger_.move(meeting_.patch, *state_, next, motion, slide * share / stroke_parts);
     state_ = next;
   }

@@ -57,7 +57,8 @@ class BladeForce {
   /// would be left with the force of steady cutting at the end of its motion.
   [[nodiscard]] std::vector<topology::BladePose> wanted(const BodyModel& now);
   /// The body with the way cut through these poses. `drawn`, J: what loads other than the blade release by that cut;
-  /// the edge has the rest to pay.
+  /// the edge has the rest to pay. Throws NumericalError where a body at finite strain has no equilibrium under the
+  /// edge: what was proposed before stays.
   void propose(BodyModel body, std::size_t poses, double drawn = 0);
   /// Nothing is proposed any more.
   void withdraw() { proposal_.reset(); }
@@ -101,6 +102,10 @@ class BladeForce {
   [[nodiscard]] double needed_for_proposal() const; // J
   void stroke(const BodyModel& now, const topology::BladePose& target, double share);
   void press(const BodyModel& now);
+  [[nodiscard]] static double drag_of(const EdgeMeeting& meeting) { return meeting.patch.dragged ? 1 : 0; }
+  [[nodiscard]] static solvers::BladeState state_at(EdgeMeeting& meeting, const BodyModel& body,
+                                                    const VectorX& advance);
+  void press_proposal();
 
   BladeEdge edge_;
   bool tears_; // the cut may run ahead of the blade

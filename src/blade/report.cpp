@@ -1,6 +1,8 @@
 // What a blade tells: the field of the body under it, its force, and how that goes on.
 #include "src/blade/force.hpp"
 
+#include "src/model/finite_model.hpp"
+
 #include <algorithm>
 
 namespace spherecut::app {
@@ -33,7 +35,7 @@ BladeReport report_of(const EdgeMeeting& meeting, const solvers::BladeState& sta
     ++report.contacts;
     force += state.forces[entry];
     length += meeting.patch.contacts[c].length;
-    report.advance = std::max(report.advance, state.advance[entry] - meeting.patch.base[entry]);
+    report.advance = std::max(report.advance, state.advance[entry] - meeting.patch.free[entry]);
   }
   if (length > 0)
     report.release = force / length;
@@ -51,7 +53,13 @@ bool first_cut(const EdgeMeeting& meeting, const solvers::BladeState& state) {
 }
 
 solvers::Field BladeForce::field(const BodyModel& body) const {
-  return state_ ? solvers::deform(meeting_.patch, *state_, without_lips(body)) : body.field;
+  if (!state_)
+    return body.field;
+  if (body.finite == nullptr)
+    return solvers::deform(meeting_.patch, *state_, without_lips(body));
+  solvers::Field field = body.field;
+  field.coefficients = body.finite->pressed_coefficients();
+  return field;
 }
 
 BladeReport BladeForce::report() const {

@@ -1,6 +1,7 @@
 #include "src/model/finite_model.hpp"
 
 #include "solvers/contact/friction.hpp"
+#include "solvers/elasticity/rotation.hpp"
 #include "solvers/finite/transfer.hpp"
 #include "solvers/release/front_states.hpp"
 #include "src/scenario/law_reader.hpp"
@@ -18,6 +19,11 @@ namespace {
 constexpr double most_penetration = 1e-3;
 /// Of the acting forces, gravity among them: a small force of contact is to be told from what is left.
 constexpr double most_unbalanced = 1e-4;
+/// The same under the edge of a blade, whose own force is most of what acts. Its pieces overlap, and which of them bear
+/// the force changes from iteration to iteration.
+constexpr double most_unbalanced_of_edge = 1e-3;
+/// Of E times the length of a piece of an edge: the penalty by which it stands against tissue, N/m.
+constexpr double edge_stiffness = 20;
 /// Of the spacing: nodes as near to each other are the same.
 constexpr double same_place = 1e-9;
 
@@ -51,8 +57,8 @@ Hindrance hindrance_of(const Scenario& scenario) {
     return {"[blade] with material.prony", scenario.blade->line};
   if (scenario.method.method != solvers::Method::galerkin)
     return {fmt::format("method.name = \"{}\"", solvers::to_string(scenario.method.method)), line};
-  if (scenario.blade && scenario.toughness > 0)
-    return {"[blade] with material.toughness", scenario.blade->line};
+  if (scenario.blade && scenario.toughness > 0 && scenario.tearing.enabled)
+    return {"[blade] with material.toughness and [tearing]", scenario.blade->line};
   const bool cuts = scenario.blade || !scenario.precuts.empty();
   if (cuts && scenario.cut.lips == solvers::LipCondition::sticking)
     return {"cut.lips = \"sticking\"", line};
@@ -99,7 +105,7 @@ void require_run(const Scenario& scenario) {
   if (hindrance.what.empty())
     return;
   throw InputError(fmt::format("{}:{}: {} does not go with material.law = \"{}\"; possible with it: fixed regions, "
-                               "gravity, pre-tension, precuts, their tearing, a blade that nothing resists, and a tool "
+                               "gravity, pre-tension, precuts, their tearing, a blade, and a tool "
                                "that presses, rubs, bonds or grasps, by method galerkin",
                                scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
 }
@@ -357,12 +363,21 @@ FiniteStep FiniteModel::solve_from_rest(double time, const std::optional<topolog
 
 std::vector<double> FiniteModel::openings() const {
   solvers::FiniteLips lips = pairs_;
-  lips.turn(body_.piola_maps(equilibrium_.coefficients()));
-  return lips.openings(equilibrium_.coefficients());
+  lips.turn(body_.piola_maps(coefficients()));
+  return lips.contact().gaps(coefficients());
 }
 
 // What acts before the tool comes, weight and pre-tension, has acted for ever.
 FiniteStep FiniteModel::solve(double time, const std::optional<topology::ToolPose>& pose) {
+  const auto stands = [&] {
+    return pose.has_value() == pose_.has_value() &&
+           (!pose || (pose->point == pose_->point && pose->axis == pose_->axis));
+  };
+  if (edge_ && stands()) { // the body without blade is as it was
+    time_ = time;
+    return *last_;
+  }
+  leave_edge();
   try {
     if (!time_ && !has_settled_ && (!body_.loads().isZero(0) || is_prestrained_)) {
       double longest = 0;
@@ -412,8 +427,164 @@ FiniteStep FiniteModel::solve_step(double time, const std::optional<topology::To
   return step;
 }
 
+// Where the tissue has turned, what is ahead of the edge at rest has, too.
+MatrixX FiniteModel::patterns_of(const solvers::BladePatch& patch, double half_width) const {
+  const auto entries = std::ssize(patch.contacts) + (patch.dragged ? 1 : 0);
+  MatrixX patterns = MatrixX::Zero(3 * static_cast<Eigen::Index>(body_.size()), entries);
+  solvers::ShapeFunctions shape;
+  const auto add = [&](const Vector3& x, const Vector3& force, Eigen::Index column) {
+    solvers::require_support(body_.spheres(), x, shape);
+    for (int k = 0; k < shape.size(); ++k)
+      patterns.col(column).segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
+  };
+  for (std::size_t c = 0; c < patch.contacts.size(); ++c) {
+    solvers::EdgeContact at_rest = patch.contacts[c];
+    const Vector3 push = at_rest.push;
+    const Matrix3 turned = solvers::rotation_of(body_.at(at_rest.point, coefficients()).deformation).transpose();
+    at_rest.push = turned * push;
+    at_rest.normal = turned * at_rest.normal;
+    at_rest.edge = turned * at_rest.edge;
+    const solvers::ForcePattern pattern = solvers::edge_pattern(at_rest, half_width, *body_.problem().domain);
+    for (std::size_t k = 0; k < pattern.points.size(); ++k)
+      add(pattern.points[k], pattern.forces[k].dot(at_rest.push) * push, static_cast<Eigen::Index>(c));
+  }
+  if (patch.dragged)
+    for (std::size_t k = 0; k < patch.flanks.points.size(); ++k)
+      add(patch.flanks.points[k], patch.flanks.forces[k], entries - 1);
+  return patterns;
+}
+
+solvers::BladePatch FiniteModel::edge_patch(const std::vector<solvers::EdgeContact>& contacts, double half_width,
+                                            const solvers::ForcePattern& flanks) {
+  if (contacts.empty())
+    throw InputError("a blade without contacts has nothing to condense");
+  solvers::BladePatch patch;
+  patch.contacts = contacts;
+  patch.dragged = !flanks.points.empty();
+  patch.flanks = flanks;
+  for (const Vector3& force : flanks.forces)
+    patch.drag += force;
+  edge_patterns_ = patterns_of(patch, half_width);
+  patch.base = edge_patterns_.transpose() * coefficients();
+  patch.free = patch.base;
+  patch.compliance = MatrixX::Identity(patch.base.size(), patch.base.size()); // until it is pressed
+  patch.drag_torques = MatrixX::Zero(3, patch.base.size());
+  return patch;
+}
+
+std::vector<solvers::UnilateralMean> FiniteModel::edges_of(const PressedEdge& edge) const {
+  const solvers::NodeCloud& nodes = body_.problem().nodes;
+  const double modulus = body_.problem().material.young_modulus;
+  std::vector<solvers::UnilateralMean> means;
+  for (std::size_t c = 0; c < edge.contacts.size(); ++c) {
+    const solvers::EdgeContact& contact = edge.contacts[c];
+    solvers::UnilateralMean mean;
+    mean.direction = contact.push;
+    mean.mean.centroid = contact.point;
+    int nearest = 0;
+    for (int i = 0; i < nodes.size(); ++i) {
+      const double weight = contact.push.dot(
+          edge.patterns.col(static_cast<Eigen::Index>(c)).segment<3>(3 * static_cast<Eigen::Index>(i)));
+      if (weight != 0) {
+        mean.mean.nodes.push_back(i);
+        mean.mean.weights.push_back(weight);
+      }
+      if ((nodes.positions[i] - contact.point).squaredNorm() < (nodes.positions[nearest] - contact.point).squaredNorm())
+        nearest = i;
+    }
+    mean.carriers = {nearest, nearest};
+    mean.spacing = nodes.spacings[nearest];
+    mean.stiffness = edge_stiffness * modulus * contact.length;
+    means.push_back(std::move(mean));
+  }
+  return means;
+}
+
+namespace {
+
+/// The compliance of the rest operator, carried along, is soft by a third where the strain is a fifth. Made to give the
+/// way that the last forces have made, positive definite as before [Broyden, Fletcher, Goldfarb and Shanno 1970].
+void meet_secant(const VectorX& way, const VectorX& forces, MatrixX& compliance) {
+  constexpr double least = 1e-3; // of what the forces would do by the compliance
+  const double work = way.dot(forces);
+  if (!(work > least * forces.dot(compliance * forces)))
+    return;
+  const MatrixX left = MatrixX::Identity(way.size(), way.size()) - way * forces.transpose() / work;
+  compliance = (left * compliance * left.transpose() + way * way.transpose() / work).eval();
+}
+
+} // namespace
+
+void FiniteModel::press_edge(const VectorX& advance, double drag, solvers::BladePatch& patch) {
+  const auto contacts = std::ssize(patch.contacts);
+  if (!edge_) {
+    edge_.emplace();
+    edge_->free = equilibrium_.coefficients();
+    edge_->potential = last_->energy - last_->loads;
+    edge_->shares = equilibrium_.contact_shares();
+  }
+  if (edge_->contacts != patch.contacts || edge_->patterns.cols() != edge_patterns_.cols() ||
+      edge_->patterns != edge_patterns_) {
+    std::vector<double> forces;
+    if (edge_->contacts.size() == patch.contacts.size())
+      forces = equilibrium_.edges()->known_forces();
+    edge_->contacts = patch.contacts;
+    edge_->patterns = edge_patterns_;
+    edge_->moved.resize(0);
+    equilibrium_.set_edges(edges_of(*edge_), std::move(forces));
+  }
+  solvers::FiniteLoading loading;
+  if (equilibrium_.contact() != nullptr)
+    loading.tool = pose_;
+  loading.advances = advance;
+  loading.tolerance = most_unbalanced_of_edge;
+  const MatrixX& patterns = edge_->patterns;
+  if (patch.dragged)
+    loading.forces = drag * patterns.col(contacts);
+  const solvers::EquilibriumStatus status = equilibrium_.solve(loading);
+  const std::vector<double>& forces = equilibrium_.edges()->known_forces();
+  VectorX acting(patch.base.size());
+  acting.head(contacts) = Eigen::Map<const VectorX>(forces.data(), contacts);
+  if (patch.dragged)
+    acting[contacts] = drag;
+  const VectorX moved = patterns.transpose() * equilibrium_.coefficients();
+  const MatrixX compliance = patterns.transpose() * equilibrium_.responses(patterns);
+  patch.compliance = 0.5 * (compliance + compliance.transpose());
+  if (edge_->moved.size() > 0)
+    meet_secant(moved - edge_->moved, acting - edge_->acting, patch.compliance);
+  edge_->moved = moved;
+  edge_->acting = acting;
+  patch.base = moved - patch.compliance * acting;
+  // Of strain, loads and drag, above the body without blade; with the drag alone that gives way to it.
+  double potential = status.energy - body_.loads().dot(equilibrium_.coefficients()) - edge_->potential;
+  if (patch.dragged) {
+    const double free = patterns.col(contacts).dot(edge_->free);
+    potential += drag * (free - moved[contacts]) + 0.5 * drag * drag * patch.compliance(contacts, contacts);
+    patch.drag_torque = Vector3::Zero();
+    solvers::ShapeFunctions shape;
+    for (std::size_t k = 0; k < patch.flanks.points.size(); ++k) {
+      solvers::require_support(body_.spheres(), patch.flanks.points[k], shape);
+      Vector3 x = patch.flanks.points[k];
+      for (int n = 0; n < shape.size(); ++n)
+        x += shape.value[n] * equilibrium_.coefficients().segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[n]));
+      patch.drag_torque += x.cross(patch.flanks.forces[k]);
+    }
+  }
+  const VectorX edge = acting.head(contacts);
+  patch.energy = potential - 0.5 * edge.dot(patch.compliance.topLeftCorner(contacts, contacts) * edge);
+}
+
+void FiniteModel::leave_edge() {
+  if (!edge_)
+    return;
+  equilibrium_.set_edges({});
+  equilibrium_.set_coefficients(edge_->free, 1, pose_, edge_->shares);
+  edge_.reset();
+  shows_pressed_ = false;
+}
+
 solvers::PointState FiniteModel::at(const Vector3& x) const {
-  const solvers::FiniteState state = body_.at(x, equilibrium_.coefficients());
+  const solvers::FiniteState state = body_.at(x, coefficients());
   const Matrix3& f = state.deformation;
   return {state.displacement, f - Matrix3::Identity(), 0.5 * (f.transpose() * f - Matrix3::Identity()), state.cauchy};
 }
@@ -482,16 +653,16 @@ std::vector<solvers::FrontState> FiniteModel::front_states(const std::function<d
                                                            double spacing) const {
   std::vector<Vector3> closed;
   if (const solvers::FiniteLips* lips = equilibrium_.lips()) {
-    const std::vector<double> forces = lips->known_forces();
+    const std::vector<double>& forces = lips->contact().known_forces();
     for (std::size_t p = 0; p < forces.size(); ++p)
       if (forces[p] > 0)
         closed.push_back(body_.problem().nodes.positions[lips->pairs()[p].plus]);
   }
-  return solvers::front_states(body_, equilibrium_.coefficients(), toughness, spacing, closed, fibres_);
+  return solvers::front_states(body_, coefficients(), toughness, spacing, closed, fibres_);
 }
 
 VectorX FiniteModel::nodal_displacements() const {
-  return body_.nodal_displacements(equilibrium_.coefficients());
+  return body_.nodal_displacements(coefficients());
 }
 
 } // namespace spherecut::app

@@ -3,6 +3,7 @@
 // other.
 #pragma once
 
+#include "solvers/contact/blade_contact.hpp"
 #include "solvers/finite/equilibrium.hpp"
 #include "solvers/fracture/tearing.hpp"
 #include "src/model/body_model.hpp"
@@ -70,6 +71,20 @@ class FiniteModel {
   /// The same from the body at rest. Throws as solve().
   FiniteStep solve_from_rest(double time, const std::optional<topology::ToolPose>& pose);
 
+  /// Pieces of a blade's edge against the body as it is without blade, as solvers::condense_blade(): the forces on them
+  /// act along their pushes in space, on what has been ahead of the edge at rest. Throws InputError without contacts.
+  [[nodiscard]] solvers::BladePatch edge_patch(const std::vector<solvers::EdgeContact>& contacts, double half_width,
+                                               const solvers::ForcePattern& flanks);
+  /// Equilibrium with the edge of a patch of this body at `advance`, m, its flanks dragging by `drag`; the patch
+  /// becomes that of small motions about it. All else here goes on telling of the body without blade. Throws as
+  /// solve().
+  void press_edge(const VectorX& advance, double drag, solvers::BladePatch& patch);
+  /// There is no blade any more.
+  void leave_edge();
+  /// Whether what is asked of the last solution is told of the body under the blade.
+  void show_pressed(bool pressed) { shows_pressed_ = pressed; }
+  [[nodiscard]] const VectorX& pressed_coefficients() const { return equilibrium_.coefficients(); }
+
   /// Displacement, its gradient F - I, Green's strain and Cauchy stress at a place of the body at rest, the pressure
   /// from the volume ratio there. Throws InputError where no sphere covers it.
   [[nodiscard]] solvers::PointState at(const Vector3& x) const;
@@ -81,7 +96,9 @@ class FiniteModel {
   [[nodiscard]] double time() const { return *time_; }
   [[nodiscard]] const std::optional<topology::ToolPose>& pose() const { return pose_; }
   [[nodiscard]] const FiniteStep& last() const { return *last_; }
-  [[nodiscard]] const VectorX& coefficients() const { return equilibrium_.coefficients(); } // 3 a node, m
+  [[nodiscard]] const VectorX& coefficients() const { // 3 a node, m
+    return edge_ && !shows_pressed_ ? edge_->free : equilibrium_.coefficients();
+  }
   /// Gap of every pair of lips along its normal, m.
   [[nodiscard]] std::vector<double> openings() const;
   [[nodiscard]] VectorX nodal_displacements() const; // 3 a node, m
@@ -105,6 +122,17 @@ class FiniteModel {
     std::vector<int> start{0}, nodes;
     std::vector<double> values;
   };
+  /// The edge of a blade against the body, and the body without it.
+  struct PressedEdge {
+    std::vector<solvers::EdgeContact> contacts;
+    MatrixX patterns;      // a unit of every entry of the patch, on the nodes
+    VectorX free;          // coefficients, m
+    VectorX moved, acting; // of every entry when it was pressed last, m and N; empty: not yet
+    double potential = 0;  // J, of strain and loads
+    std::vector<solvers::ContactShare> shares;
+  };
+  [[nodiscard]] MatrixX patterns_of(const solvers::BladePatch& patch, double half_width) const;
+  [[nodiscard]] std::vector<solvers::UnilateralMean> edges_of(const PressedEdge& edge) const;
   FiniteStep solve_step(double time, const std::optional<topology::ToolPose>& pose);
   void lay_skin();
   [[nodiscard]] std::vector<int> places_among_candidates(const std::vector<int>& nodes) const;
@@ -126,6 +154,9 @@ class FiniteModel {
   bool is_prestrained_ = false;
   solvers::FiniteLips pairs_; // for their gaps
   std::optional<FiniteStep> last_;
+  std::optional<PressedEdge> edge_; // empty: there is no blade
+  MatrixX edge_patterns_;           // of the patch that was asked for last
+  bool shows_pressed_ = false;
   std::optional<topology::ToolShape> tool_;
   Skin skin_;
 };

@@ -9,9 +9,9 @@
 
 namespace spherecut::app {
 
-bool FiniteStepper::solve(const StepSample& sample, bool is_solved) {
+bool FiniteStepper::solve(const StepSample& sample, bool is_solved, bool is_met) {
   const bool touches = state_.touch && state_.contact && state_.contact->depth > 0;
-  const bool begins = has_loads(state_.scenario) || touches || state_.model.incision != nullptr;
+  const bool begins = has_loads(state_.scenario) || touches || is_met || state_.model.incision != nullptr;
   if (state_.model.finite == nullptr && !begins) {
     free_pose_ = sample.tool;
     free_time_ = sample.time;

@@ -11,9 +11,10 @@ class FiniteStepper {
   /// These must outlive it.
   FiniteStepper(SessionState& state, ContactSolver& contact) : state_(state), contact_(contact) {}
 
-  /// Goes on to the step, with the cut that it has made; `is_solved`: the body with that is solved already. False:
-  /// nothing acts on the tissue yet. Throws NumericalError, which says what may help.
-  bool solve(const StepSample& sample, bool is_solved);
+  /// Goes on to the step, with the cut that it has made; `is_solved`: the body with that is solved already; `is_met`: a
+  /// blade that tissue resists has come into it. False: nothing acts on the tissue yet. Throws NumericalError, which
+  /// says what may help.
+  bool solve(const StepSample& sample, bool is_solved, bool is_met);
   /// What a step without equilibrium says: when, why, and what may help.
   [[nodiscard]] std::string told(const StepSample& sample, const NumericalError& error) const;
 

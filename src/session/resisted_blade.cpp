@@ -1,6 +1,7 @@
 #include "src/session/resisted_blade.hpp"
 
 #include "src/base/stage_timer.hpp"
+#include "src/model/finite_model.hpp"
 #include "src/tissue/cut_checks.hpp"
 #include "topology/base/errors.hpp"
 
@@ -42,6 +43,8 @@ bool ResistedBlade::enters(const StepSample& sample) const {
 void ResistedBlade::load_body() {
   solvers::Field bladed = force_.field(state_.model);
   state_.model.without_blade = std::exchange(state_.model.field, std::move(bladed));
+  if (state_.model.finite != nullptr)
+    state_.model.finite->show_pressed(true);
 }
 
 void ResistedBlade::lift() {
@@ -151,10 +154,8 @@ double ResistedBlade::cut_on(const StepSample& sample, bool in_background, CutRe
       }
       if (in_background) {
         build_in_background(poses, sample, report);
-      } else if (std::optional<BodyModel> next = build(poses, sample, report)) {
+      } else if (propose(poses, sample, report)) {
         triangles += report.triangles;
-        const double drawn = fronts_.released(state_.model, *next->incision);
-        force_.propose(std::move(*next), poses.size(), drawn);
       }
       if (!force_.proposed() && background_.proposing() == nullptr) { // nothing is cut there
         forget_mark();
@@ -207,10 +208,10 @@ bool ResistedBlade::sweep(const std::vector<topology::BladePose>& poses, const S
   return true;
 }
 
-// The body with the cut that the blade makes through these poses, built and solved; none when it cuts nothing or is
-// refused, and then incision and wound are as they were.
-std::optional<BodyModel> ResistedBlade::build(const std::vector<topology::BladePose>& poses, const StepSample& sample,
-                                              CutReport& report) {
+// Proposes the body with the cut that the blade makes through these poses, built and solved; false when it cuts nothing
+// or is refused, and then incision and wound are as they were.
+bool ResistedBlade::propose(const std::vector<topology::BladePose>& poses, const StepSample& sample,
+                            CutReport& report) {
   const IncisionBuilder::Mark before = state_.incisions->mark();
   const BodyUpdate last = report; // by an earlier cut of the same step
   const auto refuse = [&](const char* why) {
@@ -220,11 +221,11 @@ std::optional<BodyModel> ResistedBlade::build(const std::vector<topology::BladeP
     report.nodes = last.nodes;
     report.kept_nodes = last.kept_nodes;
     state_.incisions->go_back(before);
-    return std::nullopt;
+    return false;
   };
   try {
     if (!sweep(poses, sample, report))
-      return std::nullopt;
+      return false;
     BodyModel next = updater_.next();
     state_.rebuild = Rebuild::in_step;
     const topology::RestMap to_rest = state_.to_rest();
@@ -232,7 +233,9 @@ std::optional<BodyModel> ResistedBlade::build(const std::vector<topology::BladeP
                        report);
     const StageTimer timer(report.seconds.solve);
     contact_.solve(sample, next);
-    return next;
+    const double drawn = fronts_.released(state_.model, *next.incision);
+    force_.propose(std::move(next), poses.size(), drawn);
+    return true;
   } catch (const InputError& error) {
     return refuse(error.what());
   } catch (const NumericalError& error) {

@@ -43,8 +43,7 @@ class ResistedBlade {
   void leave(const StepSample& sample);
   double cut_on(const StepSample& sample, bool in_background, CutReport& report);
   bool sweep(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
-  [[nodiscard]] std::optional<BodyModel> build(const std::vector<topology::BladePose>& poses, const StepSample& sample,
-                                               CutReport& report);
+  bool propose(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
   void build_in_background(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
   void take(const StepSample& sample, CutReport& report);
   void forget_mark();

@@ -137,6 +137,10 @@ void Session::Parts::step_linear(const StepSample& sample, std::vector<topology:
 void Session::Parts::step_finite(const StepSample& sample, std::vector<topology::BladePose> passed,
                                  StepResult& result) {
   Loading loading;
+  if (state.model.without_blade) {
+    state.model.field = *std::exchange(state.model.without_blade, std::nullopt);
+    state.model.finite->show_pressed(false);
+  }
   {
     const StageTimer timer(result.stages.solve);
     loading.releases = follow_grip(sample, state, grasping);
@@ -152,22 +156,26 @@ void Session::Parts::step_finite(const StepSample& sample, std::vector<topology:
   }
   {
     const StageTimer timer(result.stages.solve);
-    is_solved = finite.solve(sample, is_solved);
+    is_solved = finite.solve(sample, is_solved, resisted && resisted->enters(sample));
   }
   if (is_solved && may_follow_finite()) {
     const StageTimer timer(result.stages.body);
     follow_tool(sample, result);
   }
-  if (is_solved && tears) {
-    const StageTimer timer(result.stages.tear);
-    try {
-      tears->tear(sample, loading, result);
-    } catch (const NumericalError& error) {
-      throw NumericalError(finite.told(sample, error));
+  try {
+    if (resisted && (is_solved || sample.blade)) {
+      const StageTimer timer(result.stages.cut);
+      loading.cut_surface = resisted->press(sample, *result.cut);
     }
+    if (is_solved && tears) {
+      const StageTimer timer(result.stages.tear);
+      tears->tear(sample, loading, result);
+    }
+  } catch (const NumericalError& error) {
+    throw NumericalError(finite.told(sample, error));
   }
   if (is_solved)
-    report.tell_finite(result);
+    report.tell_finite(resisted.get(), result);
   result.resprinkled = tool.has_taken() || result.resprinkled;
   result.rebuild = std::exchange(state.rebuild, Rebuild::none);
 }

@@ -88,7 +88,7 @@ void StepReport::tell_nodes(StepResult& result) {
                     result.rotation_degrees, result.time, stretched_rotation));
 }
 
-void StepReport::tell_finite(StepResult& result) {
+void StepReport::tell_finite(ResistedBlade* blade, StepResult& result) {
   const FiniteStep& step = state_.model.finite->last();
   result.force = step.force;
   result.torque = step.torque;
@@ -102,6 +102,8 @@ void StepReport::tell_finite(StepResult& result) {
   result.largest_penetration = step.penetration;
   result.least_jacobian = step.least_jacobian;
   const StageTimer timer(state_.profile.evaluate);
+  if (blade != nullptr)
+    blade->load_body();
   state_.displacements = state_.model.finite->nodal_displacements();
   state_.node_states.clear();
   if (!state_.options.force_only)

@@ -16,7 +16,7 @@ class StepReport {
   /// under the blade. Throws NumericalError when a force is not finite.
   void tell_linear(ResistedBlade* blade, StepResult& result);
   /// Of a body at finite strain.
-  void tell_finite(StepResult& result);
+  void tell_finite(ResistedBlade* blade, StepResult& result);
   /// The cut as it is; `blade` as above.
   void tell_cut(const ResistedBlade* blade, CutReport& report);
 

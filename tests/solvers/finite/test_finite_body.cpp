@@ -342,7 +342,7 @@ TEST_CASE("A cut that is pressed together bears what the uncut block does, and o
     for (const double by : {-0.02, 0.0, 0.005, 0.01})
       status = equilibrium.solve({squeezed(by), 1, {}});
     CHECK(status.closed == 0);
-    for (const double opening : equilibrium.lips()->openings(equilibrium.coefficients()))
+    for (const double opening : equilibrium.lips()->contact().gaps(equilibrium.coefficients()))
       CHECK(opening > 0);
   }
   CHECK(error[1] < 0.02);
@@ -362,7 +362,7 @@ TEST_CASE("Lips that turn while they are pressed together do not overlap, and be
   const auto farthest = [&](const VectorX& coefficients) {
     FiniteLips now(body, pairs);
     now.turn(body.piola_maps(coefficients));
-    const std::vector<double> openings = now.openings(coefficients);
+    const std::vector<double> openings = now.contact().gaps(coefficients);
     double most = 0;
     for (std::size_t p = 0; p < pairs.size(); ++p)
       most = std::max(most, std::abs(openings[p]) / problem.nodes.spacings[pairs[p].plus]);

@@ -232,6 +232,21 @@ TEST_CASE("The energy release rate adds up the modes", "[stress_intensity]") {
   CHECK(energy_release_rate(material, {2, 1, 3}) == Approx(5 * (1 - 0.09) / 2 + 9 / (2 * material.shear_modulus())));
 }
 
+TEST_CASE("The jump behind a front that has just turned tells the intensities of a short kink", "[stress_intensity]") {
+  const double angle = 0.5;
+  const Intensities k(1.3, -0.2, 0.5);
+  CutBlock block = cut_block(14, false, 1);
+  const StraightFront body(block, k);
+  auto front = block.incision->front_frame(block.frame.origin, 0.1);
+  REQUIRE(front);
+  const Vector3 ahead = front->ahead, normal = front->normal;
+  front->ahead = std::cos(angle) * ahead + std::sin(angle) * normal;
+  front->normal = std::cos(angle) * normal - std::sin(angle) * ahead;
+  CHECK((displacement_correlation(body, {}, *front) - at_kink(k, angle)).norm() < 1e-3);
+  // In the axes of the front as it lies the faces would seem to slide by nearly twice that.
+  CHECK(at_kink({1, 0, 0}, angle)[1] == Approx(0.5 * std::sin(angle)).epsilon(0.05));
+}
+
 TEST_CASE("Front samples keep their distance from one another and from the surface", "[stress_intensity]") {
   const CutBlock block = cut_block(8, false, 1);
   const auto all = front_samples(*block.incision, 0.1), inner = front_samples(*block.incision, 0.1, 0.2);

@@ -23,10 +23,11 @@ using spherecut::tests::unturned;
 namespace {
 
 /// The block of 60 mm under a blade as wide as it, on a way straight down.
-Scenario blade_down(double toughness) {
+Scenario blade_down(double toughness, const std::string& law = "linear") {
   const TemporaryFolder folder;
   std::ofstream(folder.path() / "s.toml")
-      << replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = " + std::to_string(toughness))
+      << replaced(cut_block, "poisson_ratio = 0.3",
+                  "poisson_ratio = 0.3\nlaw = \"" + law + "\"\ntoughness = " + std::to_string(toughness))
       << "[cut]\nfront_spacing = 0.004\n[blade]\nedge = [[0, -0.04, 0], [0, 0.04, 0]]\nstep = 0.1\n"
          "[[blade.path]]\ntime = 0\nposition = [0.004, 0, 0.031]\n[[blade.path]]\ntime = 0.3\nposition = [0.003, 0, "
          "0.013]\n";
@@ -110,7 +111,9 @@ TEST_CASE("Where an edge has cut nothing yet, its force at most doubles until th
 }
 
 TEST_CASE("The hand feels a blade indent and cut at toughness times width, without steps") {
-  const Scenario scenario = blade_down(10);
+  const auto law = GENERATE(as<std::string>{}, "linear", "neo_hookean");
+  INFO(law);
+  const Scenario scenario = blade_down(10, law);
   HapticSettings settings;
   HapticSimulation simulation(scenario);
   ScriptedPath device(simulation.path(), settings.rate);

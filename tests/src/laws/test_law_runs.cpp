@@ -209,8 +209,9 @@ TEST_CASE("What a law other than linear does not go with is refused with its lin
   };
   const std::string small = with_law(small_scenario), block = with_law(cut_block);
   refused(small + "[method]\nname = \"collocation\"\n", "method.name = \"collocation\"");
-  refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 100") + incision_at_end,
-          "[blade] with material.toughness");
+  refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 100") + incision_at_end +
+              "[tearing]\n",
+          "[blade] with material.toughness and [tearing]");
   refused(block + disc_precut + "[cut]\nlips = \"sticking\"\n", "cut.lips = \"sticking\"");
   refused(block + disc_precut + "[cut]\nsight = \"appended\"\n", "cut.sight = \"appended\"");
   refused(replaced(block, "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\n[[material.prony]]\nshare = 0.3\ntime = 2\n") +
