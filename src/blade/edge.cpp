@@ -192,7 +192,7 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
                             const EdgeMeeting& last) const {
   EdgeMeeting meeting;
   meeting.area = body.incision != nullptr ? body.incision->area() : 0;
-  if (front + 1 >= poses.size())
+  if (front + 1 >= poses.size() || !body.built())
     return meeting;
   const topology::RestMap to_rest = map_of_(body);
   std::vector<solvers::EdgeContact> contacts;

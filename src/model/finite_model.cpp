@@ -503,7 +503,7 @@ std::vector<solvers::UnilateralMean> FiniteModel::edges_of(const PressedEdge& ed
 namespace {
 
 /// The compliance of the rest operator, carried along, is soft by a third where the strain is a fifth. Made to give the
-/// way that the last forces have made, positive definite as before [Broyden, Fletcher, Goldfarb and Shanno 1970].
+/// way that the last forces have made, positive definite as before (a BFGS update).
 void meet_secant(const VectorX& way, const VectorX& forces, MatrixX& compliance) {
   constexpr double least = 1e-3; // of what the forces would do by the compliance
   const double work = way.dot(forces);

@@ -84,8 +84,8 @@ constexpr std::array keys = {
         choice,
         "",
         "\"linear\"",
-        "Law of the material: small strain, or one of finite strain. check tells its moduli; run computes all of them, "
-        "those of finite strain without a force of the blade.",
+        "Law of the material: small strain, or one of finite strain. check tells its moduli; run computes all of "
+        "them.",
         {},
         "linear, neo_hookean, yeoh, ogden, holzapfel_gasser_ogden"},
     ScenarioKey{"material.young_modulus", number, "Pa", "required",

@@ -3,6 +3,7 @@
 #include "src/base/stage_timer.hpp"
 #include "src/model/finite_model.hpp"
 #include "src/tissue/cut_checks.hpp"
+#include "src/tissue/finite_body.hpp"
 #include "topology/base/errors.hpp"
 
 #include <algorithm>
@@ -274,6 +275,7 @@ void ResistedBlade::take(const StepSample& sample, CutReport& report) {
     state_.profile.discretise += report.seconds.assembly + report.seconds.visibility;
     state_.profile.condense += report.seconds.solve;
     const StageTimer timer(report.seconds.solve);
+    take_over_finite(state_.model, background.model, state_.profile);
     contact_.solve(sample, background.model);
     force_.propose(std::move(background.model), made.poses);
   } catch (const std::runtime_error& error) {

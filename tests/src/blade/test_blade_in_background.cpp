@@ -43,7 +43,12 @@ void go(Session& session, const std::function<void(const StepResult&)>& look) {
 } // namespace
 
 TEST_CASE("A resisted blade whose cuts are made in the background waits at the force of steady cutting and cuts all") {
-  const Scenario scenario = scenario_of(through_a_corner);
+  const bool is_linear = GENERATE(true, false);
+  INFO(is_linear);
+  const Scenario scenario =
+      scenario_of(is_linear ? through_a_corner
+                            : replaced(through_a_corner, "toughness = 10", "law = \"neo_hookean\"\ntoughness = 10"));
+  const double allowed = is_linear ? 1e-4 : 0.03; // at finite strain it waits where small motions lead to
   Session in_step(scenario);
   const double area = run(in_step).back().cut->area;
   REQUIRE(area > 0.75 * 0.012 * 0.0198);
@@ -64,9 +69,9 @@ TEST_CASE("A resisted blade whose cuts are made in the background waits at the f
         CHECK(step.cut->surface_hash == hash);
       shown = step.cut->area;
       hash = step.cut->surface_hash;
-      CHECK(step.cut->blade.release <= std::max(toughness, force) * (1 + 1e-4)); // it does not rise
+      CHECK(step.cut->blade.release <= std::max(toughness, force) * (1 + allowed)); // it does not rise
       CHECK(background.pending().lags == background.blade()->lags());
-      CHECK((background.blade()->lags() || step.cut->blade.release <= toughness * (1 + 1e-4)));
+      CHECK((background.blade()->lags() || step.cut->blade.release <= toughness * (1 + allowed)));
     }
     last = step.cut->area;
     force = step.cut->blade.release;
