@@ -197,6 +197,8 @@ BladeState push_blade(const BladePatch& patch, const VectorX& advance, double dr
   const Eigen::Index m = count(patch), n = unilateral(patch), all = patch.base.size();
   if (advance.size() != m)
     throw InputError(fmt::format("{} advances for {} contacts of a blade", advance.size(), m));
+  if (patch.free.size() != all)
+    throw InputError(fmt::format("{} displacements without blade for {} entries", patch.free.size(), all));
   BladeState state;
   state.advance = advance;
   state.forces = VectorX::Zero(all);

@@ -20,7 +20,7 @@ BladePatch single(double c) {
   BladePatch patch;
   patch.contacts = {EdgeContact{Vector3::Zero(), -Vector3::UnitZ(), Vector3::UnitX(), width}};
   patch.compliance = MatrixX::Constant(1, 1, c);
-  patch.base = VectorX::Zero(1);
+  patch.base = patch.free = VectorX::Zero(1);
   return patch;
 }
 
@@ -42,6 +42,7 @@ BladePatch random_patch(int contacts, int pairs, unsigned seed) {
   const MatrixX root = MatrixX::NullaryExpr(n, n, [&] { return normal(random); });
   patch.compliance = 0.2 / n * root * root.transpose() + MatrixX::Identity(n, n);
   patch.base = VectorX::NullaryExpr(n, [&] { return 0.05 * normal(random); });
+  patch.free = patch.base;
   patch.base.segment(contacts, pairs) = patch.base.segment(contacts, pairs).cwiseAbs();
   return patch;
 }

@@ -50,7 +50,7 @@ struct TurningBlade {
     }
     const MatrixX root = MatrixX::NullaryExpr(3, 3, [&] { return normal(random); });
     patch.compliance = 1e-3 * (root * root.transpose() + 3 * MatrixX::Identity(3, 3));
-    patch.base = VectorX::Zero(3);
+    patch.base = patch.free = VectorX::Zero(3);
   }
   [[nodiscard]] std::vector<Vector3> places(double angle) const {
     std::vector<Vector3> result;
