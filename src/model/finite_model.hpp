@@ -37,6 +37,16 @@ struct FiniteStep {
 /// have one.
 enum class Patience : std::uint8_t { of_a_run, of_a_hand };
 
+/// The edge of a blade against the body, and the body without it.
+struct PressedEdge {
+  std::vector<solvers::EdgeContact> contacts;
+  MatrixX patterns;      // a unit of every entry of the patch, on the nodes
+  VectorX free;          // coefficients, m
+  VectorX moved, acting; // of every entry when it was pressed last, m and N; empty: not yet
+  double potential = 0;  // J, of strain and loads
+  std::vector<solvers::ContactShare> shares;
+};
+
 class FiniteModel {
  public:
   /// The body on nodes, cut and lips of `nodes`. `touched`: whether a tool may come to it. Throws as require_run() and
@@ -121,15 +131,6 @@ class FiniteModel {
     std::vector<Vector3> rest; // m
     std::vector<int> start{0}, nodes;
     std::vector<double> values;
-  };
-  /// The edge of a blade against the body, and the body without it.
-  struct PressedEdge {
-    std::vector<solvers::EdgeContact> contacts;
-    MatrixX patterns;      // a unit of every entry of the patch, on the nodes
-    VectorX free;          // coefficients, m
-    VectorX moved, acting; // of every entry when it was pressed last, m and N; empty: not yet
-    double potential = 0;  // J, of strain and loads
-    std::vector<solvers::ContactShare> shares;
   };
   [[nodiscard]] MatrixX patterns_of(const solvers::BladePatch& patch, double half_width) const;
   [[nodiscard]] std::vector<solvers::UnilateralMean> edges_of(const PressedEdge& edge) const;
