@@ -85,6 +85,7 @@ struct BladePatch {
   /// those of small motions about a state at finite strain.
   double energy = 0;
   std::vector<Field> responses; // none at finite strain
+  MatrixX patterns;             // there: a unit of every entry, on the nodes
 };
 
 /// Condenses onto contacts, pairs (may be empty) and drag (may hold no points). `base` is the field without blade.

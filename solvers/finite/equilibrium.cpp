@@ -252,6 +252,10 @@ EquilibriumStatus Equilibrium::solve(const FiniteLoading& loading) {
     has_before_ = had_before;
     reactions_ = reactions;
     memory_.clear();
+    if (lips_)
+      lips_->contact().set_known_forces(state_.lip_forces);
+    if (edges_)
+      edges_->set_known_forces(state_.edge_forces);
   };
   bool found = true;
   try {

@@ -196,7 +196,7 @@ class Equilibrium {
   FiniteForces forces_;
   std::vector<Vector3> reactions_;
   double least_seen_ = 1, last_residual_ = 0, last_unsettled_ = 0;
-  double tolerance_ = 0; // of this solve
+  double tolerance_ = 0;        // of this solve
   double prestrain_forces_ = 0; // N, norm of those that the pre-strain of the body at rest exerts
 };
 

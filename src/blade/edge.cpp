@@ -38,6 +38,17 @@ VectorX openings(const BodyModel& body, const solvers::Field& field) {
   return open;
 }
 
+/// The way of a piece of the edge in the body at rest; one that is linear turns little.
+Vector3 at_rest(const BodyModel& body, const solvers::EdgeContact& contact) {
+  if (body.finite == nullptr)
+    return contact.push;
+  try {
+    return body.finite->turned_back(contact.point, contact.push);
+  } catch (const InputError&) { // beside the body
+    return contact.push;
+  }
+}
+
 /// Negative inside the body as it is; outside where there is no telling.
 double signed_distance(const topology::Domain& domain, const topology::RestMap& to_rest, const Vector3& x) {
   try {
@@ -181,7 +192,7 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
   if (!on_surface && body.incision != nullptr)
     if (const auto tip = body.incision->front_frame(contact.point, 2 * spacing_))
       contact.point = tip->point;
-  if (domain_->signed_distance(contact.point + ahead * half_width_ * contact.push) > 0)
+  if (domain_->signed_distance(contact.point + ahead * half_width_ * at_rest(body, contact)) > 0)
     return; // it grazes: there is no material ahead
   contacts.push_back(contact);
   meeting.pieces.push_back(piece);
@@ -291,7 +302,8 @@ double BladeEdge::reach(const EdgeMeeting& meeting, Eigen::Index contact, const 
   double depth = -signed_distance(*domain_, to_rest, x); // m
   bool is_cut_ahead = false;
   if (body.incision != nullptr)
-    if (const auto on = body.incision->closest(there.point + 0.5 * spacing_ * there.push, in_sheet * spacing_))
+    if (const auto on =
+            body.incision->closest(there.point + 0.5 * spacing_ * at_rest(body, there), in_sheet * spacing_))
       is_cut_ahead = !on->on_border;
   if (!is_cut_ahead)
     depth = std::max(depth, -domain_->signed_distance(x - (there.push.dot(x - there.point) + spacing_) * there.push));

@@ -237,16 +237,21 @@ void BladeForce::stroke(const BodyModel& now, const topology::BladePose& target,
   const VectorX start = state_->advance, end = edge_.advances(meeting_, now, target);
   const VectorX motion = share / stroke_parts * (edge_.motions(meeting_, target) - edge_.motions(meeting_, from));
   const double slide = (target.position - from.position).norm();
+  solvers::BladeLedger ledger = ledger_;
+  solvers::BladeState state = *state_;
   for (int k = 1; k <= stroke_parts; ++k) {
     const double part = share * k / stroke_parts;
-    const solvers::BladeState next = state_at(meeting_, now, start + part * (end - start));
-    ledger_.move(meeting_.patch, *state_, next, motion, slide * share / stroke_parts);
-    state_ = next;
+    solvers::BladeState next = state_at(meeting_, now, start + part * (end - start));
+    ledger.move(meeting_.patch, state, next, motion, slide * share / stroke_parts);
+    state = std::move(next);
   }
+  ledger_ = ledger;
+  state_ = std::move(state);
   way_.come_to(share < 1 ? pose_between(from, target, share) : target);
 }
 
 BladeForce::Taken BladeForce::take() {
+  press_proposal(); // where it has no equilibrium all stays as it is
   const double surface = edge_.toughness(meeting_) * (proposal_->meeting.area - meeting_.area);
   const double area = proposal_->meeting.area - meeting_.area,
                paid = needed_for_proposal() * edge_.settings().sharpness;

@@ -67,6 +67,8 @@ class BladeForce {
   void meet_again(const BodyModel& now);
   /// There was nothing to cut through these poses, or it cannot be: the front goes on without a cut.
   void pass(std::size_t poses, const BodyModel& now);
+  /// Whether the edge stands against the body.
+  [[nodiscard]] bool presses() const { return state_.has_value(); }
   [[nodiscard]] bool proposed() const { return proposal_.has_value(); }
   /// Moves the blade on while its next cut is being made: as far as the force of steady cutting (in a first cut, which
   /// takes more, a multiple of it) or to its pose.

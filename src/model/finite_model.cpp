@@ -59,6 +59,8 @@ Hindrance hindrance_of(const Scenario& scenario) {
     return {fmt::format("method.name = \"{}\"", solvers::to_string(scenario.method.method)), line};
   if (scenario.blade && scenario.toughness > 0 && scenario.tearing.enabled)
     return {"[blade] with material.toughness and [tearing]", scenario.blade->line};
+  if (scenario.blade && scenario.toughness > 0 && scenario.tool && scenario.tool->grasp)
+    return {"[blade] with material.toughness beside a grasper", scenario.blade->line};
   const bool cuts = scenario.blade || !scenario.precuts.empty();
   if (cuts && scenario.cut.lips == solvers::LipCondition::sticking)
     return {"cut.lips = \"sticking\"", line};
@@ -165,7 +167,7 @@ void FiniteModel::hold_on(const std::vector<int>& nodes, const FiniteModel& befo
     for (std::size_t k = 0; k < before.rest_.size(); ++k)
       if ((before.rest_[k] - rest_[c]).squaredNorm() < (before.rest_[nearest] - rest_[c]).squaredNorm())
         nearest = k;
-    shares[c] = before.equilibrium_.contact_shares()[nearest];
+    shares[c] = before.free_shares()[nearest];
     shares[c].anchor += rest_[c] - before.rest_[nearest];
   }
   equilibrium_.set_coefficients(equilibrium_.coefficients(), 1, before.pose_, std::move(shares));
@@ -315,7 +317,7 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
 // A node that both bodies have keeps its place on the tool. One that is new where the tool touches sticks where it is
 // now, with the force of the nearest share that was there, by their areas.
 std::vector<solvers::ContactShare> FiniteModel::shares_from(const FiniteModel& before, const VectorX& start) const {
-  const std::vector<solvers::ContactShare>& old = before.equilibrium_.contact_shares();
+  const std::vector<solvers::ContactShare>& old = before.free_shares();
   const solvers::NodeCloud& nodes = body_.problem().nodes;
   std::vector<Vector3> places;
   for (const int node : before.candidates_)
@@ -342,7 +344,7 @@ std::vector<solvers::ContactShare> FiniteModel::shares_from(const FiniteModel& b
 }
 
 bool FiniteModel::may_begin_anew() const {
-  const std::vector<solvers::ContactShare>& shares = equilibrium_.contact_shares();
+  const std::vector<solvers::ContactShare>& shares = free_shares();
   return std::none_of(shares.begin(), shares.end(), [](const auto& share) { return share.touches; });
 }
 
@@ -375,6 +377,8 @@ FiniteStep FiniteModel::solve(double time, const std::optional<topology::ToolPos
   };
   if (edge_ && stands()) { // the body without blade is as it was
     time_ = time;
+    last_->iterations = 0;
+    last_->friction_work = 0;
     return *last_;
   }
   leave_edge();
@@ -405,6 +409,12 @@ FiniteStep FiniteModel::solve_step(double time, const std::optional<topology::To
   body_.accept_step(equilibrium_.coefficients());
   time_ = time;
   pose_ = loading.tool;
+  last_ = step_of(status, loading.tool, pose);
+  return *last_;
+}
+
+FiniteStep FiniteModel::step_of(const solvers::EquilibriumStatus& status, const std::optional<topology::ToolPose>& tool,
+                                const std::optional<topology::ToolPose>& pose) const {
   FiniteStep step;
   step.force = status.tool_force;
   step.torque = status.tool_torque;
@@ -416,14 +426,13 @@ FiniteStep FiniteModel::solve_step(double time, const std::optional<topology::To
   step.energy = status.energy;
   step.loads = body_.loads().dot(equilibrium_.coefficients());
   step.friction_work = status.friction_work;
-  if (loading.tool) {
+  if (tool) {
     step.tangential = equilibrium_.contact()->options().condition == solvers::ContactCondition::bonded
                           ? force_along_surface()
                           : status.friction;
     summarise_contact(step);
     step.penetration = deepest(*pose);
   }
-  last_ = step;
   return step;
 }
 
@@ -464,8 +473,8 @@ solvers::BladePatch FiniteModel::edge_patch(const std::vector<solvers::EdgeConta
   patch.flanks = flanks;
   for (const Vector3& force : flanks.forces)
     patch.drag += force;
-  edge_patterns_ = patterns_of(patch, half_width);
-  patch.base = edge_patterns_.transpose() * coefficients();
+  patch.patterns = patterns_of(patch, half_width);
+  patch.base = patch.patterns.transpose() * coefficients();
   patch.free = patch.base;
   patch.compliance = MatrixX::Identity(patch.base.size(), patch.base.size()); // until it is pressed
   patch.drag_torques = MatrixX::Zero(3, patch.base.size());
@@ -507,7 +516,7 @@ namespace {
 void meet_secant(const VectorX& way, const VectorX& forces, MatrixX& compliance) {
   constexpr double least = 1e-3; // of what the forces would do by the compliance
   const double work = way.dot(forces);
-  if (!(work > least * forces.dot(compliance * forces)))
+  if (!(work > 0 && work > least * forces.dot(compliance * forces)))
     return;
   const MatrixX left = MatrixX::Identity(way.size(), way.size()) - way * forces.transpose() / work;
   compliance = (left * compliance * left.transpose() + way * way.transpose() / work).eval();
@@ -516,6 +525,7 @@ void meet_secant(const VectorX& way, const VectorX& forces, MatrixX& compliance)
 } // namespace
 
 void FiniteModel::press_edge(const VectorX& advance, double drag, solvers::BladePatch& patch) {
+  constexpr double least_change = 10 * most_unbalanced_of_edge; // of the forces: one that tells more than what is left
   const auto contacts = std::ssize(patch.contacts);
   if (!edge_) {
     edge_.emplace();
@@ -523,14 +533,15 @@ void FiniteModel::press_edge(const VectorX& advance, double drag, solvers::Blade
     edge_->potential = last_->energy - last_->loads;
     edge_->shares = equilibrium_.contact_shares();
   }
-  if (edge_->contacts != patch.contacts || edge_->patterns.cols() != edge_patterns_.cols() ||
-      edge_->patterns != edge_patterns_) {
+  if (edge_->contacts != patch.contacts || edge_->patterns.cols() != patch.patterns.cols() ||
+      edge_->patterns != patch.patterns) {
     std::vector<double> forces;
     if (edge_->contacts.size() == patch.contacts.size())
       forces = equilibrium_.edges()->known_forces();
     edge_->contacts = patch.contacts;
-    edge_->patterns = edge_patterns_;
+    edge_->patterns = patch.patterns;
     edge_->moved.resize(0);
+    edge_->way.resize(0);
     equilibrium_.set_edges(edges_of(*edge_), std::move(forces));
   }
   solvers::FiniteLoading loading;
@@ -542,6 +553,7 @@ void FiniteModel::press_edge(const VectorX& advance, double drag, solvers::Blade
   if (patch.dragged)
     loading.forces = drag * patterns.col(contacts);
   const solvers::EquilibriumStatus status = equilibrium_.solve(loading);
+  edge_->pressed = step_of(status, loading.tool, loading.tool);
   const std::vector<double>& forces = equilibrium_.edges()->known_forces();
   VectorX acting(patch.base.size());
   acting.head(contacts) = Eigen::Map<const VectorX>(forces.data(), contacts);
@@ -550,13 +562,20 @@ void FiniteModel::press_edge(const VectorX& advance, double drag, solvers::Blade
   const VectorX moved = patterns.transpose() * equilibrium_.coefficients();
   const MatrixX compliance = patterns.transpose() * equilibrium_.responses(patterns);
   patch.compliance = 0.5 * (compliance + compliance.transpose());
-  if (edge_->moved.size() > 0)
-    meet_secant(moved - edge_->moved, acting - edge_->acting, patch.compliance);
-  edge_->moved = moved;
-  edge_->acting = acting;
+  if (edge_->moved.size() == 0) {
+    edge_->moved = moved;
+    edge_->acting = acting;
+  } else if ((acting - edge_->acting).norm() > least_change * acting.norm()) {
+    edge_->way = moved - edge_->moved;
+    edge_->forces = acting - edge_->acting;
+    edge_->moved = moved;
+    edge_->acting = acting;
+  }
+  if (edge_->way.size() > 0)
+    meet_secant(edge_->way, edge_->forces, patch.compliance);
   patch.base = moved - patch.compliance * acting;
   // Of strain, loads and drag, above the body without blade; with the drag alone that gives way to it.
-  double potential = status.energy - body_.loads().dot(equilibrium_.coefficients()) - edge_->potential;
+  double potential = edge_->pressed.energy - edge_->pressed.loads - edge_->potential;
   if (patch.dragged) {
     const double free = patterns.col(contacts).dot(edge_->free);
     potential += drag * (free - moved[contacts]) + 0.5 * drag * drag * patch.compliance(contacts, contacts);
@@ -572,6 +591,11 @@ void FiniteModel::press_edge(const VectorX& advance, double drag, solvers::Blade
   }
   const VectorX edge = acting.head(contacts);
   patch.energy = potential - 0.5 * edge.dot(patch.compliance.topLeftCorner(contacts, contacts) * edge);
+}
+
+Vector3 FiniteModel::turned_back(const Vector3& x, const Vector3& direction) const {
+  const solvers::PointState state = at(x);
+  return solvers::rotation_of(Matrix3::Identity() + state.gradient).transpose() * direction;
 }
 
 void FiniteModel::leave_edge() {
@@ -643,10 +667,11 @@ void FiniteModel::condense(const std::vector<int>& wanted, solvers::ContactPatch
   patch.compliance = equilibrium_.contact_compliance(chosen);
   patch.base_displacement = state.displacement - patch.compliance * acting;
   state.pose = contact.pose();
-  state.tool_force = last_->force;
-  state.tool_torque = last_->torque;
-  state.active_nodes = last_->active_nodes;
-  state.contact_radius = last_->contact_radius;
+  const FiniteStep& last = edge_ ? edge_->pressed : *last_; // the patch is of the body under the blade, too
+  state.tool_force = last.force;
+  state.tool_torque = last.torque;
+  state.active_nodes = last.active_nodes;
+  state.contact_radius = last.contact_radius;
 }
 
 std::vector<solvers::FrontState> FiniteModel::front_states(const std::function<double(const Vector3&)>& toughness,

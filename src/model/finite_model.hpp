@@ -42,9 +42,11 @@ struct PressedEdge {
   std::vector<solvers::EdgeContact> contacts;
   MatrixX patterns;      // a unit of every entry of the patch, on the nodes
   VectorX free;          // coefficients, m
-  VectorX moved, acting; // of every entry when it was pressed last, m and N; empty: not yet
+  VectorX moved, acting; // m and N, of every entry when it was pressed; empty: not yet
+  VectorX way, forces;   // by which they have changed up to then
   double potential = 0;  // J, of strain and loads
   std::vector<solvers::ContactShare> shares;
+  FiniteStep pressed; // the last equilibrium with it
 };
 
 class FiniteModel {
@@ -91,6 +93,9 @@ class FiniteModel {
   void press_edge(const VectorX& advance, double drag, solvers::BladePatch& patch);
   /// There is no blade any more.
   void leave_edge();
+  [[nodiscard]] bool is_pressed() const { return edge_.has_value(); }
+  /// What a direction in space has been at rest, at a place of the body at rest.
+  [[nodiscard]] Vector3 turned_back(const Vector3& x, const Vector3& direction) const;
   /// Whether what is asked of the last solution is told of the body under the blade.
   void show_pressed(bool pressed) { shows_pressed_ = pressed; }
   [[nodiscard]] const VectorX& pressed_coefficients() const { return equilibrium_.coefficients(); }
@@ -105,7 +110,7 @@ class FiniteModel {
   /// Of the last solution: time, s, pose of the tool, and what else there is to tell.
   [[nodiscard]] double time() const { return *time_; }
   [[nodiscard]] const std::optional<topology::ToolPose>& pose() const { return pose_; }
-  [[nodiscard]] const FiniteStep& last() const { return *last_; }
+  [[nodiscard]] const FiniteStep& last() const { return edge_ && shows_pressed_ ? edge_->pressed : *last_; }
   [[nodiscard]] const VectorX& coefficients() const { // 3 a node, m
     return edge_ && !shows_pressed_ ? edge_->free : equilibrium_.coefficients();
   }
@@ -134,6 +139,12 @@ class FiniteModel {
   };
   [[nodiscard]] MatrixX patterns_of(const solvers::BladePatch& patch, double half_width) const;
   [[nodiscard]] std::vector<solvers::UnilateralMean> edges_of(const PressedEdge& edge) const;
+  [[nodiscard]] FiniteStep step_of(const solvers::EquilibriumStatus& status,
+                                   const std::optional<topology::ToolPose>& tool,
+                                   const std::optional<topology::ToolPose>& pose) const;
+  [[nodiscard]] const std::vector<solvers::ContactShare>& free_shares() const { // without the blade
+    return edge_ ? edge_->shares : equilibrium_.contact_shares();
+  }
   FiniteStep solve_step(double time, const std::optional<topology::ToolPose>& pose);
   void lay_skin();
   [[nodiscard]] std::vector<int> places_among_candidates(const std::vector<int>& nodes) const;
@@ -156,7 +167,6 @@ class FiniteModel {
   solvers::FiniteLips pairs_; // for their gaps
   std::optional<FiniteStep> last_;
   std::optional<PressedEdge> edge_; // empty: there is no blade
-  MatrixX edge_patterns_;           // of the patch that was asked for last
   bool shows_pressed_ = false;
   std::optional<topology::ToolShape> tool_;
   Skin skin_;

@@ -45,11 +45,13 @@ void ResistedBlade::load_body() {
   solvers::Field bladed = force_.field(state_.model);
   state_.model.without_blade = std::exchange(state_.model.field, std::move(bladed));
   if (state_.model.finite != nullptr)
-    state_.model.finite->show_pressed(true);
+    state_.model.finite->show_pressed(force_.presses());
 }
 
 void ResistedBlade::lift() {
   force_.lift();
+  if (state_.model.finite != nullptr)
+    state_.model.finite->leave_edge();
   drop_proposal();
 }
 
@@ -72,6 +74,10 @@ bool ResistedBlade::proposes_in_background() const {
 double ResistedBlade::press(const StepSample& sample, CutReport& report) {
   if (sample.blade)
     return press_at(sample, report);
+  if (state_.model.finite != nullptr && force_.presses() && !state_.model.finite->is_pressed()) { // the tool has moved
+    drop_proposal();
+    force_.meet_again(state_.model);
+  }
   if (!blade_.last() || !(background_.proposing() != nullptr || lags_in_background()))
     return 0;
   StepSample left = sample; // at the end of its path, with a cut still to come
@@ -128,6 +134,8 @@ void ResistedBlade::leave(const StepSample& sample) {
                                 "smaller blade.step does",
                                 sample.time, 1e3 * uncut, 1e3 * state_.zone.fine()));
   force_.leave();
+  if (state_.model.finite != nullptr)
+    state_.model.finite->leave_edge();
   drop_proposal();
 }
 

@@ -27,6 +27,7 @@ struct Session::Parts {
   void step_finite(const StepSample& sample, std::vector<topology::BladePose> passed, StepResult& result);
   [[nodiscard]] bool may_follow_finite();
   [[nodiscard]] topology::SurfaceContact find_contact(const topology::ToolPose& pose) const;
+  void look_without_blade();
   bool begin(const StepSample& sample, std::vector<topology::BladePose> passed);
   bool grasp(const StepSample& sample);
   bool take_hold(const StepSample& sample);
@@ -137,10 +138,7 @@ void Session::Parts::step_linear(const StepSample& sample, std::vector<topology:
 void Session::Parts::step_finite(const StepSample& sample, std::vector<topology::BladePose> passed,
                                  StepResult& result) {
   Loading loading;
-  if (state.model.without_blade) {
-    state.model.field = *std::exchange(state.model.without_blade, std::nullopt);
-    state.model.finite->show_pressed(false);
-  }
+  look_without_blade();
   {
     const StageTimer timer(result.stages.solve);
     loading.releases = follow_grip(sample, state, grasping);
@@ -200,11 +198,18 @@ topology::SurfaceContact Session::Parts::find_contact(const topology::ToolPose& 
                                                       : state.query.first_touch(shape, pose);
 }
 
+// The solution is again that which the next step goes on from.
+void Session::Parts::look_without_blade() {
+  if (state.model.without_blade)
+    state.model.field = *std::exchange(state.model.without_blade, std::nullopt);
+  if (state.model.finite != nullptr)
+    state.model.finite->show_pressed(false);
+}
+
 // What the last step has left, the grasper, and where the blade is. True: the grasper has let go.
 bool Session::Parts::begin(const StepSample& sample, std::vector<topology::BladePose> passed) {
   contact.begin_step();
-  if (state.model.without_blade)
-    state.model.field = *std::exchange(state.model.without_blade, std::nullopt);
+  look_without_blade();
   if (sample.blade && !background.follows_cut())
     background.drop_following();
   const bool released = grasp(sample);
@@ -368,6 +373,8 @@ PendingBody Session::pending() const {
 
 bool Session::swap_body() {
   Parts& of = *parts_;
+  if (of.state.model.finite != nullptr)
+    of.look_without_blade();
   if (of.background.follows_cut())
     return of.cutting.take();
   if (of.background.is_following()) {

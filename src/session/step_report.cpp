@@ -89,6 +89,8 @@ void StepReport::tell_nodes(StepResult& result) {
 }
 
 void StepReport::tell_finite(ResistedBlade* blade, StepResult& result) {
+  if (blade != nullptr)
+    blade->load_body();
   const FiniteStep& step = state_.model.finite->last();
   result.force = step.force;
   result.torque = step.torque;
@@ -102,8 +104,6 @@ void StepReport::tell_finite(ResistedBlade* blade, StepResult& result) {
   result.largest_penetration = step.penetration;
   result.least_jacobian = step.least_jacobian;
   const StageTimer timer(state_.profile.evaluate);
-  if (blade != nullptr)
-    blade->load_body();
   state_.displacements = state_.model.finite->nodal_displacements();
   state_.node_states.clear();
   if (!state_.options.force_only)

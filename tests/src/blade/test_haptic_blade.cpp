@@ -137,8 +137,10 @@ TEST_CASE("The hand feels a blade indent and cut at toughness times width, witho
   }
   CHECK(area > 1e-4);
   REQUIRE(cuts > 1);
-  CHECK(late / cuts == Approx(10 * 0.06).epsilon(0.2)); // a cut leaves the edge with the force of steady cutting
-  double steepest = 0;                                  // N a tick, of the solved force itself
+  // A cut leaves the edge with the force of steady cutting. Its length is chosen as if the force rose evenly; tissue at
+  // finite strain stiffens under the edge, and leaves it with less.
+  CHECK(late / cuts == Approx(10 * 0.06).epsilon(law == "linear" ? 0.2 : 0.25));
+  double steepest = 0; // N a tick, of the solved force itself
   for (std::size_t i = 1; i < records.solves.size(); ++i)
     steepest = std::max(steepest, (records.solves[i].force - records.solves[i - 1].force).norm() / 10);
   const ForceSteps steps = force_steps(records);
