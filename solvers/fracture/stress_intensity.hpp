@@ -30,9 +30,9 @@ double angle_across(const topology::FrontFrame& frame, const Vector3& direction)
 std::vector<topology::FrontFrame> front_samples(const topology::Incision& incision, double spacing, double margin = 0);
 
 /// The jump u+ - u- at distances s = h .. 4 h behind the front, components (normal, ahead, tangent) fitted by
-/// A s^(1/2) + B s^(3/2): K from A. The components are those of the sheet as it lies there, in the mean; where the front
-/// has turned since, it is taken as the tip of a short kink (at_kink()): a front that followed the jump in its own
-/// axes would turn back by twice the angle, and so from side to side.
+/// A s^(1/2) + B s^(3/2): K from A. The components are those of the sheet as it lies there, in the mean; where the
+/// front has turned since, it is taken as the tip of a short kink (at_kink()): a front that followed the jump in its
+/// own axes would turn back by twice the angle, and so from side to side.
 struct CorrelationOptions {
   double from = 1, to = 4; // in units of the node spacing at the front
   int samples = 9;
