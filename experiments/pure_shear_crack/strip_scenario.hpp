@@ -3,7 +3,7 @@
 
 #include "solvers/elasticity/homogeneous.hpp"
 
-#include <fmt/format.h>
+#include <sstream>
 #include <string>
 
 namespace spherecut::experiments {
@@ -20,44 +20,27 @@ struct StripScenario {
   std::string tearing; // lines
 
   [[nodiscard]] std::string text() const {
-    return fmt::format(R"([organ]
-shape = "block"
-size = [{}, {}, {}]
-[material]
-law = "{}"
-{}
-poisson_ratio = {}
-pretension = [0, {}, 0]
-toughness = {}
-)",
-                       length, height, thickness, law, constants, poisson_ratio, stretch - 1, toughness) +
-           clamp(-1) + clamp(1) +
-           fmt::format(R"([[fixed]]
-region = "half_space"
-point = [0, 0, 1e-6]
-normal = [0, 0, 1]
-axes = ["z"]
-[nodes]
-fine_spacing = {}
-coarse_spacing = {}
-random_seed = {}
-[[precut]]
-shape = "rectangle"
-centre = [{}, 0, {}]
-normal = [0, 1, 0]
-up = [0, 0, 1]
-width = {}
-height = {}
-[tearing]
-{})",
-                       fine, coarse, seed, -0.5 * length, 0.5 * thickness, 2 * crack, 2 * thickness, tearing);
+    std::ostringstream out;
+    out.precision(17);
+    out << "[organ]\nshape = \"block\"\nsize = [" << length << ", " << height << ", " << thickness
+        << "]\n[material]\nlaw = \"" << law << "\"\n"
+        << constants << "\npoisson_ratio = " << poisson_ratio << "\npretension = [0, " << stretch - 1
+        << ", 0]\ntoughness = " << toughness << '\n';
+    clamp(out, -1);
+    clamp(out, 1);
+    out << "[[fixed]]\nregion = \"half_space\"\npoint = [0, 0, 1e-6]\nnormal = [0, 0, 1]\naxes = [\"z\"]\n"
+        << "[nodes]\nfine_spacing = " << fine << "\ncoarse_spacing = " << coarse << "\nrandom_seed = " << seed
+        << "\n[[precut]]\nshape = \"rectangle\"\ncentre = [" << -0.5 * length << ", 0, " << 0.5 * thickness
+        << "]\nnormal = [0, 1, 0]\nup = [0, 0, 1]\nwidth = " << 2 * crack << "\nheight = " << 2 * thickness
+        << "\n[tearing]\n"
+        << tearing;
+    return out.str();
   }
 
  private:
-  [[nodiscard]] std::string clamp(int side) const {
-    return fmt::format("[[fixed]]\nregion = \"half_space\"\npoint = [0, {}, 0]\nnormal = [0, {}, 0]\naxes = [\"x\", "
-                       "\"y\"]\n",
-                       side * (0.5 * height - 1e-6), -side);
+  void clamp(std::ostream& out, int side) const {
+    out << "[[fixed]]\nregion = \"half_space\"\npoint = [0, " << side * (0.5 * height - 1e-6) << ", 0]\nnormal = [0, "
+        << -side << ", 0]\naxes = [\"x\", \"y\"]\n";
   }
 };
 
