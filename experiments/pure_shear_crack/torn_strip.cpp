@@ -44,7 +44,7 @@ app::Scenario strip(const StripLaw& law, double stretch, double toughness, std::
       .length = 6 * height,
       .thickness = 0.2 * height,
       .crack = 1.5 * height,
-      .fine = (quick ? 0.12 : 0.07) * height,
+      .fine = (quick ? 0.1 : 0.07) * height,
       .coarse = 0.2 * height,
       .seed = seed,
       .tearing =
