@@ -111,8 +111,17 @@ void SmallBoxes::evaluate(int box, const Vector3& x, ShapeFunctions& shape) cons
   });
 }
 
+void SmallBoxes::set_gradient(int cell, std::ptrdiff_t k, int lane, const Vector3& gradient) {
+  const auto count = std::ssize(cells_[cell].nodes);
+  double* at = cells_[cell].gradients.data() + 3 * count * lane + k;
+  for (int axis = 0; axis < 3; ++axis)
+    at[axis * count] = gradient[axis];
+}
+
 void SmallBoxes::add_cell(const topology::Domain& domain, const BackgroundBox& cell) {
   BoxShapes shapes;
+  shapes.centre = cell.centre;
+  shapes.half = cell.half;
   shapes.first_box = size();
   const Vector3 half = 0.5 * cell.half, sample_half = 0.5 * half;
   const bool inside = is_inside(domain, cell.centre, cell.half);

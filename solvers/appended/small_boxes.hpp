@@ -19,7 +19,8 @@ struct SmallBox {
 
 /// Shape functions of one background cell at the middles of its boxes.
 struct BoxShapes {
-  static constexpr int lanes = 8; // boxes of a cell at most
+  static constexpr int lanes = 8;                           // boxes of a cell at most
+  Vector3 centre = Vector3::Zero(), half = Vector3::Zero(); // m, of the cell
   int first_box = 0, boxes = 0;
   std::vector<int> nodes;        // that support some box, ascending
   std::vector<double> value;     // [node][lane]; zero in the lanes that are left
@@ -41,6 +42,8 @@ class SmallBoxes {
   [[nodiscard]] int size() const { return static_cast<int>(boxes_.size()); }
   [[nodiscard]] int cell_of(int box) const { return cell_of_[box]; }
   [[nodiscard]] int lane_of(int box) const { return box - cells_[cell_of_[box]].first_box; }
+  /// Replaces the gradient of the k-th node of a cell at a box.
+  void set_gradient(int cell, std::ptrdiff_t k, int lane, const Vector3& gradient);
   /// Cells that a node supports, ascending.
   [[nodiscard]] std::span<const int> cells_of_node(int node) const {
     return std::span(node_cells_).subspan(node_cell_start_[node], node_cell_start_[node + 1] - node_cell_start_[node]);

@@ -1,12 +1,14 @@
 #include "solvers/finite/body.hpp"
 
 #include "solvers/algebra/parallel.hpp"
+#include "solvers/appended/appended_body.hpp"
 #include "solvers/elasticity/function_law.hpp"
 #include "solvers/elasticity/prestrained_law.hpp"
+#include "solvers/finite/cut_functions.hpp"
 #include "solvers/finite/held_shares.hpp"
-#include "solvers/finite/point_kernels.hpp"
 #include "solvers/finite/tangent.hpp"
 #include "solvers/galerkin/galerkin.hpp"
+#include "solvers/points/point_kernels.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/search/point_tree.hpp"
 
@@ -15,6 +17,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
+#include <map>
 
 namespace spherecut::solvers {
 
@@ -37,10 +40,22 @@ Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) 
   if (!(options.pointwise_modulus >= 0))
     throw InputError(fmt::format("pointwise modulus of {} mu; it must not be negative", options.pointwise_modulus));
   check_prony_terms(options.prony);
-  if (options.sight == SightRule::appended && problem.incision != nullptr)
-    throw InputError("a body at finite strain has spheres that end or bend at a cut, no appended functions; allowed: "
-                     "visibility, diffraction, enriched");
+  if (options.sight == SightRule::appended) { // lip nodes are places: what is held at the rim its neighbours hold
+    const int base = base_nodes(problem.nodes);
+    std::erase_if(problem.prescribed, [base](const Prescribed& entry) { return entry.node >= base; });
+  }
   return problem;
+}
+
+/// The functions of the rule `appended`, on the uncut body that is there where it fits; null by the other rules.
+std::unique_ptr<const CutFunctions> cut_functions_of(const Problem& problem, const FiniteOptions& options,
+                                                     std::shared_ptr<const UncutFunctions> uncut) {
+  if (options.sight != SightRule::appended)
+    return nullptr;
+  const int base = base_nodes(problem.nodes);
+  if (uncut == nullptr || !uncut->fits(problem, base))
+    uncut = std::make_shared<const UncutFunctions>(problem, base, options.support_radius, options.consistent);
+  return std::make_unique<const CutFunctions>(std::move(uncut), problem);
 }
 
 std::shared_ptr<const Law> with_prestrain(std::shared_ptr<const Law> law, const Matrix3& elastic) {
@@ -75,18 +90,23 @@ struct FiniteBody::Work {
 FiniteBody::~FiniteBody() = default;
 
 FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options,
-                       const std::function<FibreFrame(const Vector3& x)>& fibres)
+                       const std::function<FibreFrame(const Vector3& x)>& fibres,
+                       const std::shared_ptr<const UncutFunctions>& uncut)
     : problem_(with_law(std::move(problem), law.get(), options)),
       prestrain_(Matrix3::Identity() - problem_.loads.initial_strain), law_(with_prestrain(std::move(law), prestrain_)),
-      options_(options), fibre_field_(fibres),
-      spheres_(problem_.nodes.positions, problem_.nodes.spacings, options.support_radius, Basis::linear,
-               worst_moment_condition, sight_about_cut(problem_, Method::galerkin, options.sight)),
+      options_(options), fibre_field_(fibres), cut_functions_(cut_functions_of(problem_, options, uncut)),
       work_(std::make_unique<Work>()) {
+  if (cut_functions_ == nullptr)
+    own_spheres_ = std::make_unique<const Spheres>(problem_.nodes.positions, problem_.nodes.spacings,
+                                                   options.support_radius, Basis::linear, worst_moment_condition,
+                                                   sight_about_cut(problem_, Method::galerkin, options.sight));
+  functions_ = cut_functions_ != nullptr ? cut_functions_->size() : size();
   patches_ = std::make_unique<SurfacePatches>(*problem_.domain, problem_.nodes, problem_.incision);
-  held_ = std::make_unique<HeldMeans>(problem_.prescribed, held_shares(problem_, spheres_, *patches_), size());
+  hold();
   tabulate();
   assemble_loads();
-  supports_ = nodal_supports(spheres_);
+  if (cut_functions_ == nullptr)
+    supports_ = nodal_supports(*own_spheres_);
   if (!options_.prony.empty()) {
     std::vector<Vector3> places;
     for (int group = 0; group < table_.groups(); ++group)
@@ -98,18 +118,115 @@ FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const Fi
   tangent_ = std::make_unique<FiniteTangent>(*this);
 }
 
+const Spheres& FiniteBody::spheres() const {
+  return own_spheres_ != nullptr ? *own_spheres_ : cut_functions_->uncut()->spheres();
+}
+
+int FiniteBody::node_of(int function) const {
+  return cut_functions_ != nullptr ? cut_functions_->node_of(function) : function;
+}
+
+bool FiniteBody::evaluate(const Vector3& x, ShapeFunctions& shape) const {
+  return cut_functions_ != nullptr ? cut_functions_->evaluate(x, shape) : solvers::evaluate(*own_spheres_, x, shape);
+}
+
+void FiniteBody::shape_at(const Vector3& x, ShapeFunctions& shape) const {
+  if (cut_functions_ == nullptr)
+    require_support(*own_spheres_, x, shape);
+  else if (!cut_functions_->evaluate(x, shape))
+    require_support(spheres(), x, shape);
+}
+
+/// The mean over the same share, or of the same place, by the functions on the cut.
+DisplacementMean FiniteBody::weighed(DisplacementMean mean) const {
+  if (cut_functions_ == nullptr)
+    return mean;
+  std::map<int, double> weights;
+  ShapeFunctions shape;
+  for (const QuadraturePoint& point : mean.share) {
+    shape_at(point.position, shape);
+    for (int k = 0; k < shape.size(); ++k)
+      weights[shape.nodes[k]] += point.weight * shape.value[k];
+  }
+  mean.nodes.clear();
+  mean.weights.clear();
+  for (const auto& [function, weight] : weights)
+    if (weight != 0) {
+      mean.nodes.push_back(function);
+      mean.weights.push_back(weight);
+    }
+  return mean;
+}
+
+// A share that the cut parts is held on each side for itself, by the function that its node has there.
+void FiniteBody::hold() {
+  std::vector<DisplacementMean> means = held_shares(problem_, spheres(), *patches_);
+  std::vector<int> own;
+  for (const Prescribed& entry : problem_.prescribed)
+    own.push_back(entry.node);
+  if (cut_functions_ == nullptr) {
+    held_ = std::make_unique<HeldMeans>(problem_.prescribed, std::move(means), own, functions_);
+    return;
+  }
+  const int base = cut_functions_->uncut()->size();
+  std::vector<Prescribed> entries;
+  std::vector<DisplacementMean> parts;
+  std::vector<int> of_parts;
+  ShapeFunctions shape;
+  for (std::size_t e = 0; e < means.size(); ++e) {
+    std::map<int, DisplacementMean> of_side; // by the node's function there
+    for (const QuadraturePoint& point : means[e].share) {
+      shape_at(point.position, shape);
+      int side = own[e];
+      for (const int function : shape.nodes)
+        if (function >= base && cut_functions_->node_of(function) == own[e] &&
+            !cut_functions_->appended()[function - base].twin.is_step)
+          side = function;
+      of_side[side].share.push_back(point);
+    }
+    for (auto& [function, part] : of_side) {
+      double whole = 0;
+      part.centroid.setZero();
+      for (const QuadraturePoint& point : part.share) {
+        whole += point.weight;
+        part.centroid += point.weight * point.position;
+      }
+      part.centroid /= whole;
+      part.area = whole * means[e].area;
+      for (QuadraturePoint& point : part.share)
+        point.weight /= whole;
+      entries.push_back(problem_.prescribed[e]);
+      parts.push_back(weighed(std::move(part)));
+      of_parts.push_back(function);
+    }
+  }
+  held_ = std::make_unique<HeldMeans>(std::move(entries), std::move(parts), of_parts, functions_);
+}
+
+int FiniteBody::carrier_of(const DisplacementMean& mean) const {
+  const auto largest = std::max_element(mean.weights.begin(), mean.weights.end());
+  return mean.nodes[largest - mean.weights.begin()];
+}
+
 void FiniteBody::tabulate() {
-  const BackgroundCells cells = background_cells(
-      *problem_.domain, problem_.nodes,
-      {options_.cell_size, options_.quadrature, options_.sight == SightRule::enriched}, problem_.incision.get());
-  table_ = tabulate_points(cells, spheres_);
+  BackgroundCells cells;
+  if (cut_functions_ != nullptr) {
+    table_ = cut_functions_->tabulate(cells);
+    consistency_ = cut_functions_->uncut()->consistency();
+  } else {
+    cells = background_cells(*problem_.domain, problem_.nodes,
+                             {options_.cell_size, options_.quadrature, options_.sight == SightRule::enriched},
+                             problem_.incision.get());
+    table_ = tabulate_points(cells, *own_spheres_);
+  }
   const ElasticConstants moduli = law_->small_strain();
   if (minds_volume())
     share_ = std::min(1.0, options_.pointwise_modulus * moduli.shear_modulus / moduli.bulk_modulus);
   if (share_ < 1)
     blocks_ = dilatation_blocks(*problem_.domain, cells, table_, problem_.incision.get());
-  if (options_.consistent)
-    consistency_ = make_consistent(problem_.nodes.positions, surface_integrals(spheres_, patches_->points()), table_);
+  if (options_.consistent && cut_functions_ == nullptr)
+    consistency_ =
+        make_consistent(problem_.nodes.positions, surface_integrals(*own_spheres_, patches_->points()), table_);
   for (int group = 0; group < table_.groups(); ++group) {
     point_start_.push_back(group == 0 ? 0 : point_start_.back() + table_.count[group - 1]);
     for (int lane = 0; lane < table_.count[group]; ++lane) {
@@ -125,10 +242,10 @@ void FiniteBody::tabulate() {
   const std::size_t chunks = (groups + groups_of_a_sum - 1) / groups_of_a_sum;
   work_->chunk_energy.resize(chunks);
   work_->chunk_least.resize(chunks);
-  work_->incident_start.assign(static_cast<std::size_t>(size()) + 1, 0);
+  work_->incident_start.assign(static_cast<std::size_t>(functions_) + 1, 0);
   for (const int node : table_.nodes)
     ++work_->incident_start[node + 1];
-  for (int i = 0; i < size(); ++i)
+  for (int i = 0; i < functions_; ++i)
     work_->incident_start[i + 1] += work_->incident_start[i];
   work_->incident.resize(table_.nodes.size());
   std::vector<int> next(work_->incident_start.begin(), work_->incident_start.end() - 1);
@@ -139,14 +256,14 @@ void FiniteBody::tabulate() {
 // Tractions are integrated at the points of the shares: so a constant stress is in balance with its own traction, and
 // with the forces of held means.
 void FiniteBody::assemble_loads() {
-  loads_ = VectorX::Zero(3 * static_cast<Eigen::Index>(size()));
+  loads_ = VectorX::Zero(3 * static_cast<Eigen::Index>(functions_));
   ShapeFunctions shape;
   const auto add = [&](const Vector3& x, const Vector3& force) {
     if (force.isZero(0))
       return;
     if (!force.allFinite())
       throw InputError(fmt::format("the load at ({:.6g}, {:.6g}, {:.6g}) m is not finite", x.x(), x.y(), x.z()));
-    if (!solvers::evaluate(spheres_, x, shape))
+    if (!evaluate(x, shape))
       throw NumericalError(
           fmt::format("no sound support covers the loaded point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
     for (int k = 0; k < shape.size(); ++k)
@@ -173,7 +290,7 @@ std::vector<Vector3> FiniteBody::prescribed_values() const {
   if (problem_.prescribed_field)
     return prescribed_values(problem_.prescribed_field);
   std::vector<Vector3> values;
-  for (const Prescribed& entry : problem_.prescribed)
+  for (const Prescribed& entry : held_->entries())
     values.push_back(entry.value);
   return values;
 }
@@ -188,12 +305,13 @@ std::vector<Vector3> FiniteBody::prescribed_values(const std::function<Vector3(c
 DisplacementMean FiniteBody::contact_mean(int node) const {
   if (node < 0 || node >= size() || problem_.nodes.kinds[node] == NodeKind::interior)
     throw InputError(fmt::format("node {} of {} is not on the surface: a tool cannot touch it", node, size()));
-  return patches_->contact_mean(node, spheres_, problem_);
+  return weighed(patches_->contact_mean(node, spheres(), problem_));
 }
 
 double FiniteBody::deform(const VectorX& coefficients) const {
-  if (coefficients.size() != 3 * static_cast<Eigen::Index>(size()))
-    throw InputError(fmt::format("{} coefficients for {} nodes; there are 3 a node", coefficients.size(), size()));
+  if (coefficients.size() != 3 * static_cast<Eigen::Index>(functions_))
+    throw InputError(
+        fmt::format("{} coefficients for {} functions; there are 3 of each", coefficients.size(), functions_));
   Work& work = *work_;
   parallel_ranges(table_.groups(), groups_of_a_sum, [&](int begin, int end) {
     double least = std::numeric_limits<double>::infinity();
@@ -301,7 +419,7 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
     pressure[b] = shared * law_->pressure(work.jacobian[b]);
     energy += shared * blocks_.volume[b] * law_->volumetric_energy(work.jacobian[b]);
   }
-  out.forces.setZero(3 * static_cast<Eigen::Index>(size()));
+  out.forces.setZero(3 * static_cast<Eigen::Index>(functions_));
   const bool one_thread = thread_count() == 1;
   if (!one_thread)
     work.slots.resize(3 * table_.nodes.size());
@@ -309,7 +427,7 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
     work.chunk_energy[begin / groups_of_a_sum] = add_chunk(begin, end, pressure, one_thread, out.forces);
   });
   if (!one_thread)
-    parallel_ranges(size(), 64, [&](int begin, int end) {
+    parallel_ranges(functions_, 64, [&](int begin, int end) {
       for (int i = begin; i < end; ++i)
         for (int k = work.incident_start[i]; k < work.incident_start[i + 1]; ++k)
           for (int axis = 0; axis < 3; ++axis)
@@ -321,10 +439,10 @@ void FiniteBody::evaluate(const VectorX& coefficients, FiniteForces& out) const 
 }
 
 VectorX FiniteBody::stress_free() const {
-  VectorX coefficients(3 * static_cast<Eigen::Index>(size()));
+  VectorX coefficients(3 * static_cast<Eigen::Index>(functions_));
   const Matrix3 gradient = prestrain_.inverse() - Matrix3::Identity();
-  for (int i = 0; i < size(); ++i)
-    coefficients.segment<3>(3 * static_cast<Eigen::Index>(i)) = gradient * problem_.nodes.positions[i];
+  for (int i = 0; i < functions_; ++i)
+    coefficients.segment<3>(3 * static_cast<Eigen::Index>(i)) = gradient * problem_.nodes.positions[node_of(i)];
   return coefficients;
 }
 
@@ -375,13 +493,13 @@ const std::vector<int>& FiniteBody::rank() const {
 }
 
 double FiniteBody::penalty_stiffness(int entry, double penalty) const {
-  return penalty * law_->small_strain().shear_modulus * problem_.nodes.spacings[problem_.prescribed[entry].node];
+  return penalty * law_->small_strain().shear_modulus * problem_.nodes.spacings[held_->entries()[entry].node];
 }
 
 std::vector<Matrix3> FiniteBody::piola_maps(const VectorX& coefficients) const {
   deform(coefficients);
-  std::vector<Matrix3> maps(size(), Matrix3::Zero());
-  std::vector<double> shares(size(), 0);
+  std::vector<Matrix3> maps(functions_, Matrix3::Zero());
+  std::vector<double> shares(functions_, 0);
   for (int group = 0; group < table_.groups(); ++group) {
     const LaneValues* f = work_->deformation.data() + 9 * static_cast<std::size_t>(group);
     Matrix3 mean;
@@ -396,7 +514,7 @@ std::vector<Matrix3> FiniteBody::piola_maps(const VectorX& coefficients) const {
       shares[table_.nodes[slot]] += table_.shares[slot];
     }
   }
-  for (int i = 0; i < size(); ++i) {
+  for (int i = 0; i < functions_; ++i) {
     if (shares[i] > 0)
       maps[i] /= shares[i];
     const double jacobian = maps[i].determinant();
@@ -409,14 +527,27 @@ std::vector<Matrix3> FiniteBody::piola_maps(const VectorX& coefficients) const {
 }
 
 VectorX FiniteBody::nodal_displacements(const VectorX& coefficients) const {
-  Field field;
-  field.coefficients = coefficients;
-  return supports_.displacements(field);
+  if (cut_functions_ == nullptr) {
+    Field field;
+    field.coefficients = coefficients;
+    return supports_.displacements(field);
+  }
+  VectorX displacements = VectorX::Zero(3 * static_cast<Eigen::Index>(size()));
+  parallel_ranges(size(), 64, [&](int begin, int end) {
+    ShapeFunctions shape;
+    for (int i = begin; i < end; ++i) {
+      shape_at(problem_.nodes.positions[i], shape);
+      for (int k = 0; k < shape.size(); ++k)
+        displacements.segment<3>(3 * static_cast<Eigen::Index>(i)) +=
+            shape.value[k] * coefficients.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k]));
+    }
+  });
+  return displacements;
 }
 
 FiniteState FiniteBody::at(const Vector3& x, const VectorX& coefficients) const {
   ShapeFunctions shape;
-  require_support(spheres_, x, shape);
+  shape_at(x, shape);
   FiniteState state;
   for (int k = 0; k < shape.size(); ++k) {
     const Vector3 u = coefficients.segment<3>(3 * shape.nodes[k]);

@@ -1,5 +1,6 @@
 // A body at finite strain by the method of finite spheres, total Lagrangian: strain energy, forces and tangent of a
-// hyperelastic law as functions of the nodes' coefficients. solvers/finite/equilibrium.hpp finds its equilibria.
+// hyperelastic law as functions of the coefficients of its shape functions. solvers/finite/equilibrium.hpp finds its
+// equilibria.
 //
 // Nearly incompressible laws take the pressure of the mean volume change of blocks of cells,
 //
@@ -10,9 +11,9 @@
 
 #include "solvers/body/elastic_body.hpp"
 #include "solvers/elasticity/prony.hpp"
-#include "solvers/finite/consistent_gradients.hpp"
-#include "solvers/finite/dilatation_blocks.hpp"
 #include "solvers/finite/held_means.hpp"
+#include "solvers/points/consistent_gradients.hpp"
+#include "solvers/points/dilatation_blocks.hpp"
 
 namespace spherecut::topology {
 class PointTree;
@@ -20,7 +21,9 @@ class PointTree;
 
 namespace spherecut::solvers {
 
-class FiniteTangent; // solvers/finite/tangent.hpp
+class CutFunctions;   // solvers/finite/cut_functions.hpp
+class FiniteTangent;  // solvers/finite/tangent.hpp
+class UncutFunctions; // solvers/finite/cut_functions.hpp
 
 struct FiniteOptions {
   double support_radius = 1.75; // rho, radius of a sphere over the node's spacing
@@ -31,7 +34,9 @@ struct FiniteOptions {
   double pointwise_modulus = 2.5;
   std::vector<PronyTerm> prony{}; // of a viscoelastic body: its isochoric stress fades (solvers/elasticity/prony.hpp)
   bool consistent = true;         // whether the gradients are made consistent with the quadrature
-  SightRule sight = SightRule::enriched; // only where there is an incision; not `appended`
+  /// Only where there is an incision, but for `appended`: its points are those of small boxes with or without one, and
+  /// `cell_size` and `quadrature` say nothing of them.
+  SightRule sight = SightRule::enriched;
 };
 
 /// What a law says at one point of the deformed body.
@@ -47,7 +52,7 @@ struct FiniteState {
 struct FiniteForces {
   double energy = 0;         // J; infinite where the law cannot be asked (some J <= 0)
   double least_jacobian = 1; // of all points
-  VectorX forces;            // dE/du, N, 3 a node; not set where the energy is infinite
+  VectorX forces;            // dE/du, N, 3 a function; not set where the energy is infinite
 };
 
 class FiniteBody {
@@ -56,9 +61,11 @@ class FiniteBody {
   /// fibrous law point by point; null: its own. An initial strain e0 of the loads means that the body at rest is
   /// strained elastically by F_0 = I - e0 everywhere (prestrained_law.hpp); law() then is the law with it. Throws
   /// InputError for a problem that discretise() refuses, a pre-strain that prestrained() refuses, options out of their
-  /// range and a missing law; NumericalError where a support is not sound.
+  /// range and a missing law; NumericalError where a support is not sound. `uncut`: of a body of rule `appended`, which
+  /// takes it where it fits (null: there is none yet).
   FiniteBody(Problem problem, std::shared_ptr<const Law> law, const FiniteOptions& options = {},
-             const std::function<FibreFrame(const Vector3& x)>& fibres = nullptr);
+             const std::function<FibreFrame(const Vector3& x)>& fibres = nullptr,
+             const std::shared_ptr<const UncutFunctions>& uncut = nullptr);
   ~FiniteBody();
   FiniteBody(const FiniteBody&) = delete;
   FiniteBody& operator=(const FiniteBody&) = delete;
@@ -66,15 +73,24 @@ class FiniteBody {
   [[nodiscard]] const Problem& problem() const { return problem_; }
   [[nodiscard]] const Law& law() const { return *law_; }
   [[nodiscard]] const FiniteOptions& options() const { return options_; }
-  [[nodiscard]] int size() const { return problem_.nodes.size(); }
-  [[nodiscard]] const Spheres& spheres() const { return spheres_; }
+  [[nodiscard]] int size() const { return problem_.nodes.size(); } // nodes
+  /// Vector unknowns, the coefficients of shape functions: those of the nodes' spheres, then what a cut appends.
+  [[nodiscard]] int functions() const { return functions_; }
+  /// The node whose sphere a function belongs to.
+  [[nodiscard]] int node_of(int function) const;
+  [[nodiscard]] const Spheres& spheres() const;
+  /// The rule `appended`: functions on the cut; else null.
+  [[nodiscard]] const CutFunctions* cut_functions() const { return cut_functions_.get(); }
+  /// Shape functions at x. False: no sound support covers it. Where there is to be one, throws InputError.
+  bool evaluate(const Vector3& x, ShapeFunctions& shape) const;
+  void shape_at(const Vector3& x, ShapeFunctions& shape) const;
   [[nodiscard]] const PointTable& points() const { return table_; }
   [[nodiscard]] const DilatationBlocks& blocks() const { return blocks_; } // none where every point has its pressure
   [[nodiscard]] const ConsistencyReport& consistency() const { return consistency_; }
   [[nodiscard]] const HeldMeans& held() const { return *held_; }
   /// F_0, the elastic deformation of the body at rest, the same everywhere.
   [[nodiscard]] const Matrix3& prestrain() const { return prestrain_; }
-  /// Coefficients of the stress-free body, with F = F_0^-1 everywhere, 3 a node, m.
+  /// Coefficients of the stress-free body, with F = F_0^-1 everywhere, 3 a function, m.
   [[nodiscard]] VectorX stress_free() const;
   /// Share s of the volumetric energy that is taken point by point.
   [[nodiscard]] double pointwise_share() const { return share_; }
@@ -98,19 +114,21 @@ class FiniteBody {
   [[nodiscard]] std::vector<Vector3> prescribed_values(const std::function<Vector3(const Vector3& x)>& field) const;
   /// The share of the surface that a force of a tool on a surface node acts on.
   [[nodiscard]] DisplacementMean contact_mean(int node) const;
+  /// The function that says most about a mean: how the body is strained there.
+  [[nodiscard]] int carrier_of(const DisplacementMean& mean) const;
 
-  /// Strain energy and internal forces, loads and constraints left out. Coefficients: 3 a node, m. The same bits with
-  /// any number of threads.
+  /// Strain energy and internal forces, loads and constraints left out. Coefficients: 3 a function, m. The same bits
+  /// with any number of threads.
   void evaluate(const VectorX& coefficients, FiniteForces& out) const;
 
-  /// Tangent d2E/du2 at the coefficients, its lower triangle of full 3 x 3 blocks, node i at rows 3 rank(i) .. + 2,
+  /// Tangent d2E/du2 at the coefficients, its lower triangle of full 3 x 3 blocks, function i at rows 3 rank(i) .. + 2,
   /// with the penalty of the held means: `penalty` times mu times the node's spacing, N/m, for every held component.
   void tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const;
-  [[nodiscard]] const std::vector<int>& rank() const; // place of every node in the order of elimination
+  [[nodiscard]] const std::vector<int>& rank() const; // place of every function in the order of elimination
   [[nodiscard]] double penalty_stiffness(int entry, double penalty) const;
 
-  /// Map of every node that carries the rest state along: mean of F about it over its determinant. Identity where
-  /// that is below 0.05.
+  /// Map of every function that carries the rest state along: mean of F where it counts over its determinant. Identity
+  /// where that is below 0.05.
   [[nodiscard]] std::vector<Matrix3> piola_maps(const VectorX& coefficients) const;
 
   /// Displacement of every node, u_h(x_i), 3N, m.
@@ -122,6 +140,8 @@ class FiniteBody {
  private:
   friend class FiniteTangent;
   void tabulate();
+  void hold();
+  [[nodiscard]] DisplacementMean weighed(DisplacementMean mean) const;
   void assemble_loads();
   /// F of all groups, and the mean J of all blocks; returns the least J.
   double deform(const VectorX& coefficients) const;
@@ -138,7 +158,9 @@ class FiniteBody {
   std::shared_ptr<const Law> law_;
   FiniteOptions options_;
   std::function<FibreFrame(const Vector3& x)> fibre_field_;
-  Spheres spheres_;
+  std::unique_ptr<const Spheres> own_spheres_; // null by rule `appended`
+  std::unique_ptr<const CutFunctions> cut_functions_;
+  int functions_ = 0;
   std::unique_ptr<SurfacePatches> patches_;
   PointTable table_;
   DilatationBlocks blocks_;

@@ -240,7 +240,7 @@ Vector3 FiniteContact::friction_force() const {
 double FiniteContact::unsettled() const {
   if (!bonds() && !rubs())
     return 0;
-  VectorX change = VectorX::Zero(3 * static_cast<Eigen::Index>(body_.size()));
+  VectorX change = VectorX::Zero(3 * static_cast<Eigen::Index>(body_.functions()));
   std::vector<Vector3> now(nodes_.size(), Vector3::Zero());
   for (const Active& active : active_)
     now[active.candidate] = active.along;

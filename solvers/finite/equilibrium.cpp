@@ -59,7 +59,7 @@ Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& optio
     throw InputError(fmt::format("penetration {} spacings; it must be positive", options.penetration));
   if (!(options.unsettled > 0))
     throw InputError(fmt::format("{} of the acting forces unsettled; it must be positive", options.unsettled));
-  set_coefficients(VectorX::Zero(3 * static_cast<Eigen::Index>(body.size())));
+  set_coefficients(VectorX::Zero(3 * static_cast<Eigen::Index>(body.functions())));
   if (body.prestrain() != Matrix3::Identity()) {
     body.evaluate(state_.coefficients, forces_);
     VectorX free = forces_.forces;
@@ -128,9 +128,9 @@ void Equilibrium::set_edges(std::vector<UnilateralMean> edges, std::vector<doubl
 
 void Equilibrium::set_coefficients(const VectorX& coefficients, double load_factor,
                                    const std::optional<topology::ToolPose>& tool, std::vector<ContactShare> shares) {
-  if (coefficients.size() != 3 * static_cast<Eigen::Index>(body_.size()) || !coefficients.allFinite())
-    throw InputError(fmt::format("{} coefficients for {} nodes; 3 finite numbers a node are wanted",
-                                 coefficients.size(), body_.size()));
+  if (coefficients.size() != 3 * static_cast<Eigen::Index>(body_.functions()) || !coefficients.allFinite())
+    throw InputError(fmt::format("{} coefficients for {} functions; 3 finite numbers of each are wanted",
+                                 coefficients.size(), body_.functions()));
   if (!std::isfinite(load_factor))
     throw InputError(fmt::format("load factor {} is not finite", load_factor));
   if (tool)

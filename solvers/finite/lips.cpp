@@ -16,6 +16,9 @@ FiniteLips::FiniteLips(const FiniteBody& body, std::vector<LipPair> pairs, doubl
   for (const LipPair& pair : pairs_) {
     DisplacementMean apart = body.contact_mean(pair.plus); // mean of `plus` less that of `minus`
     const DisplacementMean minus = body.contact_mean(pair.minus);
+    const std::array<int, 2> carriers = body.cut_functions() == nullptr
+                                            ? std::array{pair.plus, pair.minus}
+                                            : std::array{body.carrier_of(apart), body.carrier_of(minus)};
     for (std::size_t k = 0; k < minus.nodes.size(); ++k) {
       apart.nodes.push_back(minus.nodes[k]);
       apart.weights.push_back(-minus.weights[k]);
@@ -27,15 +30,16 @@ FiniteLips::FiniteLips(const FiniteBody& body, std::vector<LipPair> pairs, doubl
                   .at_rest = pair.gap * pair.normal,
                   .stiffness = penalty,
                   .spacing = h,
-                  .carriers = {pair.plus, pair.minus}});
+                  .carriers = carriers});
   }
 }
 
 // A normal N of the body at rest becomes F^-T N.
 void FiniteLips::turn(const std::vector<Matrix3>& maps) {
   for (std::size_t p = 0; p < pairs_.size(); ++p) {
-    const Vector3 plus = maps[pairs_[p].plus].inverse().transpose() * pairs_[p].normal;
-    const Vector3 minus = maps[pairs_[p].minus].inverse().transpose() * pairs_[p].normal;
+    const auto& [of_plus, of_minus] = contact_.means()[p].carriers;
+    const Vector3 plus = maps[of_plus].inverse().transpose() * pairs_[p].normal;
+    const Vector3 minus = maps[of_minus].inverse().transpose() * pairs_[p].normal;
     const Vector3 both = plus.normalized() + minus.normalized();
     if (both.norm() > 0.1) // else the faces look away from each other, and the last normal stays
       contact_.mean(p).direction = both.normalized();

@@ -18,7 +18,7 @@ class FiniteLips {
   /// Their gaps, one a pair; keys are below 0.
   [[nodiscard]] const UnilateralMeans& contact() const { return contact_; }
   [[nodiscard]] UnilateralMeans& contact() { return contact_; }
-  /// Normals of the body in a state with these maps of its nodes (FiniteBody::piola_maps).
+  /// Normals of the body in a state with these maps (FiniteBody::piola_maps).
   void turn(const std::vector<Matrix3>& maps);
 
  private:

@@ -37,7 +37,7 @@ FiniteTangent::FiniteTangent(const FiniteBody& body) : body_(body) {
 
 void FiniteTangent::find_pattern() {
   const PointTable& table = body_.points();
-  const int count = body_.size();
+  const int count = body_.functions();
   std::vector<std::vector<int>> neighbours(count);
   const auto tidy = [](std::vector<int>& list) {
     std::sort(list.begin(), list.end());
@@ -168,7 +168,7 @@ void FiniteTangent::assemble(const std::vector<LaneValues>& deformation, const s
 }
 
 void FiniteTangent::lay_pattern(SparseMatrix& lower) const {
-  const int count = body_.size();
+  const int count = body_.functions();
   lower.resize(3 * count, 3 * count);
   lower.resizeNonZeros(9 * static_cast<Eigen::Index>(rows_.size()));
   int* const starts = lower.outerIndexPtr();
@@ -260,7 +260,7 @@ void FiniteTangent::group_matrix(int group, const LaneValues* tangent, Local& lo
 void FiniteTangent::add_blocks(const std::vector<double>& jacobian, const std::vector<VectorX>& swelling,
                                SparseMatrix& lower) const {
   const PointTable& table = body_.points();
-  std::vector<int> nodes, place(body_.size(), -1), ranks;
+  std::vector<int> nodes, place(body_.functions(), -1), ranks;
   for (int b = 0; b < std::ssize(block_groups_); ++b) {
     nodes.clear();
     for (const int group : block_groups_[b])

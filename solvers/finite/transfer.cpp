@@ -1,6 +1,6 @@
 #include "solvers/finite/transfer.hpp"
 
-#include "solvers/finite/point_kernels.hpp"
+#include "solvers/points/point_kernels.hpp"
 #include "topology/base/errors.hpp"
 
 #include <Eigen/SparseCholesky>

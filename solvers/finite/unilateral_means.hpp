@@ -15,7 +15,7 @@ struct UnilateralMean {
   Vector3 at_rest = Vector3::Zero();   // m
   double stiffness = 0;                // N/m, of the penalty
   double spacing = 0;                  // m, between nodes there
-  std::array<int, 2> carriers{};       // nodes whose maps carry it from the body at rest
+  std::array<int, 2> carriers{};       // functions whose maps carry it from the body at rest
   [[nodiscard]] double gap(const VectorX& coefficients) const { return direction.dot(at_rest + mean.of(coefficients)); }
 };
 

@@ -1,7 +1,7 @@
 #include "solvers/release/energy_release.hpp"
 
 #include "solvers/elasticity/rotation.hpp"
-#include "solvers/finite/point_kernels.hpp"
+#include "solvers/points/point_kernels.hpp"
 #include "solvers/fracture/local_values.hpp"
 #include "solvers/fracture/virtual_shift.hpp"
 #include "topology/base/errors.hpp"
@@ -67,9 +67,9 @@ EnergyMomentum::EnergyMomentum(const FiniteBody& body, const VectorX& coefficien
     : body_(body), coefficients_(coefficients) {
   if (!body.options().prony.empty())
     throw InputError("energy release: the body is viscoelastic; allowed: one without a Prony series");
-  if (coefficients.size() != 3 * static_cast<Eigen::Index>(body.size()))
-    throw InputError(fmt::format("energy release: {} coefficients for {} nodes; there are 3 a node",
-                                 coefficients.size(), body.size()));
+  if (coefficients.size() != 3 * static_cast<Eigen::Index>(body.functions()))
+    throw InputError(fmt::format("energy release: {} coefficients for {} functions; there are 3 of each",
+                                 coefficients.size(), body.functions()));
   const PointTable& table = body.points();
   const DilatationBlocks& blocks = body.blocks();
   const Law& law = body.law();

@@ -157,7 +157,7 @@ double BodyModel::sphere_radius(int node) const {
 }
 
 int BodyModel::coefficient_count() const {
-  return finite != nullptr ? 3 * finite->spheres().size() : body->coefficient_count();
+  return finite != nullptr ? 3 * finite->functions() : body->coefficient_count();
 }
 
 bool BodyModel::solved() const {

@@ -17,6 +17,7 @@
 
 namespace spherecut::solvers {
 class UncutBody;
+class UncutFunctions;
 }
 
 namespace spherecut::app {
@@ -46,6 +47,7 @@ struct BodyModel {
   std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut, and at finite strain
   std::shared_ptr<FiniteModel> finite;             // in place of the body where the law is not linear
   std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
+  std::shared_ptr<const solvers::UncutFunctions> uncut_functions; // the same at finite strain
   const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
   topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
   int added_nodes = 0;                             // by updates since then

@@ -2,6 +2,7 @@
 
 #include "solvers/contact/friction.hpp"
 #include "solvers/elasticity/rotation.hpp"
+#include "solvers/finite/cut_functions.hpp"
 #include "solvers/finite/transfer.hpp"
 #include "solvers/release/front_states.hpp"
 #include "src/scenario/law_reader.hpp"
@@ -64,8 +65,6 @@ Hindrance hindrance_of(const Scenario& scenario) {
   const bool cuts = scenario.blade || !scenario.precuts.empty();
   if (cuts && scenario.cut.lips == solvers::LipCondition::sticking)
     return {"cut.lips = \"sticking\"", line};
-  if (cuts && scenario.cut.sight == solvers::SightRule::appended)
-    return {"cut.sight = \"appended\"", line};
   if (scenario.tearing.enabled && !scenario.law.spec.prony.empty())
     return {"[tearing] with material.prony", line};
   if (scenario.tearing.enabled && scenario.tearing.strength > 0)
@@ -129,8 +128,8 @@ bool can_run(const Scenario& scenario) {
 
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                          const BodyModel& nodes, bool touched, Patience patience)
-    : fibres_(fibre_field(scenario.law)),
-      body_(checked_problem(scenario, domain, nodes), law_of(scenario.law), body_options(scenario), fibres_),
+    : fibres_(fibre_field(scenario.law)), body_(checked_problem(scenario, domain, nodes), law_of(scenario.law),
+                                                body_options(scenario), fibres_, nodes.uncut_functions),
       equilibrium_(body_, equilibrium_options(patience)), is_prestrained_(!scenario.pretension.isZero(0)),
       pairs_(body_, nodes.pairs) {
   if (!nodes.pairs.empty() && scenario.cut.lips != solvers::LipCondition::open)
@@ -201,14 +200,14 @@ void FiniteModel::lay_skin() {
         (surface.vertices[triangle[0]] + surface.vertices[triangle[1]] + surface.vertices[triangle[2]]) / 3);
   solvers::ShapeFunctions shape;
   for (const Vector3& x : points) {
-    if (!solvers::evaluate(body_.spheres(), x, shape))
+    if (!body_.evaluate(x, shape))
       continue;
     skin_.rest.push_back(x);
     for (int k = 0; k < shape.size(); ++k) {
-      skin_.nodes.push_back(shape.nodes[k]);
+      skin_.functions.push_back(shape.nodes[k]);
       skin_.values.push_back(shape.value[k]);
     }
-    skin_.start.push_back(static_cast<int>(skin_.nodes.size()));
+    skin_.start.push_back(static_cast<int>(skin_.functions.size()));
   }
 }
 
@@ -218,7 +217,7 @@ double FiniteModel::deepest(const topology::ToolPose& pose) const {
   for (std::size_t p = 0; p < skin_.rest.size(); ++p) {
     Vector3 x = skin_.rest[p];
     for (int k = skin_.start[p]; k < skin_.start[p + 1]; ++k)
-      x += skin_.values[k] * coefficients.segment<3>(3 * static_cast<Eigen::Index>(skin_.nodes[k]));
+      x += skin_.values[k] * coefficients.segment<3>(3 * static_cast<Eigen::Index>(skin_.functions[k]));
     depth = std::max(depth, -topology::tool_distance(*tool_, pose, x));
   }
   return depth;
@@ -264,19 +263,28 @@ void FiniteModel::go_on_from(const BodyModel& before) {
   equilibrium_.set_coefficients(start, 1, old.pose_, std::move(shares));
 }
 
-// Nodes that both bodies have keep their coefficients; new ones, and those about new ones and about some that are gone,
-// whose shape functions are others now, take those with which the body is strained as it was.
+std::shared_ptr<const solvers::UncutFunctions> FiniteModel::uncut() const {
+  return body_.cut_functions() != nullptr ? body_.cut_functions()->uncut() : nullptr;
+}
+
+// On the same uncut body what is there goes on. Else nodes that both bodies have keep their coefficients; new ones, and
+// those about new ones and about some that are gone, whose shape functions are others now, take those with which the
+// body is strained as it was.
 VectorX FiniteModel::state_from(const BodyModel& before) const {
   constexpr double about = 2; // radii of the sphere of a node that is new, or gone
   const solvers::NodeCloud& nodes = body_.problem().nodes;
-  VectorX start(3 * static_cast<Eigen::Index>(nodes.size()));
+  const std::vector<Vector3>& places = body_.spheres().centres();
+  VectorX start(3 * static_cast<Eigen::Index>(body_.functions()));
   if (before.finite == nullptr) {
-    for (int i = 0; i < nodes.size(); ++i)
-      start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(nodes.positions[i]).displacement;
+    for (int i = 0; i < body_.functions(); ++i)
+      start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(places[body_.node_of(i)]).displacement;
     return start;
   }
-  const topology::PointTree known(before.nodes().positions), here(nodes.positions);
-  std::vector<char> free(nodes.positions.size(), 0);
+  if (uncut() != nullptr && uncut() == before.finite->uncut())
+    return body_.cut_functions()->state_from(*before.finite->body_.cut_functions(), before.finite->coefficients());
+  const std::vector<Vector3>& places_before = before.finite->spheres().centres();
+  const topology::PointTree known(places_before), here(places);
+  std::vector<char> free(static_cast<std::size_t>(body_.functions()), 0);
   std::vector<topology::PointTree::Found> near;
   const auto free_about = [&](const Vector3& x, double radius) {
     near.clear();
@@ -284,8 +292,8 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
     for (const topology::PointTree::Found& found : near)
       free[found.index] = 1;
   };
-  for (int i = 0; i < nodes.size(); ++i) {
-    const Vector3& x = nodes.positions[i];
+  for (int i = 0; i < std::ssize(places); ++i) {
+    const Vector3& x = places[i];
     const topology::PointTree::Found nearest = known.nearest(x);
     const double same = same_place * nodes.spacings[i];
     if (nearest.index >= 0 && nearest.squared_distance < same * same) {
@@ -296,8 +304,13 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
     start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(x).displacement;
     free_about(x, body_.spheres().radii()[i]);
   }
-  for (int i = 0; i < before.nodes().size(); ++i) {
-    const Vector3& x = before.nodes().positions[i];
+  for (int i = static_cast<int>(places.size()); i < body_.functions(); ++i) {
+    start.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+        start.segment<3>(3 * static_cast<Eigen::Index>(body_.node_of(i)));
+    free[i] = 1;
+  }
+  for (int i = 0; i < std::ssize(places_before); ++i) {
+    const Vector3& x = places_before[i];
     const topology::PointTree::Found nearest = here.nearest(x);
     const double same = same_place * before.nodes().spacings[i];
     if (nearest.squared_distance >= same * same)
@@ -439,10 +452,10 @@ FiniteStep FiniteModel::step_of(const solvers::EquilibriumStatus& status, const 
 // Where the tissue has turned, what is ahead of the edge at rest has, too.
 MatrixX FiniteModel::patterns_of(const solvers::BladePatch& patch, double half_width) const {
   const auto entries = std::ssize(patch.contacts) + (patch.dragged ? 1 : 0);
-  MatrixX patterns = MatrixX::Zero(3 * static_cast<Eigen::Index>(body_.size()), entries);
+  MatrixX patterns = MatrixX::Zero(3 * static_cast<Eigen::Index>(body_.functions()), entries);
   solvers::ShapeFunctions shape;
   const auto add = [&](const Vector3& x, const Vector3& force, Eigen::Index column) {
-    solvers::require_support(body_.spheres(), x, shape);
+    body_.shape_at(x, shape);
     for (int k = 0; k < shape.size(); ++k)
       patterns.col(column).segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) += shape.value[k] * force;
   };
@@ -490,18 +503,20 @@ std::vector<solvers::UnilateralMean> FiniteModel::edges_of(const PressedEdge& ed
     solvers::UnilateralMean mean;
     mean.direction = contact.push;
     mean.mean.centroid = contact.point;
-    int nearest = 0;
-    for (int i = 0; i < nodes.size(); ++i) {
+    for (int i = 0; i < body_.functions(); ++i) {
       const double weight = contact.push.dot(
           edge.patterns.col(static_cast<Eigen::Index>(c)).segment<3>(3 * static_cast<Eigen::Index>(i)));
       if (weight != 0) {
         mean.mean.nodes.push_back(i);
         mean.mean.weights.push_back(weight);
       }
+    }
+    int nearest = 0;
+    for (int i = 0; i < nodes.size(); ++i)
       if ((nodes.positions[i] - contact.point).squaredNorm() < (nodes.positions[nearest] - contact.point).squaredNorm())
         nearest = i;
-    }
-    mean.carriers = {nearest, nearest};
+    const int carrier = body_.cut_functions() == nullptr ? nearest : body_.carrier_of(mean.mean);
+    mean.carriers = {carrier, carrier};
     mean.spacing = nodes.spacings[nearest];
     mean.stiffness = edge_stiffness * modulus * contact.length;
     means.push_back(std::move(mean));
@@ -582,7 +597,7 @@ void FiniteModel::press_edge(const VectorX& advance, double drag, solvers::Blade
     patch.drag_torque = Vector3::Zero();
     solvers::ShapeFunctions shape;
     for (std::size_t k = 0; k < patch.flanks.points.size(); ++k) {
-      solvers::require_support(body_.spheres(), patch.flanks.points[k], shape);
+      body_.shape_at(patch.flanks.points[k], shape);
       Vector3 x = patch.flanks.points[k];
       for (int n = 0; n < shape.size(); ++n)
         x += shape.value[n] * equilibrium_.coefficients().segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[n]));
@@ -614,7 +629,7 @@ solvers::PointState FiniteModel::at(const Vector3& x) const {
 }
 
 void FiniteModel::shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const {
-  solvers::require_support(body_.spheres(), x, shape);
+  body_.shape_at(x, shape);
 }
 
 std::vector<int> FiniteModel::places_among_candidates(const std::vector<int>& nodes) const {

@@ -40,7 +40,7 @@ enum class Patience : std::uint8_t { of_a_run, of_a_hand };
 /// The edge of a blade against the body, and the body without it.
 struct PressedEdge {
   std::vector<solvers::EdgeContact> contacts;
-  MatrixX patterns;      // a unit of every entry of the patch, on the nodes
+  MatrixX patterns;      // a unit of every entry of the patch, on the functions
   VectorX free;          // coefficients, m
   VectorX moved, acting; // m and N, of every entry when it was pressed; empty: not yet
   VectorX way, forces;   // by which they have changed up to then
@@ -106,12 +106,15 @@ class FiniteModel {
   /// Shape functions there, with which the displacement is a sum over coefficients. Throws as at().
   void shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const;
   [[nodiscard]] const solvers::Spheres& spheres() const { return body_.spheres(); }
+  [[nodiscard]] int functions() const { return body_.functions(); }
+  /// The body without its cut, where cuts only append; else null.
+  [[nodiscard]] std::shared_ptr<const solvers::UncutFunctions> uncut() const;
   [[nodiscard]] bool solved() const { return last_.has_value(); }
   /// Of the last solution: time, s, pose of the tool, and what else there is to tell.
   [[nodiscard]] double time() const { return *time_; }
   [[nodiscard]] const std::optional<topology::ToolPose>& pose() const { return pose_; }
   [[nodiscard]] const FiniteStep& last() const { return edge_ && shows_pressed_ ? edge_->pressed : *last_; }
-  [[nodiscard]] const VectorX& coefficients() const { // 3 a node, m
+  [[nodiscard]] const VectorX& coefficients() const { // 3 a function, m
     return edge_ && !shows_pressed_ ? edge_->free : equilibrium_.coefficients();
   }
   /// Gap of every pair of lips along its normal, m.
@@ -131,10 +134,10 @@ class FiniteModel {
   [[nodiscard]] int held() const { return held_nodes(body_.problem().prescribed); }
 
  private:
-  /// Points of the organ's surface as sums over nodes, in compressed rows.
+  /// Points of the organ's surface as sums over functions, in compressed rows.
   struct Skin {
     std::vector<Vector3> rest; // m
-    std::vector<int> start{0}, nodes;
+    std::vector<int> start{0}, functions;
     std::vector<double> values;
   };
   [[nodiscard]] MatrixX patterns_of(const solvers::BladePatch& patch, double half_width) const;

@@ -2,7 +2,7 @@
 // for every point asks for more than the displacements can give: the body locks.
 #pragma once
 
-#include "solvers/finite/point_table.hpp"
+#include "solvers/points/point_table.hpp"
 
 namespace spherecut::solvers {
 

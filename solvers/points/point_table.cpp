@@ -1,4 +1,4 @@
-#include "solvers/finite/point_table.hpp"
+#include "solvers/points/point_table.hpp"
 
 #include "solvers/algebra/parallel.hpp"
 #include "solvers/shapes/cell_shapes.hpp"

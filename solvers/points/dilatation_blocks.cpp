@@ -1,4 +1,4 @@
-#include "solvers/finite/dilatation_blocks.hpp"
+#include "solvers/points/dilatation_blocks.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -12,7 +12,7 @@
 // 2001; Duan, Li, Belytschko and Lin 2012: consistency of the quadrature].
 #pragma once
 
-#include "solvers/finite/point_table.hpp"
+#include "solvers/points/point_table.hpp"
 
 namespace spherecut::solvers {
 

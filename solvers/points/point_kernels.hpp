@@ -1,7 +1,7 @@
 // Inner loops of a body at finite strain: deformation gradients at eight points, and the forces of their stresses.
 #pragma once
 
-#include "solvers/finite/point_table.hpp"
+#include "solvers/points/point_table.hpp"
 
 namespace spherecut::solvers {
 

@@ -1,7 +1,7 @@
-#include "solvers/finite/consistent_gradients.hpp"
+#include "solvers/points/consistent_gradients.hpp"
 
 #include "solvers/algebra/parallel.hpp"
-#include "solvers/finite/point_kernels.hpp"
+#include "solvers/points/point_kernels.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/search/disjoint_sets.hpp"
 

@@ -1,4 +1,4 @@
-#include "solvers/finite/point_kernels.hpp"
+#include "solvers/points/point_kernels.hpp"
 
 namespace spherecut::solvers {
 

@@ -1,0 +1,340 @@
+#include "solvers/finite/cut_functions.hpp"
+
+#include "solvers/body/elastic_body.hpp"
+#include "topology/search/disjoint_sets.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace spherecut::solvers {
+
+namespace {
+
+constexpr double box_cell = 1; // edge of a background cell in spacings; it has 2 x 2 x 2 small boxes
+
+NodeCloud first_nodes(NodeCloud nodes, int base) {
+  nodes.positions.resize(base);
+  nodes.spacings.resize(base);
+  nodes.reaches.resize(base);
+  nodes.kinds.resize(base);
+  nodes.normals.resize(base);
+  return nodes;
+}
+
+/// Every sphere that a front ends in has a step, and there are no functions along the front: those are of fields that
+/// do not turn with the tissue.
+CutSpaceOptions steps_alone() {
+  CutSpaceOptions options;
+  options.front.radius = 0;
+  options.step_turn = -1;
+  options.step_share = 0;
+  return options;
+}
+
+BoundingBox everywhere(const topology::Domain& domain) {
+  const BoundingBox box = domain.bounds();
+  const Vector3 margin = 0.01 * box.extent();
+  return {box.lower - margin, box.upper + margin};
+}
+
+/// A step's function beyond the sheet, and its gradient, from those of its sphere and from the term of the space, which
+/// is h (step - step at the node) / 2.
+struct BeyondStep {
+  double side, at_node;
+  explicit BeyondStep(const Twin& twin) : side(twin.step_at_node >= 0 ? 1 : -1), at_node(twin.step_at_node) {}
+  template <class Value>
+  [[nodiscard]] Value of(const Value& whole, const Value& term) const {
+    return 0.5 * (1 - side * at_node) * whole - side * term;
+  }
+};
+
+} // namespace
+
+UncutFunctions::UncutFunctions(const Problem& problem, int base, double support_radius, bool is_consistent)
+    : domain_(problem.domain), nodes_(first_nodes(problem.nodes, base)),
+      spheres_(nodes_.positions, nodes_.spacings, support_radius, Basis::linear, worst_moment_condition),
+      boxes_(*domain_, nodes_, spheres_, box_cell) {
+  if (!is_consistent)
+    return;
+  Problem uncut = problem;
+  uncut.incision = nullptr;
+  uncut.nodes = nodes_;
+  BackgroundCells cells;
+  // Nothing is divided: a group of the table is a cell of the boxes, in the order of their places.
+  PointTable table =
+      CutFunctions(std::shared_ptr<const UncutFunctions>(std::shared_ptr<void>(), this), uncut).tabulate(cells);
+  consistency_ =
+      make_consistent(nodes_.positions, surface_integrals(spheres_, SurfacePatches(*domain_, nodes_).points()), table);
+  for (int group = 0; group < table.groups(); ++group) {
+    const int cell = boxes_.cells_by_place()[group];
+    const std::vector<int>& nodes = boxes_.cells()[cell].nodes;
+    for (int slot = table.start[group]; slot < table.start[group + 1]; ++slot) {
+      const auto k = std::lower_bound(nodes.begin(), nodes.end(), table.nodes[slot]) - nodes.begin();
+      for (int lane = 0; lane < table.count[group]; ++lane)
+        boxes_.set_gradient(cell, k, lane, table.gradient(slot, lane));
+    }
+  }
+}
+
+bool UncutFunctions::fits(const Problem& problem, int base) const {
+  if (base != size() || problem.domain != domain_)
+    return false;
+  for (int i = 0; i < base; ++i)
+    if (nodes_.positions[i] != problem.nodes.positions[i] || nodes_.spacings[i] != problem.nodes.spacings[i] ||
+        nodes_.kinds[i] != problem.nodes.kinds[i])
+      return false;
+  return true;
+}
+
+CutFunctions::CutFunctions(std::shared_ptr<const UncutFunctions> uncut, const Problem& problem)
+    : uncut_(std::move(uncut)),
+      space_(uncut_->boxes(), *problem.domain, uncut_->nodes(), uncut_->spheres(), problem.material, steps_alone()),
+      of_node_(static_cast<std::size_t>(uncut_->size())), in_cell_(uncut_->boxes().cells().size()) {
+  if (problem.incision != nullptr)
+    space_.update(problem.incision, everywhere(*problem.domain));
+  for (int f = 0; f < std::ssize(appended()); ++f) {
+    of_node_[appended()[f].twin.node].push_back(f);
+    for (const int cell : space_.cells_of(appended()[f]))
+      in_cell_[cell].push_back(f);
+  }
+}
+
+bool CutFunctions::evaluate(const Vector3& x, ShapeFunctions& shape) const {
+  if (!solvers::evaluate(uncut_->spheres(), x, shape))
+    return false;
+  if (appended().empty())
+    return true;
+  const PartId part = space_.part_at(x);
+  thread_local CutTerms terms;
+  space_.take_out_faint(x, part, shape);
+  space_.terms_at(x, part, shape, terms);
+  std::map<int, const ScalarTerm*> term_of; // few
+  for (const ScalarTerm& term : terms.scalar)
+    term_of[term.function] = &term;
+  const int spheres = shape.size();
+  for (int k = 0; k < spheres; ++k) {
+    const double whole = shape.value[k];
+    const Vector3 slope = shape.gradient(k);
+    double own = whole;
+    Vector3 own_slope = slope;
+    for (const int f : of_node_[shape.nodes[k]]) {
+      const Twin& twin = appended()[f].twin;
+      const auto term = term_of.find(f);
+      double beyond = 0;
+      Vector3 gradient = Vector3::Zero();
+      if (twin.is_step) {
+        const BeyondStep step(twin);
+        const bool is_there = term != term_of.end();
+        beyond = step.of(whole, is_there ? term->second->value : 0.0);
+        gradient = step.of(slope, is_there ? term->second->gradient : Vector3(Vector3::Zero()));
+      } else if (term != term_of.end()) {
+        beyond = whole;
+        gradient = slope;
+      }
+      if (beyond == 0 && gradient.isZero(0))
+        continue;
+      own -= beyond;
+      own_slope -= gradient;
+      shape.nodes.push_back(uncut_->size() + f);
+      shape.value.push_back(beyond);
+      shape.dx.push_back(gradient.x());
+      shape.dy.push_back(gradient.y());
+      shape.dz.push_back(gradient.z());
+    }
+    shape.value[k] = own;
+    shape.dx[k] = own_slope.x();
+    shape.dy[k] = own_slope.y();
+    shape.dz[k] = own_slope.z();
+  }
+  int kept = 0;
+  for (int k = 0; k < shape.size(); ++k) {
+    if (shape.value[k] == 0 && shape.gradient(k).isZero(0))
+      continue;
+    shape.nodes[kept] = shape.nodes[k];
+    shape.value[kept] = shape.value[k];
+    shape.dx[kept] = shape.dx[k];
+    shape.dy[kept] = shape.dy[k];
+    shape.dz[kept] = shape.dz[k];
+    ++kept;
+  }
+  shape.nodes.resize(kept);
+  for (std::vector<double>* values : {&shape.value, &shape.dx, &shape.dy, &shape.dz})
+    values->resize(kept);
+  return true;
+}
+
+bool CutFunctions::has_step(int cell) const {
+  return std::any_of(in_cell_[cell].begin(), in_cell_[cell].end(), [&](int f) { return appended()[f].twin.is_step; });
+}
+
+std::vector<CutFunctions::Place> CutFunctions::places_in(int cell) const {
+  const BoxShapes& shapes = uncut_->boxes().cells()[cell];
+  const bool sampled = has_step(cell);
+  std::vector<Place> places;
+  for (int box = shapes.first_box; box < shapes.first_box + shapes.boxes; ++box)
+    for (int p = 0; p < space_.cut().part_count(box); ++p) {
+      const PartId part = part_id(box, p);
+      const CutPart of = space_.cut().part(part);
+      const double volume = uncut_->boxes().boxes()[box].volume * of.share;
+      if (!sampled) {
+        places.push_back({part, 0, {of.centroid, volume}});
+        continue;
+      }
+      const PlacedPart& samples = space_.samples(part);
+      for (int n = 0; n < std::ssize(samples); ++n)
+        places.push_back({part, n, {samples[n].at, volume * samples[n].share}});
+    }
+  return places;
+}
+
+/// Places of a cell that parts of its boxes join.
+std::vector<std::vector<CutFunctions::Place>> CutFunctions::sides_of(int cell) const {
+  std::vector<Place> places = places_in(cell);
+  const BoxShapes& shapes = uncut_->boxes().cells()[cell];
+  bool divided = false;
+  for (int box = shapes.first_box; box < shapes.first_box + shapes.boxes; ++box)
+    divided = divided || space_.cut().is_divided(box);
+  if (!divided)
+    return {std::move(places)};
+  std::map<PartId, int> number;
+  for (const Place& place : places)
+    number.try_emplace(place.part, static_cast<int>(number.size()));
+  topology::DisjointSets joined(static_cast<int>(number.size()));
+  for (const auto& [part, k] : number)
+    space_.cut().for_each_linked(part, [&](PartId other) {
+      if (const auto found = number.find(other); found != number.end())
+        joined.join(k, found->second);
+    });
+  std::map<int, std::vector<Place>> sides;
+  for (Place& place : places)
+    sides[joined.find(number.at(place.part))].push_back(place);
+  std::vector<std::vector<Place>> result;
+  for (auto& [root, side] : sides)
+    result.push_back(std::move(side));
+  return result;
+}
+
+void CutFunctions::append_groups(int cell, const std::vector<Place>& places, int cell_of_table,
+                                 PointTable& table) const {
+  const SmallBoxes& boxes = uncut_->boxes();
+  const BoxShapes& shapes = boxes.cells()[cell];
+  const int base = uncut_->size();
+  struct Slot {
+    int function;
+    std::array<LaneValues, 3> gradient;
+  };
+  for (std::size_t first = 0; first < places.size(); first += point_lanes) {
+    const auto here = std::span(places).subspan(first, std::min<std::size_t>(point_lanes, places.size() - first));
+    LaneValues weights;
+    Vector3 centroid = Vector3::Zero();
+    double volume = 0;
+    for (int lane = 0; lane < point_lanes; ++lane) {
+      const bool is_there = lane < std::ssize(here);
+      const QuadraturePoint& point = here[is_there ? lane : 0].point;
+      table.positions.push_back(point.position);
+      if (!is_there)
+        continue;
+      weights.value[lane] = point.weight;
+      centroid += point.weight * point.position;
+      volume += point.weight;
+    }
+    centroid /= volume;
+    std::vector<Slot> slots, behind; // of the spheres, of what is appended
+    for (std::size_t k = 0; k < shapes.nodes.size(); ++k) {
+      Slot own{shapes.nodes[k], {}};
+      for (int lane = 0; lane < std::ssize(here); ++lane) {
+        const Vector3 gradient = shapes.gradient_at(k, boxes.lane_of(box_of(here[lane].part)));
+        for (int axis = 0; axis < 3; ++axis)
+          own.gradient[axis].value[lane] = gradient[axis];
+      }
+      for (const int f : of_node_[shapes.nodes[k]]) {
+        Slot beyond{base + f, {}};
+        bool any = false;
+        const Twin& twin = appended()[f].twin;
+        for (int lane = 0; lane < std::ssize(here); ++lane) {
+          ScalarTerm term{f, 0, Vector3::Zero()};
+          if (!space_.term_at(f, here[lane].part, here[lane].sample, term)) {
+            if (!twin.is_step)
+              continue;
+            term.gradient.setZero();
+          }
+          const Vector3 whole = shapes.gradient_at(k, boxes.lane_of(box_of(here[lane].part)));
+          const Vector3 gradient = twin.is_step ? BeyondStep(twin).of(whole, term.gradient) : whole;
+          for (int axis = 0; axis < 3; ++axis) {
+            beyond.gradient[axis].value[lane] = gradient[axis];
+            own.gradient[axis].value[lane] -= gradient[axis];
+          }
+          any = any || !gradient.isZero(0);
+        }
+        if (any)
+          behind.push_back(beyond);
+      }
+      const auto is_zero = [](const LaneValues& values) {
+        return std::all_of(std::begin(values.value), std::end(values.value), [](double v) { return v == 0; });
+      };
+      if (!std::all_of(own.gradient.begin(), own.gradient.end(), is_zero))
+        slots.push_back(own);
+    }
+    std::sort(behind.begin(), behind.end(), [](const Slot& a, const Slot& b) { return a.function < b.function; });
+    slots.insert(slots.end(), behind.begin(), behind.end());
+    for (const Slot& slot : slots) {
+      table.nodes.push_back(slot.function);
+      for (const LaneValues& values : slot.gradient)
+        table.gradients.push_back(values);
+      const int node = node_of(slot.function);
+      const double distance = (centroid - uncut_->spheres().centres()[node]).norm() / uncut_->spheres().radii()[node];
+      table.shares.push_back(volume * std::max(quartic_spline(distance), 1e-3));
+    }
+    table.start.push_back(static_cast<int>(table.nodes.size()));
+    table.weights.push_back(weights);
+    table.count.push_back(static_cast<int>(here.size()));
+    table.cell.push_back(cell_of_table);
+  }
+}
+
+PointTable CutFunctions::tabulate(BackgroundCells& cells) const {
+  const SmallBoxes& boxes = uncut_->boxes();
+  PointTable table;
+  cells = {};
+  for (const int cell : boxes.cells_by_place()) {
+    const BoxShapes& shapes = boxes.cells()[cell];
+    BackgroundBox box{shapes.centre, shapes.half, 0, static_cast<int>(cells.start.size()) - 1, 0};
+    for (const std::vector<Place>& side : sides_of(cell)) {
+      append_groups(cell, side, static_cast<int>(cells.start.size()) - 1, table);
+      for (const Place& place : side)
+        cells.points.push_back(place.point);
+      cells.start.push_back(static_cast<int>(cells.points.size()));
+    }
+    box.last_cell = static_cast<int>(cells.start.size()) - 1;
+    cells.boxes.push_back(box);
+  }
+  return table;
+}
+
+// A function that was not there goes on as what its part of the sphere moved by: the node's own unknown, or the step
+// that the front has passed.
+VectorX CutFunctions::state_from(const CutFunctions& before, const VectorX& coefficients) const {
+  const auto at = [](int function) { return 3 * static_cast<Eigen::Index>(function); };
+  const int base = uncut_->size();
+  VectorX state(at(size()));
+  state.head(at(base)) = coefficients.head(at(base));
+  for (int f = 0; f < std::ssize(appended()); ++f) {
+    const Twin& twin = appended()[f].twin;
+    int best = twin.node;
+    std::size_t most = 0;
+    for (const int b : before.of_node_[twin.node]) {
+      const std::vector<PartId>& was = before.appended()[b].twin.hidden;
+      std::vector<PartId> both;
+      std::set_intersection(was.begin(), was.end(), twin.hidden.begin(), twin.hidden.end(), std::back_inserter(both));
+      if (both.size() > most) {
+        most = both.size();
+        best = base + b;
+      }
+    }
+    state.segment<3>(at(base + f)) = coefficients.segment<3>(at(best));
+  }
+  return state;
+}
+
+} // namespace spherecut::solvers
