@@ -60,6 +60,7 @@ solvers::Problem finite_block(const FiniteBlock& block) {
     solvers::SprinkleOptions options;
     options.spacing = *block.graded;
     options.incision = problem.incision;
+    options.lips_apart = block.lips_apart;
     options.random_seed = block.seed;
     problem.nodes = solvers::sprinkle(*problem.domain, options).nodes;
     hold_faces(problem, block);

@@ -18,6 +18,7 @@ struct FiniteBlock {
   HeldFaces held{};
   std::optional<solvers::SpacingField> graded{}; // nodes are sprinkled so, in place of the grid
   std::vector<topology::SurfaceMesh> cuts{};     // there from the start; nodes on a grid take no notice of them
+  bool lips_apart = false; // sprinkled for the rule `appended`: nodes as without the cuts, then places on their faces
 };
 
 /// Nodes on a grid of about the spacing, or sprinkled. Entries are one per node and axis, or, where every face is held

@@ -112,6 +112,16 @@ std::vector<CutPart> CutBoxes::divide(int index, const topology::Incision& incis
   return parts;
 }
 
+// A sheet in the plane of a face divides no box, and parts the boxes on both sides of it.
+bool CutBoxes::lies_at_sheet(int box, const topology::Incision& incision) const {
+  const SmallBox& at = boxes_.boxes()[box];
+  if (!incision.near(at.centre, at.half.norm()))
+    return false;
+  const std::span<const int> neighbours = boxes_.neighbours(box);
+  return std::any_of(neighbours.begin(), neighbours.end(),
+                     [&](int other) { return incision.blocks(at.middle, boxes_.boxes()[other].middle); });
+}
+
 std::vector<int> CutBoxes::update(const topology::Incision& incision, const BoundingBox& region) {
   std::vector<int> concerned, fresh;
   boxes_.within(region, concerned);
@@ -122,7 +132,8 @@ std::vector<int> CutBoxes::update(const topology::Incision& incision, const Boun
       fresh.push_back(box);
     }
     std::vector<CutPart> parts = divide(box, incision);
-    if (parts.size() > 1 || parts.front().share != 1 || parts.front().centroid != boxes_.boxes()[box].middle) {
+    if (parts.size() > 1 || parts.front().share != 1 || parts.front().centroid != boxes_.boxes()[box].middle ||
+        lies_at_sheet(box, incision)) {
       if (fresh.empty() || fresh.back() != box)
         fresh.push_back(box);
       divided_[box] = std::make_unique<Divided>();

@@ -45,6 +45,7 @@ class CutBoxes {
     const Vector3& middle = boxes_.boxes()[box].middle;
     return {1, middle, middle};
   }
+  /// Whether the cut divides the box, or parts it from a neighbour.
   [[nodiscard]] bool is_divided(int box) const { return divided_[box] != nullptr; }
   /// Calls visit(part) for the parts that hang together with this one across a face of its box, or around a front
   /// within it.
@@ -74,6 +75,7 @@ class CutBoxes {
   };
   [[nodiscard]] std::vector<CutPart> divide(int box, const topology::Incision& incision) const;
   [[nodiscard]] std::vector<CutPart> divide_by_samples(const SmallBox& box, const topology::Incision& incision) const;
+  [[nodiscard]] bool lies_at_sheet(int box, const topology::Incision& incision) const;
   [[nodiscard]] int nearest_part(int box, const Vector3& x, const topology::Incision& incision) const;
 
   const SmallBoxes& boxes_;
