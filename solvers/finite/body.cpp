@@ -158,49 +158,12 @@ DisplacementMean FiniteBody::weighed(DisplacementMean mean) const {
   return mean;
 }
 
-// A share that the cut parts is held on each side for itself, by the function that its node has there.
+// Shares consist of what their node sees.
 void FiniteBody::hold() {
   std::vector<DisplacementMean> means = held_shares(problem_, spheres(), *patches_);
-  std::vector<int> own;
-  for (const Prescribed& entry : problem_.prescribed)
-    own.push_back(entry.node);
-  if (cut_functions_ == nullptr) {
-    held_ = std::make_unique<HeldMeans>(problem_.prescribed, std::move(means), own, functions_);
-    return;
-  }
-  const int base = cut_functions_->uncut()->size();
-  std::vector<Prescribed> entries;
-  std::vector<DisplacementMean> parts;
-  std::vector<int> of_parts;
-  ShapeFunctions shape;
-  for (std::size_t e = 0; e < means.size(); ++e) {
-    std::map<int, DisplacementMean> of_side; // by the node's function there
-    for (const QuadraturePoint& point : means[e].share) {
-      shape_at(point.position, shape);
-      int side = own[e];
-      for (const int function : shape.nodes)
-        if (function >= base && cut_functions_->node_of(function) == own[e] &&
-            !cut_functions_->appended()[function - base].twin.is_step)
-          side = function;
-      of_side[side].share.push_back(point);
-    }
-    for (auto& [function, part] : of_side) {
-      double whole = 0;
-      part.centroid.setZero();
-      for (const QuadraturePoint& point : part.share) {
-        whole += point.weight;
-        part.centroid += point.weight * point.position;
-      }
-      part.centroid /= whole;
-      part.area = whole * means[e].area;
-      for (QuadraturePoint& point : part.share)
-        point.weight /= whole;
-      entries.push_back(problem_.prescribed[e]);
-      parts.push_back(weighed(std::move(part)));
-      of_parts.push_back(function);
-    }
-  }
-  held_ = std::make_unique<HeldMeans>(std::move(entries), std::move(parts), of_parts, functions_);
+  for (DisplacementMean& mean : means)
+    mean = weighed(std::move(mean));
+  held_ = std::make_unique<HeldMeans>(problem_.prescribed, std::move(means), functions_);
 }
 
 int FiniteBody::carrier_of(const DisplacementMean& mean) const {

@@ -123,6 +123,7 @@ class FiniteBody {
 
   /// Tangent d2E/du2 at the coefficients, its lower triangle of full 3 x 3 blocks, function i at rows 3 rank(i) .. + 2,
   /// with the penalty of the held means: `penalty` times mu times the node's spacing, N/m, for every held component.
+  /// With a penalty what a cut appends has a little support of its own, so that the whole is definite.
   void tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const;
   [[nodiscard]] const std::vector<int>& rank() const; // place of every function in the order of elimination
   [[nodiscard]] double penalty_stiffness(int entry, double penalty) const;

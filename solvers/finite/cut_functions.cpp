@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 namespace spherecut::solvers {
 
 namespace {
 
+constexpr double faint = 1e-5; // of the energy of its sphere: a step with less is none
 constexpr double box_cell = 1; // edge of a background cell in spacings; it has 2 x 2 x 2 small boxes
 
 NodeCloud first_nodes(NodeCloud nodes, int base) {
@@ -91,19 +93,66 @@ CutFunctions::CutFunctions(std::shared_ptr<const UncutFunctions> uncut, const Pr
     : uncut_(std::move(uncut)),
       space_(uncut_->boxes(), *problem.domain, uncut_->nodes(), uncut_->spheres(), problem.material, steps_alone()),
       of_node_(static_cast<std::size_t>(uncut_->size())), in_cell_(uncut_->boxes().cells().size()) {
-  if (problem.incision != nullptr)
-    space_.update(problem.incision, everywhere(*problem.domain));
-  for (int f = 0; f < std::ssize(appended()); ++f) {
-    of_node_[appended()[f].twin.node].push_back(f);
-    for (const int cell : space_.cells_of(appended()[f]))
+  if (problem.incision == nullptr)
+    return;
+  space_.update(problem.incision, everywhere(*problem.domain));
+  find_kept();
+}
+
+// A step that its sphere hardly feels, at its rim, would be an unknown without stiffness.
+void CutFunctions::find_kept() {
+  kept_.resize(space_.functions().size());
+  std::iota(kept_.begin(), kept_.end(), 0);
+  list_by_place();
+  std::vector<double> whole(kept_.size(), 0), beyond(kept_.size(), 0);
+  const SmallBoxes& boxes = uncut_->boxes();
+  for (int cell = 0; cell < std::ssize(in_cell_); ++cell) {
+    if (!has_step(cell))
+      continue;
+    const BoxShapes& shapes = boxes.cells()[cell];
+    for (const Place& place : places_in(cell))
+      for (const int f : in_cell_[cell]) {
+        if (!twin(f).is_step)
+          continue;
+        const auto at = std::lower_bound(shapes.nodes.begin(), shapes.nodes.end(), twin(f).node);
+        const Vector3 gradient = shapes.gradient_at(at - shapes.nodes.begin(), boxes.lane_of(box_of(place.part)));
+        whole[f] += place.point.weight * gradient.squaredNorm();
+        beyond[f] += place.point.weight * gradient_beyond(f, place, gradient).squaredNorm();
+      }
+  }
+  std::vector<int> weighing;
+  for (int f = 0; f < appended(); ++f)
+    if (!twin(f).is_step || beyond[f] > faint * whole[f])
+      weighing.push_back(kept_[f]);
+  if (weighing.size() == kept_.size())
+    return;
+  kept_ = std::move(weighing);
+  list_by_place();
+}
+
+void CutFunctions::list_by_place() {
+  for (std::vector<std::vector<int>>* lists : {&of_node_, &in_cell_})
+    for (std::vector<int>& list : *lists)
+      list.clear();
+  for (int f = 0; f < appended(); ++f) {
+    of_node_[twin(f).node].push_back(f);
+    for (const int cell : space_.cells_of(space_.functions()[kept_[f]]))
       in_cell_[cell].push_back(f);
   }
+}
+
+Vector3 CutFunctions::gradient_beyond(int k, const Place& place, const Vector3& whole) const {
+  ScalarTerm term{kept_[k], 0, Vector3::Zero()};
+  const bool is_there = space_.term_at(kept_[k], place.part, place.sample, term);
+  if (twin(k).is_step)
+    return BeyondStep(twin(k)).of(whole, is_there ? term.gradient : Vector3(Vector3::Zero()));
+  return is_there ? whole : Vector3(Vector3::Zero());
 }
 
 bool CutFunctions::evaluate(const Vector3& x, ShapeFunctions& shape) const {
   if (!solvers::evaluate(uncut_->spheres(), x, shape))
     return false;
-  if (appended().empty())
+  if (appended() == 0)
     return true;
   const PartId part = space_.part_at(x);
   thread_local CutTerms terms;
@@ -119,12 +168,11 @@ bool CutFunctions::evaluate(const Vector3& x, ShapeFunctions& shape) const {
     double own = whole;
     Vector3 own_slope = slope;
     for (const int f : of_node_[shape.nodes[k]]) {
-      const Twin& twin = appended()[f].twin;
-      const auto term = term_of.find(f);
+      const auto term = term_of.find(kept_[f]);
       double beyond = 0;
       Vector3 gradient = Vector3::Zero();
-      if (twin.is_step) {
-        const BeyondStep step(twin);
+      if (twin(f).is_step) {
+        const BeyondStep step(twin(f));
         const bool is_there = term != term_of.end();
         beyond = step.of(whole, is_there ? term->second->value : 0.0);
         gradient = step.of(slope, is_there ? term->second->gradient : Vector3(Vector3::Zero()));
@@ -165,7 +213,7 @@ bool CutFunctions::evaluate(const Vector3& x, ShapeFunctions& shape) const {
 }
 
 bool CutFunctions::has_step(int cell) const {
-  return std::any_of(in_cell_[cell].begin(), in_cell_[cell].end(), [&](int f) { return appended()[f].twin.is_step; });
+  return std::any_of(in_cell_[cell].begin(), in_cell_[cell].end(), [&](int f) { return twin(f).is_step; });
 }
 
 std::vector<CutFunctions::Place> CutFunctions::places_in(int cell) const {
@@ -251,16 +299,9 @@ void CutFunctions::append_groups(int cell, const std::vector<Place>& places, int
       for (const int f : of_node_[shapes.nodes[k]]) {
         Slot beyond{base + f, {}};
         bool any = false;
-        const Twin& twin = appended()[f].twin;
         for (int lane = 0; lane < std::ssize(here); ++lane) {
-          ScalarTerm term{f, 0, Vector3::Zero()};
-          if (!space_.term_at(f, here[lane].part, here[lane].sample, term)) {
-            if (!twin.is_step)
-              continue;
-            term.gradient.setZero();
-          }
           const Vector3 whole = shapes.gradient_at(k, boxes.lane_of(box_of(here[lane].part)));
-          const Vector3 gradient = twin.is_step ? BeyondStep(twin).of(whole, term.gradient) : whole;
+          const Vector3 gradient = gradient_beyond(f, here[lane], whole);
           for (int axis = 0; axis < 3; ++axis) {
             beyond.gradient[axis].value[lane] = gradient[axis];
             own.gradient[axis].value[lane] -= gradient[axis];
@@ -319,14 +360,14 @@ VectorX CutFunctions::state_from(const CutFunctions& before, const VectorX& coef
   const int base = uncut_->size();
   VectorX state(at(size()));
   state.head(at(base)) = coefficients.head(at(base));
-  for (int f = 0; f < std::ssize(appended()); ++f) {
-    const Twin& twin = appended()[f].twin;
-    int best = twin.node;
+  for (int f = 0; f < appended(); ++f) {
+    const std::vector<PartId>& is = twin(f).hidden;
+    int best = twin(f).node;
     std::size_t most = 0;
-    for (const int b : before.of_node_[twin.node]) {
-      const std::vector<PartId>& was = before.appended()[b].twin.hidden;
+    for (const int b : before.of_node_[twin(f).node]) {
+      const std::vector<PartId>& was = before.twin(b).hidden;
       std::vector<PartId> both;
-      std::set_intersection(was.begin(), was.end(), twin.hidden.begin(), twin.hidden.end(), std::back_inserter(both));
+      std::set_intersection(was.begin(), was.end(), is.begin(), is.end(), std::back_inserter(both));
       if (both.size() > most) {
         most = both.size();
         best = base + b;

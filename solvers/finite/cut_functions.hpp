@@ -51,11 +51,13 @@ class CutFunctions {
 
   [[nodiscard]] const std::shared_ptr<const UncutFunctions>& uncut() const { return uncut_; }
   /// Vector unknowns: one a node of the uncut body, then those that the cut appends.
-  [[nodiscard]] int size() const { return uncut_->size() + static_cast<int>(appended().size()); }
-  [[nodiscard]] const std::vector<CutFunction>& appended() const { return space_.functions(); }
+  [[nodiscard]] int size() const { return uncut_->size() + appended(); }
+  [[nodiscard]] int appended() const { return static_cast<int>(kept_.size()); }
+  /// Of the k-th that is appended.
+  [[nodiscard]] const Twin& twin(int k) const { return space_.functions()[kept_[k]].twin; }
   /// The node whose sphere a function belongs to.
   [[nodiscard]] int node_of(int function) const {
-    return function < uncut_->size() ? function : appended()[function - uncut_->size()].twin.node;
+    return function < uncut_->size() ? function : twin(function - uncut_->size()).node;
   }
   /// The functions at x; those that vanish are left out. False: no sound support covers x.
   bool evaluate(const Vector3& x, ShapeFunctions& shape) const;
@@ -78,10 +80,15 @@ class CutFunctions {
   [[nodiscard]] std::vector<std::vector<Place>> sides_of(int cell) const;
   void append_groups(int cell, const std::vector<Place>& places, int cell_of_table, PointTable& table) const;
   [[nodiscard]] bool has_step(int cell) const;
+  void find_kept();
+  void list_by_place();
+  /// Gradient of the k-th appended function in a part that its sphere reaches, 1/m; of the sphere's: `whole`.
+  [[nodiscard]] Vector3 gradient_beyond(int k, const Place& place, const Vector3& whole) const;
 
   std::shared_ptr<const UncutFunctions> uncut_;
   CutSpace space_;
-  std::vector<std::vector<int>> of_node_; // places in appended(), by node
+  std::vector<int> kept_;                 // functions of the space that weigh
+  std::vector<std::vector<int>> of_node_; // of these, by node
   std::vector<std::vector<int>> in_cell_; // likewise, by cell of the small boxes
 };
 

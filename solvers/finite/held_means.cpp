@@ -4,8 +4,7 @@
 
 namespace spherecut::solvers {
 
-HeldMeans::HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMean> means, const std::vector<int>& own,
-                     int functions)
+HeldMeans::HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMean> means, int functions)
     : entries_(std::move(entries)), means_(std::move(means)) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<int> here;
@@ -25,21 +24,21 @@ HeldMeans::HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMe
     group.entries = here;
     std::vector<int> place(functions, -1);
     for (const int e : here) {
-      place[own[e]] = static_cast<int>(group.nodes.size());
-      group.nodes.push_back(own[e]);
+      place[entries_[e].node] = static_cast<int>(group.nodes.size());
+      group.nodes.push_back(entries_[e].node);
     }
-    std::vector<Eigen::Triplet<double>> followers, others;
+    std::vector<Eigen::Triplet<double>> own, others;
     for (int row = 0; row < std::ssize(here); ++row) {
       const DisplacementMean& mean = means_[here[row]];
       for (std::size_t k = 0; k < mean.nodes.size(); ++k)
         if (place[mean.nodes[k]] >= 0)
-          followers.emplace_back(row, place[mean.nodes[k]], mean.weights[k]);
+          own.emplace_back(row, place[mean.nodes[k]], mean.weights[k]);
         else
           others.emplace_back(row, mean.nodes[k], mean.weights[k]);
     }
     const auto count = static_cast<Eigen::Index>(here.size());
     SparseMatrix matrix(count, count);
-    matrix.setFromTriplets(followers.begin(), followers.end());
+    matrix.setFromTriplets(own.begin(), own.end());
     group.own = factor_general(matrix);
     group.others.resize(count, functions);
     group.others.setFromTriplets(others.begin(), others.end());

@@ -163,8 +163,11 @@ void FiniteTangent::assemble(const std::vector<LaneValues>& deformation, const s
   add_groups(deformation, jacobian, swelling, lower);
   if (blocks)
     add_blocks(jacobian, swelling, lower);
-  if (penalty > 0)
+  if (penalty > 0) {
     add_penalties(penalty, lower);
+    if (body_.cut_functions() != nullptr)
+      add_support(lower);
+  }
 }
 
 void FiniteTangent::lay_pattern(SparseMatrix& lower) const {
@@ -283,6 +286,20 @@ void FiniteTangent::add_blocks(const std::vector<double>& jacobian, const std::v
     scatter(ranks, slope / body_.blocks().volume[b] * sum * sum.transpose(), lower);
     for (const int node : nodes)
       place[node] = -1;
+  }
+}
+
+// Where a cut leaves slivers of the body, more functions may reach a part than it has strains: some of their sums do
+// nothing to any point, and no force moves them.
+void FiniteTangent::add_support(SparseMatrix& lower) const {
+  constexpr double little = 1e-7; // of mu times the spacing
+  for (int f = 0; f < body_.functions(); ++f) {
+    const double support =
+        little * body_.law().small_strain().shear_modulus * body_.problem().nodes.spacings[body_.node_of(f)];
+    for (int a = 0; a < 3; ++a) {
+      const int column = 3 * rank_[f] + a; // its diagonal comes after those before it in its block
+      lower.valuePtr()[lower.outerIndexPtr()[column] + a] += support;
+    }
   }
 }
 

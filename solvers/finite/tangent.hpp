@@ -27,6 +27,7 @@ class FiniteTangent {
                   std::vector<VectorX>& swelling, SparseMatrix& lower) const;
   void add_blocks(const std::vector<double>& jacobian, const std::vector<VectorX>& swelling, SparseMatrix& lower) const;
   void add_penalties(double penalty, SparseMatrix& lower) const;
+  void add_support(SparseMatrix& lower) const;
   /// d(sum of w J)/du of a group, in its order of nodes, m2.
   [[nodiscard]] VectorX swelling_of(int group, const LaneValues* cofactor) const;
   void group_matrix(int group, const LaneValues* tangent, Local& local) const;

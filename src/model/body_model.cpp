@@ -66,8 +66,7 @@ std::vector<std::array<bool, 3>> axes_held_together(const std::vector<FixedRegio
 solvers::DiscretisationOptions method_of(const Scenario& scenario) {
   solvers::DiscretisationOptions options = scenario.method;
   options.unheld = scenario.cut.unheld;
-  if (scenario.cut.sight)
-    options.sight = *scenario.cut.sight;
+  options.sight = sight_of(scenario);
   return options;
 }
 
@@ -126,8 +125,12 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
   return problem;
 }
 
+solvers::SightRule sight_of(const Scenario& scenario) {
+  return scenario.cut.sight.value_or(is_nonlinear(scenario.law) ? solvers::SightRule::appended : scenario.method.sight);
+}
+
 bool cut_appends(const Scenario& scenario) {
-  return scenario.method.method == solvers::Method::galerkin && scenario.cut.sight == solvers::SightRule::appended;
+  return scenario.method.method == solvers::Method::galerkin && sight_of(scenario) == solvers::SightRule::appended;
 }
 
 int BodyModel::nearest_seen(const Vector3& x) const {

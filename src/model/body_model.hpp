@@ -27,7 +27,11 @@ inline constexpr double near_banks = 0.25;
 
 class FiniteModel; // src/model/finite_model.hpp
 
-/// Whether a cut of this scenario's body only appends unknowns (cut.sight = "appended").
+/// How spheres reach around a cut: cut.sight, or what is left out there, `appended` at finite strain and the method's
+/// own elsewhere.
+solvers::SightRule sight_of(const Scenario& scenario);
+
+/// Whether a cut of this scenario's body only appends unknowns (sight rule `appended`).
 bool cut_appends(const Scenario& scenario);
 
 struct BodyModel {

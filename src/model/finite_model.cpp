@@ -43,7 +43,7 @@ solvers::EquilibriumOptions equilibrium_options(Patience patience) {
 solvers::FiniteOptions body_options(const Scenario& scenario) {
   solvers::FiniteOptions options;
   options.prony = scenario.law.spec.prony;
-  options.sight = scenario.cut.sight.value_or(options.sight);
+  options.sight = sight_of(scenario);
   return options;
 }
 

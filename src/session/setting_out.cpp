@@ -93,9 +93,10 @@ void lay_first_nodes(SessionState& state, const BodyUpdater& updater) {
     state.zone.begin_at(state.zone.centre_of(state.touch->contact, state.touch->pose));
   state.model.touched_from = state.zone.facing();
   if (state.zone.find_gaps() && cut_appends(state.scenario)) {
-    state.scenario.cut.sight = solvers::SightRule::enriched;
-    state.log.warn("gaps", "cut.sight = \"appended\" takes spheres that see through the narrow gaps of this organ: "
-                           "\"enriched\" is used");
+    const bool is_wanted = std::exchange(state.scenario.cut.sight, solvers::SightRule::enriched).has_value();
+    if (is_wanted)
+      state.log.warn("gaps", "cut.sight = \"appended\" takes spheres that see through the narrow gaps of this organ: "
+                             "\"enriched\" is used");
   }
   std::vector<Vector3> places;
   if (state.zone.centre())

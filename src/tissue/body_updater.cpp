@@ -83,6 +83,8 @@ void BodyUpdater::lead_zone(const topology::Incision& incision, CutGrowth& growt
     return;
   }
   const auto why_not = [&, way = growth.way_ahead()]() -> std::string {
+    if (is_nonlinear(scenario_.law) && cut_appends(scenario_))
+      return "";
     if (std::string hindrance = state_.hindrance(); !hindrance.empty())
       return hindrance;
     if (cut_appends(scenario_))

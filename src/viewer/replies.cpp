@@ -1,6 +1,7 @@
 #include "src/viewer/replies.hpp"
 
 #include "src/base/version.hpp"
+#include "src/model/body_model.hpp"
 #include "topology/base/overloaded.hpp"
 
 #include <fmt/format.h>
@@ -132,7 +133,7 @@ std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMo
                    {"poisson_ratio", scenario.material.poisson_ratio},
                    {"toughness", scenario.toughness},
                    {"method", solvers::to_string(scenario.method.method)},
-                   {"sight", solvers::to_string(scenario.cut.sight.value_or(scenario.method.sight))},
+                   {"sight", solvers::to_string(sight_of(scenario))},
                    {"fine_spacing", session.fine_spacing()},
                    {"coarse_spacing", session.coarse_spacing()}}}});
 }
