@@ -29,22 +29,7 @@ CutSpace::CutSpace(const SmallBoxes& boxes, const topology::Domain& domain, cons
     : boxes_(boxes), domain_(domain), nodes_(nodes), spheres_(spheres), material_(material), options_(options),
       cut_(boxes, domain), places_(cut_, domain, material, farthest_from_front(nodes, spheres, options)),
       twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()), group_weights_(nodes.positions.size()),
-      faint_(nodes.positions.size()), local_(most_parts * static_cast<std::size_t>(boxes.size()), -1),
-      reach_(nodes.positions.size()) {}
-
-const std::vector<int>& CutSpace::boxes_in_reach(int node) const {
-  std::vector<int>& near = reach_[node];
-  if (!near.empty())
-    return near;
-  const Vector3& x = spheres_.centres()[node];
-  const double radius = spheres_.radii()[node];
-  boxes_.within({x.array() - radius, x.array() + radius}, near);
-  std::erase_if(near, [&](int box) {
-    const SmallBox& at = boxes_.boxes()[box];
-    return ((x - at.centre).cwiseAbs() - at.half).cwiseMax(0).squaredNorm() >= radius * radius;
-  });
-  return near;
-}
+      faint_(nodes.positions.size()), local_(most_parts * static_cast<std::size_t>(boxes.size()), -1) {}
 
 // Step of a partly cut sphere at x and its gradient; `place` null: far from every front, where the step is the side.
 double CutSpace::step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const {
@@ -147,7 +132,7 @@ double CutSpace::energy_in(int node, PartId part) const {
 // together although a sheet divides some, the sphere has a step.
 void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   faint_[node].clear();
-  const std::vector<int>& reach = boxes_in_reach(node);
+  const std::vector<int>& reach = boxes_.in_reach(node);
   if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
     return;
   std::vector<PartId> parts;

@@ -109,8 +109,6 @@ class CutSpace {
   void take_out_faint(const Vector3& x, PartId part, ShapeFunctions& shape) const;
 
  private:
-  /// Boxes that the sphere of a node may reach, ascending; kept.
-  [[nodiscard]] const std::vector<int>& boxes_in_reach(int node) const;
   void add_twins(int node, std::vector<CutFunction>& found);
   int find_components(const std::vector<PartId>& parts, std::vector<int>& component, const std::vector<char>& marked);
   [[nodiscard]] std::vector<char> faint_of(int node, const std::vector<PartId>& parts) const;
@@ -146,12 +144,11 @@ class CutSpace {
     std::array<double, BoxShapes::lanes> middle{};        // at the middles of the boxes
     std::array<double, 3 * BoxShapes::lanes> gradients{}; // 1/m, [lane][axis]
   };
-  mutable std::vector<Blend> blends_;           // of one cell
-  mutable std::vector<int> blend_of_;           // by function, -1 between calls
-  mutable std::vector<int> local_;              // of a part among those of a sphere, -1 between calls
-  mutable std::vector<std::vector<int>> reach_; // by node, found as they are asked for
-  std::vector<char> curved_;                    // by segment of the front: its run is curved
-  std::vector<double> carried_;                 // m, likewise: nodes so near to it carry functions along the front
+  mutable std::vector<Blend> blends_; // of one cell
+  mutable std::vector<int> blend_of_; // by function, -1 between calls
+  mutable std::vector<int> local_;    // of a part among those of a sphere, -1 between calls
+  std::vector<char> curved_;          // by segment of the front: its run is curved
+  std::vector<double> carried_;       // m, likewise: nodes so near to it carry functions along the front
   int next_id_ = 0;
 };
 

@@ -41,7 +41,7 @@ std::pair<double, Vector3> part_inside(const topology::Domain& domain, const Vec
 }
 
 SmallBoxes::SmallBoxes(const topology::Domain& domain, const NodeCloud& nodes, const Spheres& spheres, double cell_size)
-    : spheres_(spheres) {
+    : spheres_(spheres), reach_(static_cast<std::size_t>(spheres.size())) {
   const BackgroundCells leaves = background_cells(domain, nodes, {cell_size, 1, false, 1});
   cells_.reserve(leaves.boxes.size());
   for (const BackgroundBox& leaf : leaves.boxes)
@@ -246,6 +246,20 @@ void SmallBoxes::within(const BoundingBox& region, std::vector<int>& found) cons
       }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
+}
+
+const std::vector<int>& SmallBoxes::in_reach(int node) const {
+  const std::scoped_lock lock(reach_mutex_);
+  std::vector<int>& near = reach_[node];
+  if (!near.empty())
+    return near;
+  const Vector3& x = spheres_.centres()[node];
+  const double radius = spheres_.radii()[node];
+  within({x.array() - radius, x.array() + radius}, near);
+  std::erase_if(near, [&](int box) {
+    return ((x - boxes_[box].centre).cwiseAbs() - boxes_[box].half).cwiseMax(0).squaredNorm() >= radius * radius;
+  });
+  return near;
 }
 
 int SmallBoxes::locate(const Vector3& x) const {

@@ -6,6 +6,7 @@
 #include "solvers/quadrature/background_cells.hpp"
 #include "solvers/shapes/functions.hpp"
 
+#include <mutex>
 #include <span>
 
 namespace spherecut::solvers {
@@ -59,6 +60,8 @@ class SmallBoxes {
   [[nodiscard]] int locate(const Vector3& x) const;
   /// Boxes that may meet the region, ascending.
   void within(const BoundingBox& region, std::vector<int>& found) const;
+  /// Boxes that the sphere of a node may reach, ascending. Found as they are asked for, and kept; thread safe.
+  [[nodiscard]] const std::vector<int>& in_reach(int node) const;
   /// Cells in an order in which neighbours follow one another.
   [[nodiscard]] const std::vector<int>& cells_by_place() const { return order_; }
 
@@ -78,6 +81,8 @@ class SmallBoxes {
   Vector3 bin_origin_ = Vector3::Zero(), bin_size_ = Vector3::Ones(); // m
   std::array<int, 3> bins_{1, 1, 1};
   std::vector<int> bin_start_, bin_boxes_;
+  mutable std::mutex reach_mutex_;
+  mutable std::vector<std::vector<int>> reach_; // by node; empty: not known
 };
 
 /// Takes out the functions for which is_out(k), and corrects the others so that they reproduce linear functions as

@@ -217,7 +217,6 @@ TEST_CASE("What a law other than linear does not go with is refused with its lin
               "0.03]\n[[tool.path]]\ntime = 1\nposition = [0, 0, 0.035]\n",
           "[blade] with material.toughness beside a grasper");
   refused(block + disc_precut + "[cut]\nlips = \"sticking\"\n", "cut.lips = \"sticking\"");
-  refused(block + disc_precut + "[cut]\nsight = \"appended\"\n", "cut.sight = \"appended\"");
   refused(replaced(block, "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\n[[material.prony]]\nshare = 0.3\ntime = 2\n") +
               incision_at_end,
           "[blade] with material.prony");
