@@ -7,6 +7,8 @@
 #include "topology/base/errors.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <fmt/format.h>
 #include <limits>
 #include <numeric>
@@ -190,6 +192,7 @@ void FiniteTangent::lay_pattern(SparseMatrix& lower) const {
 void FiniteTangent::add_groups(const std::vector<LaneValues>& deformation, const std::vector<double>& jacobian,
                                std::vector<VectorX>& swelling, SparseMatrix& lower) const {
   const int groups = body_.points().groups();
+  const std::unique_ptr<const Uniform> uniform = uniform_of(deformation, jacobian);
   std::vector<Local> locals(groups_at_once);
   for (int first = 0; first < groups; first += groups_at_once) {
     const int here = std::min(groups_at_once, groups - first);
@@ -199,6 +202,15 @@ void FiniteTangent::add_groups(const std::vector<LaneValues>& deformation, const
         const int group = first + k;
         const bool blocks = !swelling.empty();
         LaneValues cofactor[9];
+        if (uniform != nullptr) {
+          for (int c = 0; c < 9 && blocks; ++c)
+            for (int lane = 0; lane < point_lanes; ++lane)
+              cofactor[c].value[lane] = body_.points().weights[group].value[lane] * uniform->cofactor[c].value[0];
+          if (blocks)
+            swelling[group] = swelling_of(group, cofactor);
+          group_matrix(group, *uniform, locals[k]);
+          continue;
+        }
         std::fill(tangent.begin(), tangent.end(), LaneValues{});
         point_tangents(group, deformation.data() + 9 * static_cast<std::size_t>(group),
                        blocks ? jacobian[body_.blocks().block[group]] : 1, tangent.data(), cofactor);
@@ -257,6 +269,68 @@ void FiniteTangent::group_matrix(int group, const LaneValues* tangent, Local& lo
     for (int i = 0; i < size; ++i)
       local.matrix.row(3 * i + a) = product.row(i);
   }
+}
+
+std::unique_ptr<const FiniteTangent::Uniform> FiniteTangent::uniform_of(const std::vector<LaneValues>& deformation,
+                                                                        const std::vector<double>& jacobian) const {
+  constexpr double alike = 1e-12;
+  const PointTable& table = body_.points();
+  if (!body_.fibres_.empty() || body_.prony_ != nullptr || table.groups() == 0)
+    return nullptr;
+  for (int group = 0; group < table.groups(); ++group)
+    for (int k = 0; k < 9; ++k)
+      for (int lane = 0; lane < table.count[group]; ++lane)
+        if (!(std::abs(deformation[9 * static_cast<std::size_t>(group) + k].value[lane] - deformation[k].value[0]) <
+              alike))
+          return nullptr;
+  for (const double block : jacobian)
+    if (!(std::abs(block - jacobian.front()) < alike))
+      return nullptr;
+  auto uniform = std::make_unique<Uniform>();
+  point_tangents(0, deformation.data(), jacobian.empty() ? 1 : jacobian.front(), uniform->tangent, uniform->cofactor);
+  const double weight = table.weights[0].value[0];
+  for (LaneValues& value : uniform->tangent)
+    value.value[0] /= weight;
+  for (LaneValues& value : uniform->cofactor)
+    value.value[0] /= weight;
+  return uniform;
+}
+
+// K_ij = sum over c, d of D_acbd M_cd,ij with M_cd = sum over the points of w g_ic g_jd: one product for all of them.
+void FiniteTangent::group_matrix(int group, const Uniform& uniform, Local& local) const {
+  const std::span<const int> nodes = body_.points().nodes_of(group);
+  const std::vector<int> order = sorted_by_rank(nodes, rank_);
+  const int size = static_cast<int>(nodes.size());
+  const LaneValues* g = body_.points().gradients_of(group);
+  const LaneValues& weights = body_.points().weights[group];
+  MatrixX left(point_lanes, 3 * size), right(point_lanes, 3 * size), moments = MatrixX::Zero(3 * size, 3 * size);
+  local.ranks.resize(size);
+  local.matrix.resize(3 * size, 3 * size);
+  for (int i = 0; i < size; ++i) {
+    local.ranks[i] = rank_[nodes[order[i]]];
+    for (int c = 0; c < 3; ++c)
+      for (int lane = 0; lane < point_lanes; ++lane) {
+        left(lane, 3 * i + c) = g[3 * order[i] + c].value[lane];
+        right(lane, 3 * i + c) = weights.value[lane] * left(lane, 3 * i + c);
+      }
+  }
+  add_product(1, left, true, right, moments);
+  std::array<double, 81> tangent{}; // [a + 3 b][c + 3 d]
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b)
+      for (int c = 0; c < 3; ++c)
+        for (int d = 0; d < 3; ++d)
+          tangent[9 * (a + 3 * b) + c + 3 * d] = uniform.tangent[a + 3 * c + 9 * (b + 3 * d)].value[0];
+  for (int j = 0; j < size; ++j)
+    for (int i = j; i < size; ++i) { // what is above the diagonal is not asked for
+      const Matrix3 moment = moments.block<3, 3>(3 * i, 3 * j);
+      for (int ab = 0; ab < 9; ++ab) {
+        double sum = 0;
+        for (int cd = 0; cd < 9; ++cd)
+          sum += tangent[9 * ab + cd] * moment.data()[cd];
+        local.matrix(3 * i + ab % 3, 3 * j + ab / 3) = sum;
+      }
+    }
 }
 
 // The pressure of a block is that of its mean volume change: one row a block.

@@ -31,6 +31,14 @@ class FiniteTangent {
   /// d(sum of w J)/du of a group, in its order of nodes, m2.
   [[nodiscard]] VectorX swelling_of(int group, const LaneValues* cofactor) const;
   void group_matrix(int group, const LaneValues* tangent, Local& local) const;
+  /// Tangent and cofactors of a point of unit weight, where all points are alike: a body strained alike everywhere, as
+  /// at rest, whose law is the same everywhere.
+  struct Uniform {
+    LaneValues tangent[81], cofactor[9]; // in the first lane
+  };
+  [[nodiscard]] std::unique_ptr<const Uniform> uniform_of(const std::vector<LaneValues>& deformation,
+                                                          const std::vector<double>& jacobian) const;
+  void group_matrix(int group, const Uniform& uniform, Local& local) const;
   void point_tangents(int group, const LaneValues* deformation, double block_jacobian, LaneValues* tangent,
                       LaneValues* cofactor) const;
   /// Adds a 3 x 3 block per pair of the nodes, whose ranks ascend; `matrix` has 3 rows and columns a node, in that
