@@ -86,7 +86,8 @@ double grown_under_load(const GapingReference::Stretch& given, const std::shared
     if (body == nullptr) {
       state = pull(*next, nullptr);
     } else {
-      const VectorX start = next->cut_functions()->state_from(*body->cut_functions(), state);
+      std::vector<char> is_new;
+      const VectorX start = next->cut_functions()->state_from(*body->cut_functions(), state, is_new);
       state = pull(*next, &start);
     }
     body = std::move(next);

@@ -29,7 +29,8 @@ void hold_faces(solvers::Problem& problem, const FiniteBlock& block) {
     };
   const solvers::NodeCloud& nodes = problem.nodes;
   for (int node = 0; node < nodes.size(); ++node) {
-    if (nodes.kinds[node] == solvers::NodeKind::interior)
+    if (nodes.kinds[node] == solvers::NodeKind::interior ||
+        (block.lips_apart && nodes.kinds[node] == solvers::NodeKind::lip))
       continue;
     std::array<bool, 3> along{};
     for (int axis = 0; axis < 3; ++axis)

@@ -168,8 +168,73 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
       found.push_back(std::move(function));
   }
   std::sort(faint_[node].begin(), faint_[node].end());
-  if (count == 1 && options_.step_reach > 0)
+  if (options_.steps_by_run)
+    add_run_steps(node, parts, component, count, own, found);
+  else if (count == 1 && options_.step_reach > 0)
     add_step(node, std::move(parts), found);
+}
+
+/// Whether the sheet of a run lies between parts that hang together around its front.
+bool CutSpace::is_opened(const std::vector<PartId>& parts, int run) {
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    local_[parts[k]] = static_cast<int>(k);
+  const auto is_of_run = [&](int box) {
+    const SmallBox& at = boxes_.boxes()[box];
+    const auto place = places_.nearest(at.centre);
+    return place && places_.runs().run_of(place->segment) == run;
+  };
+  bool is_open = false;
+  for (const PartId part : parts) {
+    const int box = box_of(part);
+    if (!cut_.is_divided(box))
+      continue;
+    bool has_both = false;
+    for (int other = part % most_parts + 1; other < cut_.part_count(box) && !has_both; ++other)
+      has_both = local_[part_id(box, other)] >= 0;
+    for (const int neighbour : boxes_.neighbours(box))
+      for (int other = 0; other < cut_.part_count(neighbour) && !has_both; ++other)
+        has_both = local_[part_id(neighbour, other)] >= 0 &&
+                   incision_->blocks(cut_.part(part).eye, cut_.part(part_id(neighbour, other)).eye);
+    if (has_both && is_of_run(box)) {
+      is_open = true;
+      break;
+    }
+  }
+  for (const PartId part : parts)
+    local_[part] = -1;
+  return is_open;
+}
+
+/// Steps behind the front of every run that ends in the sphere of a node: in its node's own component, and in each of
+/// those with a twin.
+void CutSpace::add_run_steps(int node, const std::vector<PartId>& parts, const std::vector<int>& component, int count,
+                             int own, std::vector<CutFunction>& found) {
+  const Vector3& x = spheres_.centres()[node];
+  const double radius = spheres_.radii()[node];
+  if (!incision_->closest(x, radius))
+    return;
+  for (int run = 0; run < places_.runs().count(); ++run) {
+    const auto place = places_.runs().place(run, x, (count == 1 ? 2 : 1) * radius);
+    if (!place)
+      continue;
+    const bool alone = count == 1 && places_.runs().count() == 1;
+    for (int c = 0; c < count; ++c) {
+      CutFunction function;
+      Twin& twin = function.twin;
+      for (std::size_t k = 0; k < parts.size(); ++k)
+        if (component[k] == c)
+          twin.hidden.push_back(parts[k]);
+      if (!alone && !is_opened(twin.hidden, run))
+        continue;
+      twin.node = node;
+      twin.is_step = true;
+      twin.run = run;
+      twin.step_length = options_.step_reach * nodes_.spacings[node];
+      Vector3 gradient;
+      twin.step_at_node = c == own ? step(&*place, x, twin.step_length, gradient) : 1;
+      found.push_back(std::move(function));
+    }
+  }
 }
 
 /// The step of a sphere in which the front ends, or beside which it passes, where its run is curved; of one that a
@@ -339,7 +404,8 @@ bool CutSpace::twin_stays(const CutFunction& old, const std::vector<char>& chang
   for (std::size_t w = 0; w < wanted.twins.size(); ++w) {
     const Twin& twin = wanted.twins[w].twin;
     if (wanted.twin_taken[w] == 0 && twin.node == old.twin.node && twin.is_step == old.twin.is_step &&
-        twin.step_at_node == old.twin.step_at_node && twin.hidden == old.twin.hidden && !is_touched) {
+        twin.run == old.twin.run && twin.step_at_node == old.twin.step_at_node && twin.hidden == old.twin.hidden &&
+        !is_touched) {
       wanted.twin_taken[w] = 1;
       return true;
     }
@@ -455,11 +521,17 @@ bool CutSpace::term_at(int k, PartId part, int sample, ScalarTerm& term) const {
     term = {k, middle, gradient};
     return true;
   }
-  const PlacedSample& placed = places_.of(part)[sample];
+  PlacedSample& placed = places_.of(part)[sample];
+  const FrontPlace* at_front = placed.place ? &*placed.place : nullptr;
+  if (twin.run >= 0) {
+    if (!std::binary_search(twin.hidden.begin(), twin.hidden.end(), part))
+      return false;
+    const PlaceAtRun* const at_run = places_.at_run(placed, twin.run);
+    at_front = at_run != nullptr ? &at_run->place : nullptr;
+  }
   const double value = middle + gradient.dot(placed.at - boxes_.boxes()[box].middle);
   Vector3 slope;
-  const double jump =
-      0.5 * (step(placed.place ? &*placed.place : nullptr, placed.at, twin.step_length, slope) - twin.step_at_node);
+  const double jump = 0.5 * (step(at_front, placed.at, twin.step_length, slope) - twin.step_at_node);
   term = {k, value * jump, jump * gradient + 0.5 * value * slope};
   return jump != 0 || !slope.isZero(0);
 }
@@ -522,8 +594,16 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
           terms.scalar.push_back({k, shape.value[n], shape.gradient(n)});
         continue;
       }
+      const FrontPlace* at = place_here();
+      std::optional<FrontPlace> of_run;
+      if (twin.run >= 0) {
+        if (!std::binary_search(twin.hidden.begin(), twin.hidden.end(), part))
+          continue;
+        of_run = places_.of_run(x, twin.run);
+        at = of_run ? &*of_run : nullptr;
+      }
       Vector3 slope;
-      const double jump = 0.5 * (step(place_here(), x, twin.step_length, slope) - twin.step_at_node);
+      const double jump = 0.5 * (step(at, x, twin.step_length, slope) - twin.step_at_node);
       if (jump != 0 || !slope.isZero(0))
         terms.scalar.push_back({k, shape.value[n] * jump, jump * shape.gradient(n) + 0.5 * shape.value[n] * slope});
     }

@@ -21,7 +21,10 @@ struct CutSpaceOptions {
   /// small ones, which open the cut by themselves.
   double step_share = 0.1;
   double shallow = 1.2; // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
-  double corner = 45;   // degrees from one segment to the next: a corner, which is no curvature
+  /// A step for every run of the front that ends in a sphere, or in a part of it that is parted from its node, whatever
+  /// the run's shape: where two fronts are near, each step knows of its own alone and is smooth.
+  bool steps_by_run = false;
+  double corner = 45; // degrees from one segment to the next: a corner, which is no curvature
 };
 
 /// A second vector unknown of a sphere: h_J psi. Where the cut parts the sphere, psi is 1 in one component of what is
@@ -32,8 +35,9 @@ struct CutSpaceOptions {
 /// which opens like sqrt(r) behind the front.
 struct Twin {
   int node = -1;
-  std::vector<PartId> hidden; // ascending; of a step: all parts in reach of the sphere
+  std::vector<PartId> hidden; // ascending; of a step: all parts in reach of the sphere, by runs those that it opens
   bool is_step = false;
+  int run = -1; // of a step by runs: that of the front; it is one in its `hidden` parts alone
   double step_at_node = 0, step_length = 0; // of a step; m
 };
 
@@ -114,6 +118,9 @@ class CutSpace {
   [[nodiscard]] std::vector<char> faint_of(int node, const std::vector<PartId>& parts) const;
   [[nodiscard]] double energy_in(int node, PartId part) const;
   void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
+  void add_run_steps(int node, const std::vector<PartId>& parts, const std::vector<int>& component, int count, int own,
+                     std::vector<CutFunction>& found);
+  [[nodiscard]] bool is_opened(const std::vector<PartId>& parts, int run);
   [[nodiscard]] double largest_on_cut(int node, const std::vector<PartId>& parts) const;
   void find_curved_front();
   [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool has_curved) const;

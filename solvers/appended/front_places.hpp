@@ -50,6 +50,10 @@ class FrontPlaces {
   }
   /// A sample with respect to a run; null: the run is far from it. Valid until the next run is asked for.
   [[nodiscard]] PlaceAtRun* at_run(PlacedSample& sample, int run) const;
+  /// A place with respect to a run; of no value: the run is far.
+  [[nodiscard]] std::optional<FrontPlace> of_run(const Vector3& x, int run) const {
+    return runs_->place(run, x, reach_);
+  }
   /// With respect to the nearest front; of no value: all are far.
   [[nodiscard]] std::optional<FrontPlace> nearest(const Vector3& x) const { return front_place(*incision_, x, reach_); }
 

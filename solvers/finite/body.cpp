@@ -40,10 +40,12 @@ Problem with_law(Problem problem, const Law* law, const FiniteOptions& options) 
   if (!(options.pointwise_modulus >= 0))
     throw InputError(fmt::format("pointwise modulus of {} mu; it must not be negative", options.pointwise_modulus));
   check_prony_terms(options.prony);
-  if (options.sight == SightRule::appended) { // lip nodes are places: what is held at the rim its neighbours hold
-    const int base = base_nodes(problem.nodes);
-    std::erase_if(problem.prescribed, [base](const Prescribed& entry) { return entry.node >= base; });
-  }
+  if (options.sight == SightRule::appended)
+    for (const Prescribed& entry : problem.prescribed)
+      if (entry.node >= base_nodes(problem.nodes))
+        throw InputError(fmt::format("node {} is held; where a cut appends, lip nodes have no unknowns: nodes 0 to {} "
+                                     "can be",
+                                     entry.node, base_nodes(problem.nodes) - 1));
   return problem;
 }
 
@@ -53,7 +55,7 @@ std::unique_ptr<const CutFunctions> cut_functions_of(const Problem& problem, con
   if (options.sight != SightRule::appended)
     return nullptr;
   const int base = base_nodes(problem.nodes);
-  if (uncut == nullptr || !uncut->fits(problem, base))
+  if (uncut == nullptr || !uncut->fits(problem, base, options.support_radius, options.consistent))
     uncut = std::make_shared<const UncutFunctions>(problem, base, options.support_radius, options.consistent);
   return std::make_unique<const CutFunctions>(std::move(uncut), problem);
 }
@@ -166,7 +168,7 @@ void FiniteBody::hold() {
   held_ = std::make_unique<HeldMeans>(problem_.prescribed, std::move(means), functions_);
 }
 
-int FiniteBody::carrier_of(const DisplacementMean& mean) const {
+int FiniteBody::carrier_of(const DisplacementMean& mean) {
   const auto largest = std::max_element(mean.weights.begin(), mean.weights.end());
   return mean.nodes[largest - mean.weights.begin()];
 }

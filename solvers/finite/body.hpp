@@ -114,8 +114,8 @@ class FiniteBody {
   [[nodiscard]] std::vector<Vector3> prescribed_values(const std::function<Vector3(const Vector3& x)>& field) const;
   /// The share of the surface that a force of a tool on a surface node acts on.
   [[nodiscard]] DisplacementMean contact_mean(int node) const;
-  /// The function that says most about a mean: how the body is strained there.
-  [[nodiscard]] int carrier_of(const DisplacementMean& mean) const;
+  /// The function that says most about a mean of some: how the body is strained there.
+  [[nodiscard]] static int carrier_of(const DisplacementMean& mean);
 
   /// Strain energy and internal forces, loads and constraints left out. Coefficients: 3 a function, m. The same bits
   /// with any number of threads.

@@ -29,8 +29,7 @@ NodeCloud first_nodes(NodeCloud nodes, int base) {
 CutSpaceOptions steps_alone() {
   CutSpaceOptions options;
   options.front.radius = 0;
-  options.step_turn = -1;
-  options.step_share = 0;
+  options.steps_by_run = true;
   return options;
 }
 
@@ -38,6 +37,10 @@ BoundingBox everywhere(const topology::Domain& domain) {
   const BoundingBox box = domain.bounds();
   const Vector3 margin = 0.01 * box.extent();
   return {box.lower - margin, box.upper + margin};
+}
+
+bool has_part(const Twin& twin, PartId part) {
+  return std::binary_search(twin.hidden.begin(), twin.hidden.end(), part);
 }
 
 /// A step's function beyond the sheet, and its gradient, from those of its sphere and from the term of the space, which
@@ -54,7 +57,8 @@ struct BeyondStep {
 } // namespace
 
 UncutFunctions::UncutFunctions(const Problem& problem, int base, double support_radius, bool is_consistent)
-    : domain_(problem.domain), nodes_(first_nodes(problem.nodes, base)),
+    : domain_(problem.domain), nodes_(first_nodes(problem.nodes, base)), support_radius_(support_radius),
+      is_consistent_(is_consistent),
       spheres_(nodes_.positions, nodes_.spacings, support_radius, Basis::linear, worst_moment_condition),
       boxes_(*domain_, nodes_, spheres_, box_cell) {
   if (!is_consistent)
@@ -79,8 +83,9 @@ UncutFunctions::UncutFunctions(const Problem& problem, int base, double support_
   }
 }
 
-bool UncutFunctions::fits(const Problem& problem, int base) const {
-  if (base != size() || problem.domain != domain_)
+bool UncutFunctions::fits(const Problem& problem, int base, double support_radius, bool is_consistent) const {
+  if (base != size() || problem.domain != domain_ || support_radius != support_radius_ ||
+      is_consistent != is_consistent_)
     return false;
   for (int i = 0; i < base; ++i)
     if (nodes_.positions[i] != problem.nodes.positions[i] || nodes_.spacings[i] != problem.nodes.spacings[i] ||
@@ -124,10 +129,20 @@ void CutFunctions::find_kept() {
   for (int f = 0; f < appended(); ++f)
     if (!twin(f).is_step || beyond[f] > faint * whole[f])
       weighing.push_back(kept_[f]);
-  if (weighing.size() == kept_.size())
-    return;
-  kept_ = std::move(weighing);
-  list_by_place();
+  if (weighing.size() != kept_.size()) {
+    kept_ = std::move(weighing);
+    list_by_place();
+  }
+  find_hosts();
+}
+
+void CutFunctions::find_hosts() {
+  host_.assign(kept_.size(), -1);
+  for (int f = 0; f < appended(); ++f)
+    if (twin(f).is_step)
+      for (const int other : of_node_[twin(f).node])
+        if (!twin(other).is_step && twin(other).hidden == twin(f).hidden)
+          host_[f] = other;
 }
 
 void CutFunctions::list_by_place() {
@@ -144,6 +159,8 @@ void CutFunctions::list_by_place() {
 Vector3 CutFunctions::gradient_beyond(int k, const Place& place, const Vector3& whole) const {
   ScalarTerm term{kept_[k], 0, Vector3::Zero()};
   const bool is_there = space_.term_at(kept_[k], place.part, place.sample, term);
+  if (twin(k).is_step && !has_part(twin(k), place.part))
+    return Vector3::Zero();
   if (twin(k).is_step)
     return BeyondStep(twin(k)).of(whole, is_there ? term.gradient : Vector3(Vector3::Zero()));
   return is_there ? whole : Vector3(Vector3::Zero());
@@ -162,16 +179,23 @@ bool CutFunctions::evaluate(const Vector3& x, ShapeFunctions& shape) const {
   for (const ScalarTerm& term : terms.scalar)
     term_of[term.function] = &term;
   const int spheres = shape.size();
+  std::vector<int> place_of(kept_.size(), -1); // of an appended function in `shape`
   for (int k = 0; k < spheres; ++k) {
     const double whole = shape.value[k];
     const Vector3 slope = shape.gradient(k);
-    double own = whole;
-    Vector3 own_slope = slope;
-    for (const int f : of_node_[shape.nodes[k]]) {
+    const auto take = [&](int place, double value, const Vector3& gradient) {
+      shape.value[place] -= value;
+      shape.dx[place] -= gradient.x();
+      shape.dy[place] -= gradient.y();
+      shape.dz[place] -= gradient.z();
+    };
+    for (const int f : of_node_[shape.nodes[k]]) { // twins before the steps that they host
       const auto term = term_of.find(kept_[f]);
       double beyond = 0;
       Vector3 gradient = Vector3::Zero();
       if (twin(f).is_step) {
+        if (!has_part(twin(f), part))
+          continue;
         const BeyondStep step(twin(f));
         const bool is_there = term != term_of.end();
         beyond = step.of(whole, is_there ? term->second->value : 0.0);
@@ -182,18 +206,14 @@ bool CutFunctions::evaluate(const Vector3& x, ShapeFunctions& shape) const {
       }
       if (beyond == 0 && gradient.isZero(0))
         continue;
-      own -= beyond;
-      own_slope -= gradient;
+      take(host_[f] < 0 ? k : place_of[host_[f]], beyond, gradient);
+      place_of[f] = shape.size();
       shape.nodes.push_back(uncut_->size() + f);
       shape.value.push_back(beyond);
       shape.dx.push_back(gradient.x());
       shape.dy.push_back(gradient.y());
       shape.dz.push_back(gradient.z());
     }
-    shape.value[k] = own;
-    shape.dx[k] = own_slope.x();
-    shape.dy[k] = own_slope.y();
-    shape.dz[k] = own_slope.z();
   }
   int kept = 0;
   for (int k = 0; k < shape.size(); ++k) {
@@ -272,6 +292,11 @@ void CutFunctions::append_groups(int cell, const std::vector<Place>& places, int
     int function;
     std::array<LaneValues, 3> gradient;
   };
+  const auto is_zero = [](const Slot& slot) {
+    return std::all_of(slot.gradient.begin(), slot.gradient.end(), [](const LaneValues& values) {
+      return std::all_of(std::begin(values.value), std::end(values.value), [](double v) { return v == 0; });
+    });
+  };
   for (std::size_t first = 0; first < places.size(); first += point_lanes) {
     const auto here = std::span(places).subspan(first, std::min<std::size_t>(point_lanes, places.size() - first));
     LaneValues weights;
@@ -296,27 +321,26 @@ void CutFunctions::append_groups(int cell, const std::vector<Place>& places, int
         for (int axis = 0; axis < 3; ++axis)
           own.gradient[axis].value[lane] = gradient[axis];
       }
-      for (const int f : of_node_[shapes.nodes[k]]) {
-        Slot beyond{base + f, {}};
-        bool any = false;
+      const std::size_t first_behind = behind.size();
+      for (const int f : of_node_[shapes.nodes[k]]) { // twins before the steps that they host
+        Slot& beyond = behind.emplace_back(Slot{base + f, {}});
+        Slot* host = &own;
+        for (std::size_t other = first_behind; other < behind.size(); ++other)
+          if (host_[f] >= 0 && behind[other].function == base + host_[f])
+            host = &behind[other];
         for (int lane = 0; lane < std::ssize(here); ++lane) {
           const Vector3 whole = shapes.gradient_at(k, boxes.lane_of(box_of(here[lane].part)));
           const Vector3 gradient = gradient_beyond(f, here[lane], whole);
           for (int axis = 0; axis < 3; ++axis) {
             beyond.gradient[axis].value[lane] = gradient[axis];
-            own.gradient[axis].value[lane] -= gradient[axis];
+            host->gradient[axis].value[lane] -= gradient[axis];
           }
-          any = any || !gradient.isZero(0);
         }
-        if (any)
-          behind.push_back(beyond);
       }
-      const auto is_zero = [](const LaneValues& values) {
-        return std::all_of(std::begin(values.value), std::end(values.value), [](double v) { return v == 0; });
-      };
-      if (!std::all_of(own.gradient.begin(), own.gradient.end(), is_zero))
+      if (!is_zero(own))
         slots.push_back(own);
     }
+    std::erase_if(behind, is_zero);
     std::sort(behind.begin(), behind.end(), [](const Slot& a, const Slot& b) { return a.function < b.function; });
     slots.insert(slots.end(), behind.begin(), behind.end());
     for (const Slot& slot : slots) {
@@ -353,25 +377,30 @@ PointTable CutFunctions::tabulate(BackgroundCells& cells) const {
   return table;
 }
 
-// A function that was not there goes on as what its part of the sphere moved by: the node's own unknown, or the step
-// that the front has passed.
-VectorX CutFunctions::state_from(const CutFunctions& before, const VectorX& coefficients) const {
+// A twin that was not there goes on as its node, with which it was one; a step as what was most like it.
+VectorX CutFunctions::state_from(const CutFunctions& before, const VectorX& coefficients,
+                                 std::vector<char>& is_new) const {
   const auto at = [](int function) { return 3 * static_cast<Eigen::Index>(function); };
   const int base = uncut_->size();
   VectorX state(at(size()));
   state.head(at(base)) = coefficients.head(at(base));
+  is_new.assign(static_cast<std::size_t>(size()), 0);
   for (int f = 0; f < appended(); ++f) {
-    const std::vector<PartId>& is = twin(f).hidden;
-    int best = twin(f).node;
+    const Twin& now = twin(f);
+    int best = now.node;
     std::size_t most = 0;
-    for (const int b : before.of_node_[twin(f).node]) {
-      const std::vector<PartId>& was = before.twin(b).hidden;
+    is_new[base + f] = 1;
+    for (const int b : before.of_node_[now.node]) {
+      const Twin& was = before.twin(b);
       std::vector<PartId> both;
-      std::set_intersection(was.begin(), was.end(), is.begin(), is.end(), std::back_inserter(both));
+      std::set_intersection(was.hidden.begin(), was.hidden.end(), now.hidden.begin(), now.hidden.end(),
+                            std::back_inserter(both));
       if (both.size() > most) {
         most = both.size();
         best = base + b;
       }
+      if (!now.is_step && !was.is_step && now.hidden == was.hidden)
+        is_new[base + f] = 0;
     }
     state.segment<3>(at(base + f)) = coefficients.segment<3>(at(best));
   }

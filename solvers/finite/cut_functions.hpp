@@ -4,10 +4,10 @@
 //
 //   u = sum_J h_J [(1 - psi_J) a_J + psi_J b_J].
 //
-// psi is 1 in what is hidden where the sheet parts the sphere [Hansbo and Hansbo 2004]. Where the front ends in the
-// sphere it is (1 - step(x)) / 2 with the step of solvers/appended/cut_space.hpp, which opens like sqrt(r). So each
-// unknown is strained and turned as its side is, and no field that knows of directions is needed: what the cut has
-// opened may turn by any angle.
+// psi is 1 in what is hidden where the sheet parts the sphere [Hansbo and Hansbo 2004]. Where a front ends in the
+// sphere it is (1 - step(x)) / 2 with the step of solvers/appended/cut_space.hpp, which opens like sqrt(r); likewise
+// with b_J in place of a_J where it ends in what is hidden. So each unknown is strained and turned as its side is, and
+// no field that knows of directions is needed: what the cut has opened may turn by any angle.
 #pragma once
 
 #include "solvers/appended/cut_space.hpp"
@@ -28,7 +28,7 @@ class UncutFunctions {
   UncutFunctions& operator=(const UncutFunctions&) = delete;
 
   /// Whether another problem has the same uncut body.
-  [[nodiscard]] bool fits(const Problem& problem, int base) const;
+  [[nodiscard]] bool fits(const Problem& problem, int base, double support_radius, bool is_consistent) const;
 
   [[nodiscard]] int size() const { return nodes_.size(); }
   [[nodiscard]] const NodeCloud& nodes() const { return nodes_; }
@@ -39,6 +39,8 @@ class UncutFunctions {
  private:
   std::shared_ptr<const topology::Domain> domain_;
   NodeCloud nodes_;
+  double support_radius_;
+  bool is_consistent_;
   Spheres spheres_;
   SmallBoxes boxes_;
   ConsistencyReport consistency_;
@@ -66,9 +68,10 @@ class CutFunctions {
   /// `cells`: a box of the octree each, shared out among the cells that the cut divides it into.
   [[nodiscard]] PointTable tabulate(BackgroundCells& cells) const;
 
-  /// Coefficients, m, 3 a function, of the state of another body of the same uncut one, whose cut is shorter: what has
-  /// been in one piece is in one piece still.
-  [[nodiscard]] VectorX state_from(const CutFunctions& before, const VectorX& coefficients) const;
+  /// Coefficients, m, 3 a function, of the state of another body of the same uncut one, whose cut is shorter. `is_new`,
+  /// by function: it is another one than before, or was not there; its coefficients are those of what is most like it.
+  [[nodiscard]] VectorX state_from(const CutFunctions& before, const VectorX& coefficients,
+                                   std::vector<char>& is_new) const;
 
  private:
   struct Place { // a point of the quadrature
@@ -82,12 +85,14 @@ class CutFunctions {
   [[nodiscard]] bool has_step(int cell) const;
   void find_kept();
   void list_by_place();
+  void find_hosts();
   /// Gradient of the k-th appended function in a part that its sphere reaches, 1/m; of the sphere's: `whole`.
   [[nodiscard]] Vector3 gradient_beyond(int k, const Place& place, const Vector3& whole) const;
 
   std::shared_ptr<const UncutFunctions> uncut_;
   CutSpace space_;
   std::vector<int> kept_;                 // functions of the space that weigh
+  std::vector<int> host_;                 // of these: the function that a step opens; -1: that of its sphere
   std::vector<std::vector<int>> of_node_; // of these, by node
   std::vector<std::vector<int>> in_cell_; // likewise, by cell of the small boxes
 };

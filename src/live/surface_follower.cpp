@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <span>
 #include <unordered_map>
 
@@ -283,11 +284,15 @@ void SurfaceFollower::deform(const Session& session, std::vector<Eigen::Vector3f
 void SurfaceFollower::spread(const std::vector<double>& nodal, std::vector<float>& values) const {
   values.assign(places_.size(), 0);
   for (std::size_t v = 0; v < rows_.rows.size(); ++v) {
-    double value = 0;
-    for (int k = rows_.rows[v].first; k < rows_.rows[v].first + rows_.rows[v].count; ++k)
-      value += rows_.weights[static_cast<std::size_t>(k)] *
-               nodal[static_cast<std::size_t>(rows_.nodes[static_cast<std::size_t>(k)])];
-    values[v] = static_cast<float>(value);
+    double value = 0, whole = 0;
+    for (int k = rows_.rows[v].first; k < rows_.rows[v].first + rows_.rows[v].count; ++k) {
+      const double weight = rows_.weights[static_cast<std::size_t>(k)];
+      value += weight * nodal[static_cast<std::size_t>(rows_.nodes[static_cast<std::size_t>(k)])];
+      whole += weight;
+    }
+    // Where functions of nodes beyond a cut have the rest, those of this side tell.
+    constexpr double least = 0.05, rounding = 1e-6;
+    values[v] = static_cast<float>(whole > least && std::abs(whole - 1) > rounding ? value / whole : value);
   }
 }
 

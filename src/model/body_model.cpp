@@ -44,6 +44,14 @@ bool carries_surface(const topology::Domain& domain, const solvers::NodeCloud& n
   return true;
 }
 
+/// Whether a node can be held where it is: at finite strain lip nodes of a cut that appends are places without
+/// unknowns.
+bool can_be_held(const Scenario& scenario, const topology::Domain& domain, const solvers::NodeCloud& nodes, int node) {
+  const bool is_place =
+      nodes.kinds[node] == solvers::NodeKind::lip && is_nonlinear(scenario.law) && cut_appends(scenario);
+  return !is_place && carries_surface(domain, nodes, node);
+}
+
 /// Sets of axes that the same regions hold: what one of them holds, all of its set are.
 std::vector<std::array<bool, 3>> axes_held_together(const std::vector<FixedRegion>& fixed) {
   const auto alike = [&](std::size_t a, std::size_t b) {
@@ -160,7 +168,9 @@ int BodyModel::sphere_count() const {
 }
 
 double BodyModel::sphere_radius(int node) const {
-  return finite != nullptr ? finite->spheres().radii()[static_cast<std::size_t>(node)] : body->sphere_radius(node);
+  if (finite == nullptr)
+    return body->sphere_radius(node);
+  return node < finite->spheres().size() ? finite->spheres().radii()[static_cast<std::size_t>(node)] : 0;
 }
 
 int BodyModel::coefficient_count() const {
@@ -205,7 +215,7 @@ std::vector<solvers::Prescribed> fixed_nodes(const Scenario& scenario, const top
   std::vector<int> held(scenario.fixed.size(), 0);
   const std::vector<std::array<bool, 3>> sets = axes_held_together(scenario.fixed);
   for (int i = 0; i < nodes.size(); ++i) {
-    if (!carries_surface(domain, nodes, i))
+    if (!can_be_held(scenario, domain, nodes, i))
       continue;
     std::array<bool, 3> axes{};
     for (std::size_t r = 0; r < scenario.fixed.size(); ++r)
@@ -276,7 +286,7 @@ solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Do
   solvers::SprinkleOptions held = options;
   for (const FixedRegion& region : scenario.fixed) {
     const auto holds = [&](const solvers::NodeCloud& nodes, int i) {
-      return region.holds(nodes.positions[i]) && carries_surface(domain, nodes, i);
+      return region.holds(nodes.positions[i]) && can_be_held(scenario, domain, nodes, i);
     };
     const auto any = [&](const solvers::NodeCloud& nodes) {
       for (int i = 0; i < nodes.size(); ++i)

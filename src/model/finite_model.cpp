@@ -280,8 +280,20 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
       start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(places[body_.node_of(i)]).displacement;
     return start;
   }
-  if (uncut() != nullptr && uncut() == before.finite->uncut())
-    return body_.cut_functions()->state_from(*before.finite->body_.cut_functions(), before.finite->coefficients());
+  const VectorX& old = before.finite->coefficients();
+  solvers::ShapeFunctions shape;
+  const auto strained_before = [&](const Vector3& x) -> Matrix3 {
+    Matrix3 deformation = Matrix3::Identity();
+    before.shape_at(x, shape);
+    for (int k = 0; k < shape.size(); ++k)
+      deformation += old.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) * shape.gradient(k).transpose();
+    return deformation;
+  };
+  if (uncut() != nullptr && uncut() == before.finite->uncut()) {
+    std::vector<char> is_new;
+    start = body_.cut_functions()->state_from(*before.finite->body_.cut_functions(), old, is_new);
+    return solvers::nearest_state(body_, std::move(start), is_new, strained_before);
+  }
   const std::vector<Vector3>& places_before = before.finite->spheres().centres();
   const topology::PointTree known(places_before), here(places);
   std::vector<char> free(static_cast<std::size_t>(body_.functions()), 0);
@@ -297,8 +309,7 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
     const topology::PointTree::Found nearest = known.nearest(x);
     const double same = same_place * nodes.spacings[i];
     if (nearest.index >= 0 && nearest.squared_distance < same * same) {
-      start.segment<3>(3 * static_cast<Eigen::Index>(i)) =
-          before.finite->coefficients().segment<3>(3 * static_cast<Eigen::Index>(nearest.index));
+      start.segment<3>(3 * static_cast<Eigen::Index>(i)) = old.segment<3>(3 * static_cast<Eigen::Index>(nearest.index));
       continue;
     }
     start.segment<3>(3 * static_cast<Eigen::Index>(i)) = before.at(x).displacement;
@@ -316,15 +327,7 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
     if (nearest.squared_distance >= same * same)
       free_about(x, before.sphere_radius(i));
   }
-  const VectorX& old = before.finite->coefficients();
-  solvers::ShapeFunctions shape;
-  return solvers::nearest_state(body_, std::move(start), free, [&](const Vector3& x) -> Matrix3 {
-    Matrix3 deformation = Matrix3::Identity();
-    before.shape_at(x, shape);
-    for (int k = 0; k < shape.size(); ++k)
-      deformation += old.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) * shape.gradient(k).transpose();
-    return deformation;
-  });
+  return solvers::nearest_state(body_, std::move(start), free, strained_before);
 }
 
 // A node that both bodies have keeps its place on the tool. One that is new where the tool touches sticks where it is
@@ -515,7 +518,8 @@ std::vector<solvers::UnilateralMean> FiniteModel::edges_of(const PressedEdge& ed
     for (int i = 0; i < nodes.size(); ++i)
       if ((nodes.positions[i] - contact.point).squaredNorm() < (nodes.positions[nearest] - contact.point).squaredNorm())
         nearest = i;
-    const int carrier = body_.cut_functions() == nullptr ? nearest : body_.carrier_of(mean.mean);
+    const bool is_carried = body_.cut_functions() != nullptr && !mean.mean.nodes.empty();
+    const int carrier = is_carried ? solvers::FiniteBody::carrier_of(mean.mean) : nearest;
     mean.carriers = {carrier, carrier};
     mean.spacing = nodes.spacings[nearest];
     mean.stiffness = edge_stiffness * modulus * contact.length;

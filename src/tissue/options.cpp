@@ -30,8 +30,8 @@ CutPolicy cut_policy(const Scenario& scenario, const SessionOptions& options) {
   if (resists(scenario))
     return options.following_in_background && blade_alone && !advance ? CutPolicy::proposed_in_background
                                                                       : CutPolicy::proposed;
-  if (options.following_in_background && blade_alone && !cut_appends(scenario) &&
-      advance.value_or(background_advance) > 0)
+  const bool is_cheap = cut_appends(scenario) && !is_nonlinear(scenario.law); // an increment is found in the step
+  if (options.following_in_background && blade_alone && !is_cheap && advance.value_or(background_advance) > 0)
     return CutPolicy::in_background;
   const bool ahead = options.recondensing && !scenario.tearing.enabled && !cut_appends(scenario) &&
                      !is_nonlinear(scenario.law); // its bodies have no window

@@ -3,6 +3,7 @@
 #include "experiments/support/finite_block.hpp"
 #include "solvers/finite/cut_functions.hpp"
 #include "solvers/finite/equilibrium.hpp"
+#include "solvers/finite/transfer.hpp"
 #include "topology/incision/cut_sheets.hpp"
 
 #include <Eigen/Geometry>
@@ -17,8 +18,16 @@ using experiments::FiniteBlock;
 
 namespace {
 
-/// A cube of 1 m about the origin with a level cut from the face x = -0.5 up to x = `end`, `above` m over its middle.
-Problem cut_cube(double end, double above = 0.013, double tilt = 0, std::uint64_t seed = 1) {
+/// A level cut from beyond the face x = -0.5 up to x = `end`, `above` m over the middle.
+topology::SurfaceMesh level_cut(double end, double above, double tilt = 0) {
+  const Vector3 normal = Vector3(std::sin(tilt), 0, std::cos(tilt)),
+                along = Vector3(std::cos(tilt), 0, -std::sin(tilt));
+  return topology::make_rectangle_sheet(0.5 * (end - 0.7) * along + above * normal, normal, along, 1.6, end + 0.7,
+                                        0.08);
+}
+
+/// A cube of 1 m about the origin, its top and bottom held.
+Problem cube_with(std::vector<topology::SurfaceMesh> cuts, std::uint64_t seed = 1) {
   FiniteBlock block{.lower = Vector3::Constant(-0.5), .upper = Vector3::Constant(0.5), .seed = seed};
   for (const int face : {4, 5})
     block.held[face].fill(true);
@@ -26,12 +35,12 @@ Problem cut_cube(double end, double above = 0.013, double tilt = 0, std::uint64_
   spacing.fine = spacing.coarse = 0.17;
   block.graded = spacing;
   block.lips_apart = true;
-  const Vector3 normal = Vector3(std::sin(tilt), 0, std::cos(tilt)),
-                along = Vector3(std::cos(tilt), 0, -std::sin(tilt));
-  if (end > -0.5)
-    block.cuts = {topology::make_rectangle_sheet(0.5 * (end - 0.7) * along + above * normal, normal, along, 1.6,
-                                                 end + 0.7, 0.08)};
+  block.cuts = std::move(cuts);
   return finite_block(block);
+}
+
+Problem cut_cube(double end, double above = 0.013, double tilt = 0) {
+  return cube_with({level_cut(end, above, tilt)});
 }
 
 FiniteBody appended_body(Problem problem, const std::shared_ptr<const UncutFunctions>& uncut = nullptr) {
@@ -79,6 +88,75 @@ TEST_CASE("Functions on both sides of a cut and about its front reproduce linear
   body.evaluate(u, forces);
   CHECK(forces.energy < 1e-10);
   CHECK(forces.forces.norm() < 1e-10);
+}
+
+TEST_CASE("Fields are smooth wherever nothing is cut, with fronts beside and across one another, too") {
+  const topology::SurfaceMesh lower = level_cut(0, -0.15), upper = level_cut(0, 0.15);
+  topology::SurfaceMesh turned =
+      topology::make_rectangle_sheet({-0.35, 0, 0.15}, -Vector3::UnitZ(), Vector3::UnitX(), 1.6, 0.7, 0.08);
+  topology::SurfaceMesh from_there =
+      topology::make_rectangle_sheet({0.45, 0, 0.01}, -Vector3::UnitZ(), Vector3::UnitX(), 1.6, 0.7, 0.08);
+  topology::SurfaceMesh across =
+      topology::make_rectangle_sheet({-0.2, 0.011, 0.2}, Vector3::UnitY(), Vector3::UnitZ(), 0.7, 0.9, 0.08);
+  const std::vector<std::vector<topology::SurfaceMesh>> scenes = {
+      {lower, upper}, {lower, turned}, {level_cut(-0.1, 0.01), from_there}, {level_cut(0.1, 0.013), across}};
+  for (std::size_t scene = 0; scene < scenes.size(); ++scene) {
+    const FiniteBody body = appended_body(cube_with(scenes[scene]));
+    const topology::Incision& cut = *body.problem().incision;
+    std::srand(static_cast<unsigned>(scene) + 1);
+    const VectorX u = VectorX::Random(3 * body.functions());
+    std::mt19937_64 random(scene + 1);
+    std::uniform_real_distribution<double> anywhere(-0.49, 0.49);
+    double worst = 0;
+    Vector3 at = Vector3::Zero();
+    for (int k = 0; k < 4000; ++k) {
+      const Vector3 x(anywhere(random), anywhere(random), 0.7 * anywhere(random));
+      Vector3 y = x + 0.02 * Vector3(anywhere(random), anywhere(random), anywhere(random));
+      if (cut.closest(x, 0.03) || cut.blocks(x, y))
+        continue;
+      // Twenty small steps: a jump is in one of them.
+      for (int step = 0; step < 20; ++step) {
+        const Vector3 a = x + step * (y - x) / 20, b = x + (step + 1) * (y - x) / 20;
+        const double change = (body.at(b, u).displacement - body.at(a, u).displacement).norm();
+        if (change > worst) {
+          worst = change;
+          at = a;
+        }
+      }
+    }
+    INFO("scene " << scene << ": " << worst << " at " << at.transpose());
+    CHECK(worst < 0.06); // steps of up to 0.8 mm, coefficients of up to 1
+  }
+}
+
+TEST_CASE("A second cut across the first, or one beside it, opens a loaded body as both at once do") {
+  const topology::SurfaceMesh first = level_cut(0.1, 0.013);
+  const topology::SurfaceMesh across =
+      topology::make_rectangle_sheet({-0.2, 0.011, 0.2}, Vector3::UnitY(), Vector3::UnitZ(), 0.7, 0.9, 0.08);
+  const topology::SurfaceMesh beside = level_cut(0.1, 0.26);
+  for (const topology::SurfaceMesh& second : {across, beside}) {
+    const FiniteBody one = appended_body(cube_with({first}));
+    EquilibriumOptions accurate;
+    accurate.tolerance = 1e-6;
+    Equilibrium before(one, accurate);
+    before.solve({pulled_top(one, 0.25)});
+    Problem both = cube_with({first, second});
+    both.domain = one.problem().domain;
+    const FiniteBody two = appended_body(both, one.cut_functions()->uncut());
+    std::vector<char> is_new;
+    VectorX start = two.cut_functions()->state_from(*one.cut_functions(), before.coefficients(), is_new);
+    start = nearest_state(two, start, is_new,
+                          [&](const Vector3& x) { return one.at(x, before.coefficients()).deformation; });
+    FiniteForces forces;
+    two.evaluate(start, forces);
+    CHECK(forces.least_jacobian > 0.05);
+    Equilibrium grown(two, accurate), at_once(two, accurate);
+    grown.set_coefficients(start);
+    const EquilibriumStatus after = grown.solve({pulled_top(two, 0.25)});
+    const EquilibriumStatus wanted = at_once.solve({pulled_top(two, 0.25)});
+    CHECK(after.energy == Approx(wanted.energy).epsilon(1e-4));
+    CHECK(opening(two, grown.coefficients(), -0.3, 0.013) > 0.03);
+  }
 }
 
 TEST_CASE("What a cut parts does not know of the other side; forces are the slope of the energy") {
@@ -149,7 +227,10 @@ TEST_CASE("A body under load goes on as it was when its cut grows, and comes to 
                                              FiniteOptions{.sight = SightRule::appended}, nullptr, uncut);
     REQUIRE(next->cut_functions()->uncut() == uncut);
     const FiniteBody& old = last != nullptr ? *last : first;
-    const VectorX start = next->cut_functions()->state_from(*old.cut_functions(), state);
+    std::vector<char> is_new;
+    const VectorX start = next->cut_functions()->state_from(*old.cut_functions(), state, is_new);
+    CHECK(std::count(is_new.begin(), is_new.end(), 1) > 0);
+    CHECK(std::count(is_new.begin(), is_new.begin() + uncut->size(), 1) == 0);
     // Away from the old and the new front nothing has moved.
     for (const Vector3& x : {Vector3(-0.45, 0.1, 0.2), Vector3(-0.45, 0.1, -0.2), Vector3(0.4, -0.3, 0.3)})
       CHECK((next->at(x, start).displacement - old.at(x, state).displacement).norm() < 2e-3);
