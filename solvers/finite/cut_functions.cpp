@@ -269,15 +269,16 @@ std::vector<std::vector<CutFunctions::Place>> CutFunctions::sides_of(int cell) c
   for (const Place& place : places)
     number.try_emplace(place.part, static_cast<int>(number.size()));
   topology::DisjointSets joined(static_cast<int>(number.size()));
-  for (const auto& [part, k] : number)
-    space_.cut().for_each_linked(part, [&](PartId other) {
+  for (const auto& numbered : number)
+    space_.cut().for_each_linked(numbered.first, [&](PartId other) {
       if (const auto found = number.find(other); found != number.end())
-        joined.join(k, found->second);
+        joined.join(numbered.second, found->second);
     });
   std::map<int, std::vector<Place>> sides;
   for (Place& place : places)
     sides[joined.find(number.at(place.part))].push_back(place);
   std::vector<std::vector<Place>> result;
+  result.reserve(sides.size());
   for (auto& [root, side] : sides)
     result.push_back(std::move(side));
   return result;

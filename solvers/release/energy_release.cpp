@@ -1,9 +1,9 @@
 #include "solvers/release/energy_release.hpp"
 
 #include "solvers/elasticity/rotation.hpp"
-#include "solvers/points/point_kernels.hpp"
 #include "solvers/fracture/local_values.hpp"
 #include "solvers/fracture/virtual_shift.hpp"
+#include "solvers/points/point_kernels.hpp"
 #include "topology/base/errors.hpp"
 
 #include <Eigen/LU>

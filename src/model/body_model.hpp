@@ -18,7 +18,7 @@
 namespace spherecut::solvers {
 class UncutBody;
 class UncutFunctions;
-}
+} // namespace spherecut::solvers
 
 namespace spherecut::app {
 
@@ -52,20 +52,20 @@ struct BodyModel {
   std::shared_ptr<FiniteModel> finite;             // in place of the body where the law is not linear
   std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
   std::shared_ptr<const solvers::UncutFunctions> uncut_functions; // the same at finite strain
-  const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
-  topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
-  int added_nodes = 0;                             // by updates since then
-  std::optional<topology::BladePose> window_seen;  // where the blade was when the window was last seen to cover its way
-  solvers::Field base;                             // without tool and contact
-  solvers::ContactPatch patch;                     // no nodes: the tool is far
-  std::optional<SurfaceWatch> watch;               // of the surface about the patch; empty: not looked at yet
-  int presses = 0;                                 // since it was condensed
-  std::optional<solvers::LipPatch> lips;           // pairs, then banks; empty: none has had to be held yet
-  std::optional<solvers::CutContactState> state;   // empty: not solved yet
-  solvers::Field field;                            // solution; at finite strain of that body's shape functions
-  std::optional<solvers::Field> without_blade;     // that without the blade, while `field` is under it
-  mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
-  mutable RestMemo rest_memo{};                    // of the solution, likewise
+  const char* not_following = "";                                 // why the body cannot follow a cut; empty: it can
+  topology::SurfaceMesh window_way;               // of the cut, for which a body that follows it was condensed
+  int added_nodes = 0;                            // by updates since then
+  std::optional<topology::BladePose> window_seen; // where the blade was when the window was last seen to cover its way
+  solvers::Field base;                            // without tool and contact
+  solvers::ContactPatch patch;                    // no nodes: the tool is far
+  std::optional<SurfaceWatch> watch;              // of the surface about the patch; empty: not looked at yet
+  int presses = 0;                                // since it was condensed
+  std::optional<solvers::LipPatch> lips;          // pairs, then banks; empty: none has had to be held yet
+  std::optional<solvers::CutContactState> state;  // empty: not solved yet
+  solvers::Field field;                           // solution; at finite strain of that body's shape functions
+  std::optional<solvers::Field> without_blade;    // that without the blade, while `field` is under it
+  mutable solvers::FrontRules front_rules{};      // of these nodes and this cut, found as they are asked for
+  mutable RestMemo rest_memo{};                   // of the solution, likewise
 
   /// Whether there is a body.
   [[nodiscard]] bool built() const { return body != nullptr || finite != nullptr; }
