@@ -160,12 +160,52 @@ DisplacementMean FiniteBody::weighed(DisplacementMean mean) const {
   return mean;
 }
 
-// Shares consist of what their node sees.
+// A cut parts shares of the uncut body: each part is held for itself, by the function that its node has there.
 void FiniteBody::hold() {
-  std::vector<DisplacementMean> means = held_shares(problem_, spheres(), *patches_);
-  for (DisplacementMean& mean : means)
-    mean = weighed(std::move(mean));
-  held_ = std::make_unique<HeldMeans>(problem_.prescribed, std::move(means), functions_);
+  std::vector<int> own;
+  own.reserve(problem_.prescribed.size());
+  for (const Prescribed& entry : problem_.prescribed)
+    own.push_back(entry.node);
+  if (cut_functions_ == nullptr) {
+    held_ =
+        std::make_unique<HeldMeans>(problem_.prescribed, held_shares(problem_, spheres(), *patches_), own, functions_);
+    return;
+  }
+  Problem uncut = problem_;
+  uncut.incision = nullptr;
+  uncut.nodes = cut_functions_->uncut()->nodes();
+  const std::vector<DisplacementMean> whole = held_shares(uncut, spheres(), SurfacePatches(*uncut.domain, uncut.nodes));
+  const int base = uncut.nodes.size();
+  std::vector<Prescribed> entries;
+  std::vector<DisplacementMean> means;
+  std::vector<int> followers;
+  ShapeFunctions shape;
+  for (std::size_t e = 0; e < whole.size(); ++e) {
+    std::map<int, DisplacementMean> parts; // by function of the node
+    for (const QuadraturePoint& point : whole[e].share) {
+      shape_at(point.position, shape);
+      int side = own[e];
+      for (const int function : shape.nodes)
+        if (function >= base && node_of(function) == own[e] && !cut_functions_->twin(function - base).is_step)
+          side = function;
+      parts[side].share.push_back(point);
+    }
+    for (auto& [function, part] : parts) {
+      double share = 0;
+      for (const QuadraturePoint& point : part.share) {
+        share += point.weight;
+        part.centroid += point.weight * point.position;
+      }
+      part.centroid /= share;
+      part.area = share * whole[e].area;
+      for (QuadraturePoint& point : part.share)
+        point.weight /= share;
+      entries.push_back(problem_.prescribed[e]);
+      means.push_back(weighed(std::move(part)));
+      followers.push_back(function);
+    }
+  }
+  held_ = std::make_unique<HeldMeans>(std::move(entries), std::move(means), followers, functions_);
 }
 
 int FiniteBody::carrier_of(const DisplacementMean& mean) {

@@ -4,7 +4,8 @@
 
 namespace spherecut::solvers {
 
-HeldMeans::HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMean> means, int functions)
+HeldMeans::HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMean> means, const std::vector<int>& own,
+                     int functions)
     : entries_(std::move(entries)), means_(std::move(means)) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<int> here;
@@ -24,21 +25,21 @@ HeldMeans::HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMe
     group.entries = here;
     std::vector<int> place(functions, -1);
     for (const int e : here) {
-      place[entries_[e].node] = static_cast<int>(group.nodes.size());
-      group.nodes.push_back(entries_[e].node);
+      place[own[e]] = static_cast<int>(group.nodes.size());
+      group.nodes.push_back(own[e]);
     }
-    std::vector<Eigen::Triplet<double>> own, others;
+    std::vector<Eigen::Triplet<double>> followers, others;
     for (int row = 0; row < std::ssize(here); ++row) {
       const DisplacementMean& mean = means_[here[row]];
       for (std::size_t k = 0; k < mean.nodes.size(); ++k)
         if (place[mean.nodes[k]] >= 0)
-          own.emplace_back(row, place[mean.nodes[k]], mean.weights[k]);
+          followers.emplace_back(row, place[mean.nodes[k]], mean.weights[k]);
         else
           others.emplace_back(row, mean.nodes[k], mean.weights[k]);
     }
     const auto count = static_cast<Eigen::Index>(here.size());
     SparseMatrix matrix(count, count);
-    matrix.setFromTriplets(own.begin(), own.end());
+    matrix.setFromTriplets(followers.begin(), followers.end());
     group.own = factor_general(matrix);
     group.others.resize(count, functions);
     group.others.setFromTriplets(others.begin(), others.end());

@@ -1,6 +1,6 @@
 // Prescribed displacements of a body at finite strain, met exactly. Every entry holds the mean displacement over a
-// share of the surface along some axes, sum_J w_J u_J = g; the coefficients of the entries' own nodes follow from the
-// others.
+// share of the surface along some axes, sum_J w_J u_J = g; the coefficients of one function an entry, its own,
+// follow from the others.
 #pragma once
 
 #include "solvers/algebra/factorisation.hpp"
@@ -10,8 +10,10 @@ namespace spherecut::solvers {
 
 class HeldMeans {
  public:
-  /// `means` belong to the entries. Throws NumericalError where the means do not determine their nodes' coefficients.
-  HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMean> means, int functions);
+  /// `means` and `own`, the functions whose coefficients follow, belong to the entries. Throws NumericalError where the
+  /// means do not determine those coefficients.
+  HeldMeans(std::vector<Prescribed> entries, std::vector<DisplacementMean> means, const std::vector<int>& own,
+            int functions);
 
   [[nodiscard]] const std::vector<Prescribed>& entries() const { return entries_; }
   [[nodiscard]] const std::vector<DisplacementMean>& means() const { return means_; }

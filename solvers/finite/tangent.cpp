@@ -275,7 +275,9 @@ std::unique_ptr<const FiniteTangent::Uniform> FiniteTangent::uniform_of(const st
                                                                         const std::vector<double>& jacobian) const {
   constexpr double alike = 1e-12;
   const PointTable& table = body_.points();
-  if (!body_.fibres_.empty() || body_.prony_ != nullptr || table.groups() == 0)
+  // By the other rules sums keep their order, and with it their last bits: a flap of the coarsest nodes that can bear
+  // it tears on or not by these.
+  if (body_.cut_functions() == nullptr || !body_.fibres_.empty() || body_.prony_ != nullptr || table.groups() == 0)
     return nullptr;
   for (int group = 0; group < table.groups(); ++group)
     for (int k = 0; k < 9; ++k)

@@ -264,7 +264,12 @@ TEST_CASE("A share of the held surface that a cut parts is held on both sides") 
   CHECK(equilibrium.solve({}).converged);
   const VectorX& u = equilibrium.coefficients();
   CHECK(opening(body, u, -0.45, 0.013) > 0.05);
-  CHECK(std::abs(opening(body, u, 0.495, 0.013)) < 0.1 * opening(body, u, -0.45, 0.013));
+  CHECK(body.held().entries().size() > body.problem().prescribed.size());
+  double slip = 0;
+  for (double y = -0.45; y < 0.5; y += 0.1)
+    for (double z = -0.45; z < 0.5; z += 0.1)
+      slip = std::max(slip, body.at({0.5, y, z}, u).displacement.norm());
+  CHECK(slip < 0.02 * opening(body, u, -0.45, 0.013));
   // Weight is borne: the reactions are the forces.
   Vector3 sum = Vector3::Zero();
   for (const Vector3& reaction : equilibrium.constraint_forces())
