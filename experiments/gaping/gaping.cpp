@@ -57,7 +57,7 @@ std::vector<Vector3> pulled_apart(const solvers::FiniteBody& body, double strain
 double grown_under_load(const GapingReference::Stretch& given, const std::shared_ptr<const solvers::Law>& law,
                         double fine, double coarse) {
   solvers::EquilibriumOptions accurate;
-  accurate.tolerance = 1e-6;
+  accurate.tolerance = 1e-5;
   std::shared_ptr<const topology::Domain> domain;
   std::unique_ptr<solvers::FiniteBody> body;
   VectorX state;
@@ -184,11 +184,12 @@ std::vector<Check> run_gaping(const ExperimentContext& context) {
     checks.push_back({fmt::format("gaping_reference_opening_{}", percent), given.opening_change, "<=", 0.01});
     checks.push_back({fmt::format("gaping_reference_force_{}", percent), given.force_change, "<=", 0.01});
   }
-  const double grown = grown_under_load(reference.stretches.front(), law, fine, coarse);
+  const double grown_fine = context.quick ? 2 * fine : fine;
+  const double grown = grown_under_load(reference.stretches.front(), law, grown_fine, coarse);
   context.say(
       fmt::format("appended, grown in increments of {} m at {:.0f} %: {:.1e} of the largest opening off the cut "
                   "at once",
-                  fine, 100 * (reference.stretches.front().stretch - 1), grown));
+                  grown_fine, 100 * (reference.stretches.front().stretch - 1), grown));
   checks.push_back({"gaping_appended_grown", grown, "<=", 0.002});
   table.write(context.out / "openings.csv");
   app::write_png(figure, context.out / "openings.png");
