@@ -575,14 +575,13 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
   terms.clear();
   if (functions_.empty())
     return;
-  std::optional<FrontPlace> place;
-  bool placed = false;
-  const auto place_here = [&]() -> const FrontPlace* {
-    if (!placed) {
-      place = places_.nearest(x);
-      placed = true;
-    }
-    return place ? &*place : nullptr;
+  constexpr int nearest = -1;
+  std::map<int, std::optional<FrontPlace>> placed; // of x, by run of the front; few
+  const auto place_at = [&](int run) -> const FrontPlace* {
+    auto found = placed.find(run);
+    if (found == placed.end())
+      found = placed.emplace(run, run == nearest ? places_.nearest(x) : places_.of_run(x, run)).first;
+    return found->second ? &*found->second : nullptr;
   };
   std::map<int, std::pair<double, Vector3>> of_group; // few
   for (int n = 0; n < shape.size(); ++n) {
@@ -594,16 +593,11 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
           terms.scalar.push_back({k, shape.value[n], shape.gradient(n)});
         continue;
       }
-      const FrontPlace* at = place_here();
-      std::optional<FrontPlace> of_run;
-      if (twin.run >= 0) {
-        if (!std::binary_search(twin.hidden.begin(), twin.hidden.end(), part))
-          continue;
-        of_run = places_.of_run(x, twin.run);
-        at = of_run ? &*of_run : nullptr;
-      }
+      if (twin.run >= 0 && !std::binary_search(twin.hidden.begin(), twin.hidden.end(), part))
+        continue;
       Vector3 slope;
-      const double jump = 0.5 * (step(at, x, twin.step_length, slope) - twin.step_at_node);
+      const double jump =
+          0.5 * (step(place_at(twin.run >= 0 ? twin.run : nearest), x, twin.step_length, slope) - twin.step_at_node);
       if (jump != 0 || !slope.isZero(0))
         terms.scalar.push_back({k, shape.value[n] * jump, jump * shape.gradient(n) + 0.5 * shape.value[n] * slope});
     }
@@ -613,9 +607,9 @@ void CutSpace::terms_at(const Vector3& x, PartId part, const ShapeFunctions& sha
       gradient += group_weights_[node][g] * shape.gradient(n);
     }
   }
-  if (of_group.empty() || place_here() == nullptr)
+  if (of_group.empty() || place_at(nearest) == nullptr)
     return;
-  PlacedSample here{1, x, place, {}};
+  PlacedSample here{1, x, placed.at(nearest), {}};
   for (const auto& [k, sum] : of_group)
     if (PlaceAtRun* const at = places_.at_run(here, functions_[k].group.run); at != nullptr)
       terms.front.push_back(front_term(k, sum.first, sum.second, *at));

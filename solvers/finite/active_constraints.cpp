@@ -12,7 +12,7 @@ void find_responses(const RestOperator& rest, const std::vector<int>& keys,
       missing.push_back(i);
   if (missing.empty())
     return;
-  MatrixX units = MatrixX::Zero(rest.matrix().rows(), 3 * std::ssize(missing));
+  MatrixX units = MatrixX::Zero(rest.rows(), 3 * std::ssize(missing));
   for (std::size_t m = 0; m < missing.size(); ++m) {
     const DisplacementMean& mean = *means[missing[m]];
     for (std::size_t k = 0; k < mean.nodes.size(); ++k)

@@ -117,7 +117,13 @@ FiniteBody::FiniteBody(Problem problem, std::shared_ptr<const Law> law, const Fi
     prony_ = std::make_unique<PronyState>(options_.prony, places.size(), law_->small_strain_only());
     places_ = std::make_unique<topology::PointTree>(places);
   }
-  tangent_ = std::make_unique<FiniteTangent>(*this);
+}
+
+// Its pattern and order of elimination take long, and a body may do without.
+const FiniteTangent& FiniteBody::assembler() const {
+  if (tangent_ == nullptr)
+    tangent_ = std::make_unique<FiniteTangent>(*this);
+  return *tangent_;
 }
 
 const Spheres& FiniteBody::spheres() const {
@@ -174,7 +180,7 @@ void FiniteBody::hold() {
   Problem uncut = problem_;
   uncut.incision = nullptr;
   uncut.nodes = cut_functions_->uncut()->nodes();
-  const std::vector<DisplacementMean> whole = held_shares(uncut, spheres(), SurfacePatches(*uncut.domain, uncut.nodes));
+  const std::vector<DisplacementMean> whole = held_shares(uncut, spheres(), cut_functions_->uncut()->patches());
   const int base = uncut.nodes.size();
   std::vector<Prescribed> entries;
   std::vector<DisplacementMean> means;
@@ -217,6 +223,13 @@ void FiniteBody::tabulate() {
   BackgroundCells cells;
   if (cut_functions_ != nullptr) {
     table_ = cut_functions_->tabulate(cells);
+    std::vector<int> group_of(cells.start.size(), -1); // by cell of the table
+    for (int uncut = 0; uncut < std::ssize(cells.boxes); ++uncut)
+      for (int cell = cells.boxes[uncut].first_cell; cell < cells.boxes[uncut].last_cell; ++cell)
+        group_of[cell] = uncut;
+    uncut_groups_.reserve(table_.cell.size());
+    for (const int cell : table_.cell)
+      uncut_groups_.push_back(group_of[cell]);
     consistency_ = cut_functions_->uncut()->consistency();
   } else {
     cells = background_cells(*problem_.domain, problem_.nodes,
@@ -490,11 +503,16 @@ void FiniteBody::accept_step(const VectorX& coefficients) {
 
 void FiniteBody::tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const {
   deform(coefficients);
-  tangent_->assemble(work_->deformation, work_->jacobian, penalty, lower);
+  assembler().assemble(work_->deformation, work_->jacobian, penalty, lower);
+}
+
+std::optional<UniformTangent> FiniteBody::uniform_tangent(const VectorX& coefficients) const {
+  deform(coefficients);
+  return uniform_tangent_of(*this, work_->deformation, work_->jacobian);
 }
 
 const std::vector<int>& FiniteBody::rank() const {
-  return tangent_->rank();
+  return assembler().rank();
 }
 
 double FiniteBody::penalty_stiffness(int entry, double penalty) const {

@@ -15,6 +15,8 @@
 #include "solvers/points/consistent_gradients.hpp"
 #include "solvers/points/dilatation_blocks.hpp"
 
+#include <optional>
+
 namespace spherecut::topology {
 class PointTree;
 }
@@ -53,6 +55,13 @@ struct FiniteForces {
   double energy = 0;         // J; infinite where the law cannot be asked (some J <= 0)
   double least_jacobian = 1; // of all points
   VectorX forces;            // dE/du, N, 3 a function; not set where the energy is infinite
+};
+
+/// Tangent of points that are strained alike, per volume.
+struct UniformTangent {
+  Eigen::Matrix<double, 9, 9> stiffness; // Pa: row a + 3 b, column c + 3 d: dP_ac / dF_bd
+  Matrix3 cofactor;                      // J F^-T
+  double bulk_slope = 0;                 // Pa, of the part of the pressure that blocks have
 };
 
 class FiniteBody {
@@ -126,6 +135,11 @@ class FiniteBody {
   /// With a penalty what a cut appends has a little support of its own, so that the whole is definite.
   void tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const;
   [[nodiscard]] const std::vector<int>& rank() const; // place of every function in the order of elimination
+  /// The tangent of all points where they are strained alike, as at rest, and the law is the same everywhere; else of
+  /// no value.
+  [[nodiscard]] std::optional<UniformTangent> uniform_tangent(const VectorX& coefficients) const;
+  /// Where cuts append: for every group of points, that of the uncut body's which it is, or is part of.
+  [[nodiscard]] const std::vector<int>& uncut_groups() const { return uncut_groups_; }
   [[nodiscard]] double penalty_stiffness(int entry, double penalty) const;
 
   /// Map of every function that carries the rest state along: mean of F where it counts over its determinant. Identity
@@ -140,12 +154,16 @@ class FiniteBody {
 
  private:
   friend class FiniteTangent;
+  friend std::optional<UniformTangent> uniform_tangent_of(const FiniteBody& body,
+                                                          const std::vector<LaneValues>& deformation,
+                                                          const std::vector<double>& jacobian);
   void tabulate();
   void hold();
   [[nodiscard]] DisplacementMean weighed(DisplacementMean mean) const;
   void assemble_loads();
   /// F of all groups, and the mean J of all blocks; returns the least J.
   double deform(const VectorX& coefficients) const;
+  [[nodiscard]] const FiniteTangent& assembler() const;
   double add_chunk(int begin, int end, const std::vector<double>& pressure, bool one_thread, VectorX& forces) const;
   [[nodiscard]] const Vector3& place_of(int group, std::size_t point) const; // m
   [[nodiscard]] int count_from(int begin, int end) const;          // points that weigh something, of these groups
@@ -164,6 +182,7 @@ class FiniteBody {
   int functions_ = 0;
   std::unique_ptr<SurfacePatches> patches_;
   PointTable table_;
+  std::vector<int> uncut_groups_;
   DilatationBlocks blocks_;
   ConsistencyReport consistency_;
   std::unique_ptr<HeldMeans> held_;
@@ -172,9 +191,9 @@ class FiniteBody {
   double volume_ = 0, share_ = 1;
   VectorX loads_;
   NodalSupports supports_;
-  std::unique_ptr<PronyState> prony_;           // null: nothing fades
-  std::unique_ptr<topology::PointTree> places_; // of all points, where something does
-  std::unique_ptr<FiniteTangent> tangent_;
+  std::unique_ptr<PronyState> prony_;              // null: nothing fades
+  std::unique_ptr<topology::PointTree> places_;    // of all points, where something does
+  mutable std::unique_ptr<FiniteTangent> tangent_; // null: not asked for yet
   std::unique_ptr<Work> work_;
 };
 

@@ -60,7 +60,7 @@ UncutFunctions::UncutFunctions(const Problem& problem, int base, double support_
     : domain_(problem.domain), nodes_(first_nodes(problem.nodes, base)), support_radius_(support_radius),
       is_consistent_(is_consistent),
       spheres_(nodes_.positions, nodes_.spacings, support_radius, Basis::linear, worst_moment_condition),
-      boxes_(*domain_, nodes_, spheres_, box_cell) {
+      boxes_(*domain_, nodes_, spheres_, box_cell), patches_(*domain_, nodes_) {
   if (!is_consistent)
     return;
   Problem uncut = problem;
@@ -70,8 +70,7 @@ UncutFunctions::UncutFunctions(const Problem& problem, int base, double support_
   // Nothing is divided: a group of the table is a cell of the boxes, in the order of their places.
   PointTable table =
       CutFunctions(std::shared_ptr<const UncutFunctions>(std::shared_ptr<void>(), this), uncut).tabulate(cells);
-  consistency_ =
-      make_consistent(nodes_.positions, surface_integrals(spheres_, SurfacePatches(*domain_, nodes_).points()), table);
+  consistency_ = make_consistent(nodes_.positions, surface_integrals(spheres_, patches_.points()), table);
   for (int group = 0; group < table.groups(); ++group) {
     const int cell = boxes_.cells_by_place()[group];
     const std::vector<int>& nodes = boxes_.cells()[cell].nodes;
@@ -92,6 +91,16 @@ bool UncutFunctions::fits(const Problem& problem, int base, double support_radiu
         nodes_.kinds[i] != problem.nodes.kinds[i])
       return false;
   return true;
+}
+
+std::shared_ptr<const UncutTangent> UncutFunctions::tangent() const {
+  const std::lock_guard lock(guard_);
+  return tangent_;
+}
+
+void UncutFunctions::keep(std::shared_ptr<const UncutTangent> tangent) const {
+  const std::lock_guard lock(guard_);
+  tangent_ = std::move(tangent);
 }
 
 CutFunctions::CutFunctions(std::shared_ptr<const UncutFunctions> uncut, const Problem& problem)

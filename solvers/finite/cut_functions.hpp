@@ -15,10 +15,14 @@
 #include "solvers/points/consistent_gradients.hpp"
 
 #include <memory>
+#include <mutex>
 
 namespace spherecut::solvers {
 
-/// The uncut body: its nodes, spheres and small boxes, whose gradients fit the quadrature. Immutable.
+class UncutTangent; // solvers/finite/bordered_operator.hpp
+
+/// The uncut body: its nodes, spheres and small boxes, whose gradients fit the quadrature. Immutable but for
+/// what it keeps for others.
 class UncutFunctions {
  public:
   /// On the first `base` nodes of a problem; the others are lip nodes, places without spheres. Throws NumericalError
@@ -34,7 +38,12 @@ class UncutFunctions {
   [[nodiscard]] const NodeCloud& nodes() const { return nodes_; }
   [[nodiscard]] const Spheres& spheres() const { return spheres_; }
   [[nodiscard]] const SmallBoxes& boxes() const { return boxes_; }
+  [[nodiscard]] const SurfacePatches& patches() const { return patches_; }
   [[nodiscard]] const ConsistencyReport& consistency() const { return consistency_; }
+
+  /// The factored tangent at rest of the body without a cut, which was the last to be kept; null: none was.
+  [[nodiscard]] std::shared_ptr<const UncutTangent> tangent() const;
+  void keep(std::shared_ptr<const UncutTangent> tangent) const;
 
  private:
   std::shared_ptr<const topology::Domain> domain_;
@@ -43,7 +52,10 @@ class UncutFunctions {
   bool is_consistent_;
   Spheres spheres_;
   SmallBoxes boxes_;
+  SurfacePatches patches_;
   ConsistencyReport consistency_;
+  mutable std::mutex guard_;
+  mutable std::shared_ptr<const UncutTangent> tangent_;
 };
 
 class CutFunctions {
@@ -61,6 +73,8 @@ class CutFunctions {
   [[nodiscard]] int node_of(int function) const {
     return function < uncut_->size() ? function : twin(function - uncut_->size()).node;
   }
+  /// The function that counts less by what the k-th appended one counts: that of the same sphere on the near side.
+  [[nodiscard]] int host_of(int k) const { return host_[k] < 0 ? twin(k).node : uncut_->size() + host_[k]; }
   /// The functions at x; those that vanish are left out. False: no sound support covers x.
   bool evaluate(const Vector3& x, ShapeFunctions& shape) const;
 

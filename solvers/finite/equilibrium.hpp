@@ -150,6 +150,8 @@ class Equilibrium {
   [[nodiscard]] const RestOperator& preconditioner() const { return tangent_ ? tangent_->matrix : rest_; }
   void renew_preconditioner(const EquilibriumStatus& status);
   void set_tangent(std::unique_ptr<CarriedTangent> tangent);
+  /// Whether a solve has taken all that it may by this method.
+  [[nodiscard]] bool is_spent(FiniteMethod method, const EquilibriumStatus& status) const;
   bool go(const State& target, int halvings, EquilibriumStatus& status);
   bool step(const State& target, FiniteMethod method, EquilibriumStatus& status);
   bool begin_step(const State& target, Trial& now, EquilibriumStatus& status);

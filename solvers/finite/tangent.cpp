@@ -27,6 +27,14 @@ std::vector<int> sorted_by_rank(std::span<const int> nodes, const std::vector<in
   return order;
 }
 
+/// Groups from this one on that are of the same cell: the first one beyond them.
+int end_of_cell(const PointTable& table, int group) {
+  int end = group + 1;
+  while (end < table.groups() && table.cell[end] == table.cell[group])
+    ++end;
+  return end;
+}
+
 } // namespace
 
 FiniteTangent::FiniteTangent(const FiniteBody& body) : body_(body) {
@@ -35,6 +43,12 @@ FiniteTangent::FiniteTangent(const FiniteBody& body) : body_(body) {
     for (int group = 0; group < body_.points().groups(); ++group)
       block_groups_[body_.blocks().block[group]].push_back(group);
   find_pattern();
+}
+
+// By the other rules sums keep their order, and with it their last bits: a flap of the coarsest nodes that can bear it
+// tears on or not by these.
+bool FiniteTangent::sums_by_cell() const {
+  return body_.cut_functions() != nullptr;
 }
 
 void FiniteTangent::find_pattern() {
@@ -54,8 +68,10 @@ void FiniteTangent::find_pattern() {
   };
   std::vector<int> nodes;
   if (block_groups_.empty())
-    for (int group = 0; group < table.groups(); ++group) {
-      nodes.assign(table.nodes_of(group).begin(), table.nodes_of(group).end());
+    for (int group = 0, end = 0; group < table.groups(); group = end) {
+      end = sums_by_cell() ? end_of_cell(table, group) : group + 1;
+      nodes.assign(table.nodes.begin() + table.start[group], table.nodes.begin() + table.start[end]);
+      tidy(nodes);
       couple(nodes);
     }
   for (const std::vector<int>& groups : block_groups_) {
@@ -92,43 +108,50 @@ void FiniteTangent::find_pattern() {
   }
 }
 
-void FiniteTangent::scatter(const std::vector<int>& ranks, const MatrixX& matrix, SparseMatrix& lower) const {
-  double* const values = lower.valuePtr();
-  const int* const starts = lower.outerIndexPtr();
+/// Calls visit(i, j, place of the pair in rows_) for every pair i >= j of a list of ascending ranks.
+template <class Visit>
+void FiniteTangent::for_each_pair(const std::vector<int>& ranks, Visit&& visit) const {
   for (int j = 0; j < std::ssize(ranks); ++j) {
-    const int* row = rows_.data() + column_start_[ranks[j]];
-    int place = 0;
+    int entry = column_start_[ranks[j]];
     for (int i = j; i < std::ssize(ranks); ++i) {
-      while (row[place] != ranks[i])
-        ++place;
-      for (int b = 0; b < 3; ++b)
-        for (int a = 0; a < 3; ++a)
-          values[starts[3 * ranks[j] + b] + 3 * place + a] += matrix(3 * i + a, 3 * j + b);
+      while (rows_[entry] != ranks[i])
+        ++entry;
+      visit(i, j, entry);
     }
   }
 }
 
-/// w dP/dF at the points of a group, [row + 9 column], and w times the cofactors.
-void FiniteTangent::point_tangents(int group, const LaneValues* deformation, double block_jacobian, LaneValues* tangent,
-                                   LaneValues* cofactor) const {
-  const Law& law = body_.law();
-  const bool blocks = body_.blocks().size() > 0, minds = body_.minds_volume();
-  const double own = body_.pointwise_share();
+void FiniteTangent::scatter(const std::vector<int>& ranks, const MatrixX& matrix, SparseMatrix& lower) const {
+  double* const values = lower.valuePtr();
+  const int* const starts = lower.outerIndexPtr();
+  for_each_pair(ranks, [&](int i, int j, int entry) {
+    const int place = entry - column_start_[ranks[j]];
+    for (int b = 0; b < 3; ++b)
+      for (int a = 0; a < 3; ++a)
+        values[starts[3 * ranks[j] + b] + 3 * place + a] += matrix(3 * i + a, 3 * j + b);
+  });
+}
+
+void FiniteTangent::point_tangents(const FiniteBody& body, int group, const LaneValues* deformation,
+                                   double block_jacobian, LaneValues* tangent, LaneValues* cofactor) {
+  const Law& law = body.law();
+  const bool blocks = body.blocks().size() > 0, minds = body.minds_volume();
+  const double own = body.pointwise_share();
   const double shared_pressure = blocks ? (1 - own) * law.pressure(block_jacobian) : 0;
   const FibreFrame frame = law.own_fibres();
-  for (int lane = 0; lane < body_.points().count[group]; ++lane) {
+  for (int lane = 0; lane < body.points().count[group]; ++lane) {
     Matrix3 f;
     for (int k = 0; k < 9; ++k)
       f.data()[k] = deformation[k].value[lane];
-    const double weight = body_.points().weights[group].value[lane];
+    const double weight = body.points().weights[group].value[lane];
     Matrix9 d;
     try {
-      d = law.tangent_isochoric(f, body_.fibres_.empty() ? frame : body_.fibres_[body_.point_start_[group] + lane]);
+      d = law.tangent_isochoric(f, body.fibres_.empty() ? frame : body.fibres_[body.point_start_[group] + lane]);
     } catch (const LawValueError& error) {
-      throw_with_place(error, body_.points().positions[static_cast<std::size_t>(point_lanes) * group + lane]);
+      throw_with_place(error, body.points().positions[static_cast<std::size_t>(point_lanes) * group + lane]);
     }
-    if (body_.prony_ != nullptr)
-      body_.prony_->apply(static_cast<std::size_t>(body_.point_start_[group]) + static_cast<std::size_t>(lane), d);
+    if (body.prony_ != nullptr)
+      body.prony_->apply(static_cast<std::size_t>(body.point_start_[group]) + static_cast<std::size_t>(lane), d);
     if (minds) {
       Matrix3 c;
       c.col(0) = f.col(1).cross(f.col(2));
@@ -162,7 +185,13 @@ void FiniteTangent::assemble(const std::vector<LaneValues>& deformation, const s
   lay_pattern(lower);
   const bool blocks = body_.blocks().size() > 0;
   std::vector<VectorX> swelling(blocks ? body_.points().groups() : 0);
-  add_groups(deformation, jacobian, swelling, lower);
+  std::optional<UniformTangent> uniform;
+  if (sums_by_cell())
+    uniform = uniform_tangent_of(body_, deformation, jacobian);
+  if (uniform)
+    add_uniform(*uniform, swelling, lower);
+  else
+    add_groups(deformation, jacobian, swelling, lower);
   if (blocks)
     add_blocks(jacobian, swelling, lower);
   if (penalty > 0) {
@@ -192,7 +221,7 @@ void FiniteTangent::lay_pattern(SparseMatrix& lower) const {
 void FiniteTangent::add_groups(const std::vector<LaneValues>& deformation, const std::vector<double>& jacobian,
                                std::vector<VectorX>& swelling, SparseMatrix& lower) const {
   const int groups = body_.points().groups();
-  const std::unique_ptr<const Uniform> uniform = uniform_of(deformation, jacobian);
+  const bool blocks = !swelling.empty();
   std::vector<Local> locals(groups_at_once);
   for (int first = 0; first < groups; first += groups_at_once) {
     const int here = std::min(groups_at_once, groups - first);
@@ -200,19 +229,9 @@ void FiniteTangent::add_groups(const std::vector<LaneValues>& deformation, const
       std::vector<LaneValues> tangent(81);
       for (int k = begin; k < end; ++k) {
         const int group = first + k;
-        const bool blocks = !swelling.empty();
         LaneValues cofactor[9];
-        if (uniform != nullptr) {
-          for (int c = 0; c < 9 && blocks; ++c)
-            for (int lane = 0; lane < point_lanes; ++lane)
-              cofactor[c].value[lane] = body_.points().weights[group].value[lane] * uniform->cofactor[c].value[0];
-          if (blocks)
-            swelling[group] = swelling_of(group, cofactor);
-          group_matrix(group, *uniform, locals[k]);
-          continue;
-        }
         std::fill(tangent.begin(), tangent.end(), LaneValues{});
-        point_tangents(group, deformation.data() + 9 * static_cast<std::size_t>(group),
+        point_tangents(body_, group, deformation.data() + 9 * static_cast<std::size_t>(group),
                        blocks ? jacobian[body_.blocks().block[group]] : 1, tangent.data(), cofactor);
         if (blocks)
           swelling[group] = swelling_of(group, cofactor);
@@ -271,67 +290,109 @@ void FiniteTangent::group_matrix(int group, const LaneValues* tangent, Local& lo
   }
 }
 
-std::unique_ptr<const FiniteTangent::Uniform> FiniteTangent::uniform_of(const std::vector<LaneValues>& deformation,
-                                                                        const std::vector<double>& jacobian) const {
+std::optional<UniformTangent> uniform_tangent_of(const FiniteBody& body, const std::vector<LaneValues>& deformation,
+                                                 const std::vector<double>& jacobian) {
   constexpr double alike = 1e-12;
-  const PointTable& table = body_.points();
-  // By the other rules sums keep their order, and with it their last bits: a flap of the coarsest nodes that can bear
-  // it tears on or not by these.
-  if (body_.cut_functions() == nullptr || !body_.fibres_.empty() || body_.prony_ != nullptr || table.groups() == 0)
-    return nullptr;
+  const PointTable& table = body.points();
+  if (!body.fibres_.empty() || body.prony_ != nullptr || table.groups() == 0)
+    return std::nullopt;
   for (int group = 0; group < table.groups(); ++group)
     for (int k = 0; k < 9; ++k)
       for (int lane = 0; lane < table.count[group]; ++lane)
         if (!(std::abs(deformation[9 * static_cast<std::size_t>(group) + k].value[lane] - deformation[k].value[0]) <
               alike))
-          return nullptr;
+          return std::nullopt;
   for (const double block : jacobian)
     if (!(std::abs(block - jacobian.front()) < alike))
-      return nullptr;
-  auto uniform = std::make_unique<Uniform>();
-  point_tangents(0, deformation.data(), jacobian.empty() ? 1 : jacobian.front(), uniform->tangent, uniform->cofactor);
-  const double weight = table.weights[0].value[0];
-  for (LaneValues& value : uniform->tangent)
-    value.value[0] /= weight;
-  for (LaneValues& value : uniform->cofactor)
-    value.value[0] /= weight;
-  return uniform;
-}
-
-// K_ij = sum over c, d of D_acbd M_cd,ij with M_cd = sum over the points of w g_ic g_jd: one product for all of them.
-void FiniteTangent::group_matrix(int group, const Uniform& uniform, Local& local) const {
-  const std::span<const int> nodes = body_.points().nodes_of(group);
-  const std::vector<int> order = sorted_by_rank(nodes, rank_);
-  const int size = static_cast<int>(nodes.size());
-  const LaneValues* g = body_.points().gradients_of(group);
-  const LaneValues& weights = body_.points().weights[group];
-  MatrixX left(point_lanes, 3 * size), right(point_lanes, 3 * size), moments = MatrixX::Zero(3 * size, 3 * size);
-  local.ranks.resize(size);
-  local.matrix.resize(3 * size, 3 * size);
-  for (int i = 0; i < size; ++i) {
-    local.ranks[i] = rank_[nodes[order[i]]];
-    for (int c = 0; c < 3; ++c)
-      for (int lane = 0; lane < point_lanes; ++lane) {
-        left(lane, 3 * i + c) = g[3 * order[i] + c].value[lane];
-        right(lane, 3 * i + c) = weights.value[lane] * left(lane, 3 * i + c);
-      }
-  }
-  add_product(1, left, true, right, moments);
-  std::array<double, 81> tangent{}; // [a + 3 b][c + 3 d]
+      return std::nullopt;
+  const double block_jacobian = jacobian.empty() ? 1 : jacobian.front(), weight = table.weights[0].value[0];
+  LaneValues tangent[81], cofactor[9];
+  FiniteTangent::point_tangents(body, 0, deformation.data(), block_jacobian, tangent, cofactor);
+  UniformTangent uniform;
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b)
       for (int c = 0; c < 3; ++c)
         for (int d = 0; d < 3; ++d)
-          tangent[9 * (a + 3 * b) + c + 3 * d] = uniform.tangent[a + 3 * c + 9 * (b + 3 * d)].value[0];
-  for (int j = 0; j < size; ++j)
-    for (int i = j; i < size; ++i) { // what is above the diagonal is not asked for
-      const Matrix3 moment = moments.block<3, 3>(3 * i, 3 * j);
-      for (int ab = 0; ab < 9; ++ab) {
-        double sum = 0;
-        for (int cd = 0; cd < 9; ++cd)
-          sum += tangent[9 * ab + cd] * moment.data()[cd];
-        local.matrix(3 * i + ab % 3, 3 * j + ab / 3) = sum;
+          uniform.stiffness(a + 3 * b, c + 3 * d) = tangent[a + 3 * c + 9 * (b + 3 * d)].value[0] / weight;
+  for (int k = 0; k < 9; ++k)
+    uniform.cofactor.data()[k] = cofactor[k].value[0] / weight;
+  if (body.blocks().size() > 0)
+    uniform.bulk_slope = (1 - body.pointwise_share()) * body.law().bulk_slope(block_jacobian);
+  return uniform;
+}
+
+// Groups of a cell have much the same nodes: their moments are one product.
+void FiniteTangent::cell_moments(int first, int end, std::vector<int>& place, Local& local) const {
+  const PointTable& table = body_.points();
+  std::vector<int> nodes;
+  for (int slot = table.start[first]; slot < table.start[end]; ++slot)
+    if (place[table.nodes[slot]] < 0) {
+      place[table.nodes[slot]] = 0;
+      nodes.push_back(table.nodes[slot]);
+    }
+  std::sort(nodes.begin(), nodes.end(), [&](int i, int j) { return rank_[i] < rank_[j]; });
+  local.ranks.clear();
+  for (int i = 0; i < std::ssize(nodes); ++i) {
+    place[nodes[i]] = i;
+    local.ranks.push_back(rank_[nodes[i]]);
+  }
+  const auto points = static_cast<Eigen::Index>(point_lanes) * (end - first);
+  MatrixX weighed = MatrixX::Zero(points, 3 * std::ssize(nodes)); // gradients, times the root of the weight
+  for (int group = first; group < end; ++group) {
+    double root[point_lanes];
+    for (int lane = 0; lane < point_lanes; ++lane)
+      root[lane] = std::sqrt(table.weights[group].value[lane]);
+    const std::span<const int> here = table.nodes_of(group);
+    const LaneValues* g = table.gradients_of(group);
+    for (std::size_t k = 0; k < here.size(); ++k)
+      for (int c = 0; c < 3; ++c) {
+        double* const to = &weighed(static_cast<Eigen::Index>(point_lanes) * (group - first), 3 * place[here[k]] + c);
+        for (int lane = 0; lane < point_lanes; ++lane)
+          to[lane] = root[lane] * g[3 * k + c].value[lane];
       }
+  }
+  local.matrix = gram(weighed);
+  for (const int node : nodes)
+    place[node] = -1;
+}
+
+// K_ij = sum over c, d of D_acbd M_cd,ij with M_ij = sum over all points of w g_i g_j^T.
+void FiniteTangent::add_uniform(const UniformTangent& uniform, std::vector<VectorX>& swelling,
+                                SparseMatrix& lower) const {
+  const PointTable& table = body_.points();
+  for (int group = 0; group < std::ssize(swelling); ++group) {
+    LaneValues cofactor[9];
+    for (int c = 0; c < 9; ++c)
+      for (int lane = 0; lane < point_lanes; ++lane)
+        cofactor[c].value[lane] = table.weights[group].value[lane] * uniform.cofactor.data()[c];
+    swelling[group] = swelling_of(group, cofactor);
+  }
+  std::vector<int> cells; // their first groups
+  for (int group = 0; group < table.groups(); group = end_of_cell(table, group))
+    cells.push_back(group);
+  MatrixX moments = MatrixX::Zero(9, std::ssize(rows_));
+  std::vector<Local> locals(groups_at_once);
+  for (int first = 0; first < std::ssize(cells); first += groups_at_once) {
+    const int here = std::min(groups_at_once, static_cast<int>(std::ssize(cells)) - first);
+    parallel_ranges(here, 4, [&](int begin, int end) {
+      std::vector<int> place(body_.functions(), -1);
+      for (int k = begin; k < end; ++k)
+        cell_moments(cells[first + k], end_of_cell(table, cells[first + k]), place, locals[k]);
+    });
+    for (int k = 0; k < here; ++k)
+      for_each_pair(locals[k].ranks, [&](int i, int j, int entry) {
+        Eigen::Map<Matrix3>(moments.col(entry).data()) += locals[k].matrix.block<3, 3>(3 * i, 3 * j);
+      });
+  }
+  MatrixX stiffness = MatrixX::Zero(9, moments.cols());
+  add_product(1, uniform.stiffness, false, moments, stiffness);
+  double* const values = lower.valuePtr();
+  for (int column = 0; column < body_.functions(); ++column)
+    for (int b = 0; b < 3; ++b) {
+      double* to = values + lower.outerIndexPtr()[3 * column + b];
+      for (int entry = column_start_[column]; entry < column_start_[column + 1]; ++entry)
+        for (int a = 0; a < 3; ++a)
+          *to++ += stiffness(a + 3 * b, entry);
     }
 }
 

@@ -30,17 +30,20 @@ class FiniteTangent {
   void add_support(SparseMatrix& lower) const;
   /// d(sum of w J)/du of a group, in its order of nodes, m2.
   [[nodiscard]] VectorX swelling_of(int group, const LaneValues* cofactor) const;
+  /// w dP/dF at the points of a group, [row + 9 column], and w times the cofactors.
+  static void point_tangents(const FiniteBody& body, int group, const LaneValues* deformation, double block_jacobian,
+                             LaneValues* tangent, LaneValues* cofactor);
+  friend std::optional<UniformTangent> uniform_tangent_of(const FiniteBody& body,
+                                                          const std::vector<LaneValues>& deformation,
+                                                          const std::vector<double>& jacobian);
   void group_matrix(int group, const LaneValues* tangent, Local& local) const;
-  /// Tangent and cofactors of a point of unit weight, where all points are alike: a body strained alike everywhere, as
-  /// at rest, whose law is the same everywhere.
-  struct Uniform {
-    LaneValues tangent[81], cofactor[9]; // in the first lane
-  };
-  [[nodiscard]] std::unique_ptr<const Uniform> uniform_of(const std::vector<LaneValues>& deformation,
-                                                          const std::vector<double>& jacobian) const;
-  void group_matrix(int group, const Uniform& uniform, Local& local) const;
-  void point_tangents(int group, const LaneValues* deformation, double block_jacobian, LaneValues* tangent,
-                      LaneValues* cofactor) const;
+  void add_uniform(const UniformTangent& uniform, std::vector<VectorX>& swelling, SparseMatrix& lower) const;
+  /// Sum of w g_i g_j^T over the points of groups, 3 x 3 a pair; `place`: -1 a function, here and afterwards.
+  void cell_moments(int first, int end, std::vector<int>& place, Local& local) const;
+  /// Whether the points of a cell may be summed together.
+  [[nodiscard]] bool sums_by_cell() const;
+  template <class Visit>
+  void for_each_pair(const std::vector<int>& ranks, Visit&& visit) const;
   /// Adds a 3 x 3 block per pair of the nodes, whose ranks ascend; `matrix` has 3 rows and columns a node, in that
   /// order.
   void scatter(const std::vector<int>& ranks, const MatrixX& matrix, SparseMatrix& lower) const;
@@ -50,5 +53,9 @@ class FiniteTangent {
   std::vector<std::vector<int>> block_groups_; // of every block
   std::vector<int> column_start_, rows_;       // pattern by ranks of nodes: lower, the diagonal first
 };
+
+/// As FiniteBody::uniform_tangent(), with F of all groups and the mean J of all blocks.
+std::optional<UniformTangent> uniform_tangent_of(const FiniteBody& body, const std::vector<LaneValues>& deformation,
+                                                 const std::vector<double>& jacobian);
 
 } // namespace spherecut::solvers

@@ -13,9 +13,29 @@ constexpr int most_rounds = 4;
 constexpr double more = 100; // times the weight of a point with too low a J counts in the next round: some, beside a
                              // front, weigh next to nothing
 
+/// The given deformation gradients at the points of a table, each evaluated when it is first asked for.
+class GivenGradients {
+ public:
+  GivenGradients(const PointTable& table, const std::function<Matrix3(const Vector3&)>& given)
+      : table_(table), given_(given), known_(table.positions.size(), 0), values_(table.positions.size()) {}
+  const Matrix3& at(std::size_t point) {
+    if (known_[point] == 0) {
+      values_[point] = given_(table_.positions[point]);
+      known_[point] = 1;
+    }
+    return values_[point];
+  }
+
+ private:
+  const PointTable& table_;
+  const std::function<Matrix3(const Vector3&)>& given_;
+  std::vector<char> known_;
+  std::vector<Matrix3> values_;
+};
+
 /// One least-squares fit; `emphasis`: of every point, times its weight.
 VectorX fitted(const FiniteBody& body, VectorX coefficients, const std::vector<char>& free,
-               const std::vector<double>& emphasis, const std::function<Matrix3(const Vector3&)>& given) {
+               const std::vector<double>& emphasis, GivenGradients& given) {
   std::vector<int> place(free.size(), -1); // of a free node among them
   int count = 0;
   for (std::size_t i = 0; i < free.size(); ++i)
@@ -41,7 +61,7 @@ VectorX fitted(const FiniteBody& body, VectorX coefficients, const std::vector<c
     for (int lane = 0; lane < table.count[group]; ++lane) {
       const std::size_t point = static_cast<std::size_t>(point_lanes) * group + lane;
       const double weight = emphasis[point] * table.weights[group].value[lane];
-      Matrix3 left = given(table.positions[point]);
+      Matrix3 left = given.at(point);
       for (int k = 0; k < 9; ++k)
         left.data()[k] -= f[k].value[lane];
       for (const int k : slots) {
@@ -92,10 +112,11 @@ bool stress_inverted(const FiniteBody& body, const VectorX& coefficients, double
 VectorX nearest_state(const FiniteBody& body, VectorX coefficients, std::vector<char> free,
                       const std::function<Matrix3(const Vector3&)>& given, double least_jacobian) {
   std::vector<double> emphasis(body.points().positions.size(), 1);
-  coefficients = fitted(body, std::move(coefficients), free, emphasis, given);
+  GivenGradients gradients(body.points(), given);
+  coefficients = fitted(body, std::move(coefficients), free, emphasis, gradients);
   for (int round = 0; round < most_rounds && stress_inverted(body, coefficients, least_jacobian, free, emphasis);
        ++round)
-    coefficients = fitted(body, std::move(coefficients), free, emphasis, given);
+    coefficients = fitted(body, std::move(coefficients), free, emphasis, gradients);
   return coefficients;
 }
 

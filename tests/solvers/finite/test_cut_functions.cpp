@@ -3,6 +3,7 @@
 #include "experiments/support/finite_block.hpp"
 #include "solvers/finite/cut_functions.hpp"
 #include "solvers/finite/equilibrium.hpp"
+#include "solvers/finite/rest_operator.hpp"
 #include "solvers/finite/transfer.hpp"
 #include "topology/incision/cut_sheets.hpp"
 
@@ -27,12 +28,12 @@ topology::SurfaceMesh level_cut(double end, double above, double tilt = 0) {
 }
 
 /// A cube of 1 m about the origin, its top and bottom held.
-Problem cube_with(std::vector<topology::SurfaceMesh> cuts, std::uint64_t seed = 1) {
-  FiniteBlock block{.lower = Vector3::Constant(-0.5), .upper = Vector3::Constant(0.5), .seed = seed};
+Problem cube_with(std::vector<topology::SurfaceMesh> cuts, double node_spacing = 0.17) {
+  FiniteBlock block{.lower = Vector3::Constant(-0.5), .upper = Vector3::Constant(0.5), .seed = 1};
   for (const int face : {4, 5})
     block.held[face].fill(true);
   SpacingField spacing;
-  spacing.fine = spacing.coarse = 0.17;
+  spacing.fine = spacing.coarse = node_spacing;
   block.graded = spacing;
   block.lips_apart = true;
   block.cuts = std::move(cuts);
@@ -280,4 +281,62 @@ TEST_CASE("A share of the held surface that a cut parts is held on both sides") 
   CHECK(sum.z() == Approx(200 * 0.013 * 2).epsilon(0.05));
   CHECK(down < -80);
   CHECK(up > 80);
+}
+
+TEST_CASE("The bordered factor of the uncut body is the tangent at rest of the cut one") {
+  const topology::SurfaceMesh across =
+      topology::make_rectangle_sheet({-0.2, 0.011, 0.2}, Vector3::UnitY(), Vector3::UnitZ(), 0.4, 0.4, 0.08);
+  // A body in tension, its side x = 0.5 held, which the last of the cuts parts; the cuts follow one another as one that
+  // grows, but for that across.
+  const auto problem_with = [&](std::vector<topology::SurfaceMesh> cuts) {
+    Problem problem = cube_with(std::move(cuts), 0.13);
+    problem.prescribed.clear();
+    for (int i = 0; i < problem.nodes.size(); ++i)
+      if (problem.nodes.kinds[i] != NodeKind::lip && problem.nodes.positions[i].x() > 0.4999)
+        problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+    problem.prescribed_region = [](const Vector3&, const Vector3& normal) { return normal.x() > 0.9; };
+    problem.loads.initial_strain(2, 2) = -0.1;
+    return problem;
+  };
+  const std::vector<std::vector<topology::SurfaceMesh>> scenes = {
+      {level_cut(-0.1, 0.013)}, {level_cut(0.0, 0.013)}, {level_cut(-0.1, 0.013), across}, {level_cut(0.7, 0.013)}};
+  for (const double poisson_ratio : {0.3, 0.49}) {
+    const std::shared_ptr<const Law> law = experiments::neo_hookean(1000, poisson_ratio);
+    const FiniteOptions options{.sight = SightRule::appended};
+    Problem uncut_problem = problem_with({level_cut(-0.1, 0.013)});
+    uncut_problem.incision = nullptr;
+    const FiniteBody uncut(uncut_problem, law, options);
+    REQUIRE(uncut.cut_functions()->appended() == 0);
+    REQUIRE(!RestOperator(uncut).is_bordered());
+    for (std::size_t scene = 0; scene < scenes.size(); ++scene) {
+      Problem problem = problem_with(scenes[scene]);
+      problem.domain = uncut.problem().domain;
+      const FiniteBody body(problem, law, options, nullptr, uncut.cut_functions()->uncut());
+      REQUIRE(body.cut_functions()->uncut() == uncut.cut_functions()->uncut());
+      const RestOperator bordered(body);
+      REQUIRE(bordered.is_bordered());
+      SparseMatrix lower;
+      body.tangent(body.stress_free(), RestOperator::penalty, lower);
+      std::srand(static_cast<unsigned>(scene) + 1);
+      const VectorX wanted = VectorX::Random(lower.rows());
+      const auto reordered = [&](const VectorX& v, bool back) {
+        VectorX result(v.size());
+        for (Eigen::Index f = 0; f < body.functions(); ++f) {
+          const Eigen::Index at = 3 * static_cast<Eigen::Index>(body.rank()[f]);
+          if (back)
+            result.segment<3>(3 * f) = v.segment<3>(at);
+          else
+            result.segment<3>(at) = v.segment<3>(3 * f);
+        }
+        return result;
+      };
+      const VectorX forces = reordered(lower.selfadjointView<Eigen::Lower>() * reordered(wanted, false), true);
+      VectorX found;
+      bordered.solve(forces, found);
+      const VectorX off = found - wanted,
+                    left = reordered(lower.selfadjointView<Eigen::Lower>() * reordered(off, false), true);
+      INFO("nu " << poisson_ratio << ", scene " << scene);
+      CHECK(off.dot(left) < 1e-10 * wanted.dot(forces)); // energy of the error
+    }
+  }
 }
