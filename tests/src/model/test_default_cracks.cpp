@@ -93,3 +93,14 @@ TEST_CASE("Two precuts nearer than two node distances are told, with distance, p
   for (const std::string& warning : crossed.warnings())
     CHECK(warning.find("precut[2]") == std::string::npos);
 }
+
+TEST_CASE("The rotation about a front is told alike by both rules, wherever nodes happen to be") {
+  std::vector<double> told;
+  for (const std::string sight : {"enriched", "appended"}) {
+    Session session =
+        session_of(block_on_base + node_spacings("0.004", "0.008") + "[cut]\nsight = \"" + sight + "\"\n" +
+                   rectangle_precut("[0, 0, 0.03]", "[1, 0, 0]", "[0, 0, 1]", "0.04", "0.03") + "pressure = 500\n");
+    told.push_back(run(session).back().rotation_degrees);
+  }
+  CHECK(told[1] == Approx(told[0]).epsilon(0.25));
+}
