@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/model/organ.hpp"
+#include "topology/incision/incision.hpp"
 #include "topology/tool/contact.hpp"
 
 namespace spherecut::app {
@@ -22,6 +23,11 @@ FineZone fine_zone(const Scenario& scenario, const topology::Domain& domain);
 /// What the spacing at the front of a precut costs, where it is above a fifth of how deep the precut reaches behind its
 /// front; nothing where all fronts are finer.
 std::optional<std::string> coarse_front(const Scenario& scenario, const topology::Domain& domain, const FineZone& zone);
+
+/// What it costs where two precuts that do not meet are nearer to each other than two node distances there, one entry a
+/// pair; `incision`: theirs, in their order. Of cuts whose spheres bend around fronts (cut.sight = "enriched").
+std::vector<std::string> close_precuts(const Scenario& scenario, const topology::Incision& incision,
+                                       const FineZone& zone);
 
 /// Edge of the triangles of built-in sheets and of the blade's sweep, m.
 double sheet_edge(const FineZone& zone);

@@ -79,7 +79,7 @@ int end_on_surface(topology::SurfaceMesh& sheet, const topology::Domain& domain,
       if (neighbours[t][e] < 0)
         is_border[sheet.triangles[t][e]] = is_border[sheet.triangles[t][(e + 1) % 3]] = 1;
   const double on_surface = 1e-9 * domain.bounds().extent().norm();
-  int moved = 0;
+  std::vector<char> is_moved(sheet.vertices.size(), 0);
   for (std::size_t v = 0; v < sheet.vertices.size(); ++v) {
     if (is_border[v] == 0)
       continue;
@@ -91,9 +91,15 @@ int end_on_surface(topology::SurfaceMesh& sheet, const topology::Domain& domain,
     if (along.norm() < slanted)
       continue;
     sheet.vertices[v] += (within - distance) / along.squaredNorm() * along;
-    ++moved;
+    is_moved[v] = 1;
   }
-  return moved;
+  std::vector<char> is_end(sheet.vertices.size(), 0);
+  for (std::size_t t = 0; t < sheet.triangles.size(); ++t)
+    for (int e = 0; e < 3; ++e)
+      if (const int from = sheet.triangles[t][e], to = sheet.triangles[t][(e + 1) % 3];
+          neighbours[t][e] < 0 && is_moved[from] != 0 && is_moved[to] != 0)
+        is_end[from] = is_end[to] = 1;
+  return static_cast<int>(std::count(is_end.begin(), is_end.end(), 1));
 }
 
 } // namespace spherecut::app

@@ -16,7 +16,8 @@ topology::SurfaceMesh precut_sheet(const PrecutSettings& precut, const topology:
 
 /// Moves the border of a sheet, where it lies inside the body but nearer than `within` m to its surface, along the
 /// sheet as far out of it: such a strip of whole tissue is no part of anybody's intent, and no node would see it.
-/// Returns the number of vertices that were moved.
+/// Returns the number of vertices at which the sheet ended there; a border that only passes through the surface has
+/// none.
 int end_on_surface(topology::SurfaceMesh& sheet, const topology::Domain& domain, double within);
 
 } // namespace spherecut::app

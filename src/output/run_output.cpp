@@ -128,6 +128,15 @@ RunOutput::RunOutput(std::filesystem::path folder, const Session& session) : fol
     open(tears_, "tears.csv", header_line(tear_columns()));
 }
 
+void RunOutput::withdraw() {
+  for (std::optional<OutputFile>* file : {&forces_, &cuts_, &tears_})
+    file->reset();
+  std::error_code ignored;
+  for (const std::string& name : files_)
+    std::filesystem::remove(folder_ / name, ignored);
+  files_.clear();
+}
+
 void RunOutput::add_row(OutputFile& file, const std::string& name, const std::string& row) {
   file.write(row);
   ++rows_[name];

@@ -70,6 +70,9 @@ class RunOutput {
   /// claim_results_folder(). Throws OutputError when a file cannot be written; so do the others.
   RunOutput(std::filesystem::path folder, const Session& session);
 
+  /// Removes the files of a run that has done no step. Nothing is to be added afterwards.
+  void withdraw();
+
   /// Adds the row, and the frame when one is due, of the step that the session has just done.
   void add(const Session& session, const StepResult& step);
 

@@ -7,6 +7,7 @@
 #include "src/blade/account.hpp"
 #include "src/model/finite_model.hpp"
 #include "src/output/run_output.hpp"
+#include "src/run/estimate.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "src/scenario/region_reader.hpp"
 #include "topology/base/errors.hpp"
@@ -46,10 +47,8 @@ std::string findings_text(const Session& session, const RunOutput& output, const
       text += fmt::format("  largest torque about its point {:.4g} mN m at t = {:.3g} s\n", 1e3 * turning.torque.norm(),
                           turning.time);
     text += session.model().body == nullptr
-                ? fmt::format("  {} nodes, law {}, {} iterations a step, least volume ratio {:.3g}, largest residual "
-                              "{:.1e}\n",
-                              peak.nodes, name_of(session.scenario().law), median(found.iterations),
-                              found.least_jacobian, found.largest_residual)
+                ? fmt::format("  {} nodes, law {}, {} iterations a step, largest residual {:.1e}\n", peak.nodes,
+                              name_of(session.scenario().law), median(found.iterations), found.largest_residual)
                 : fmt::format("  {} nodes, {}, condition estimate {:.1e}, largest residual {:.1e}\n", peak.nodes,
                               solvers::to_string(session.scenario().method.method),
                               session.model().body->report().condition_estimate, found.largest_residual);
@@ -91,6 +90,9 @@ std::string findings_text(const Session& session, const RunOutput& output, const
     if (found.refused_cuts > 0)
       text += fmt::format("  {} increments refused, see cuts.csv\n", found.refused_cuts);
   }
+  if (is_nonlinear(session.scenario().law))
+    text += fmt::format("  least volume ratio {:.3g} (1 at rest; sound from {:g} on)\n", found.least_jacobian,
+                        least_sound_jacobian);
   if (session.scenario().tearing.enabled) {
     const EnergyLedger& ledger = found.tear.ledger;
     text += fmt::format("torn {:.4g} cm2 in {} increments{}{}; work {:.3g} mJ: elastic {:.3g}, new surface {:.3g}, "
@@ -104,31 +106,6 @@ std::string findings_text(const Session& session, const RunOutput& output, const
   text += fmt::format("results in {}:", out.string());
   for (const std::string& file : output.files())
     text += " " + file;
-  return text;
-}
-
-/// What a run will take, from what one body takes: measured on blocks of 746, 2597 and 6119 nodes under a ball (99, 317
-/// and 1035 MB; 0.2, 1.8 and 8.9 s on one core; collocation at 2597 nodes 358 MB and 2.6 s).
-std::string estimate_text(const Session& session) {
-  constexpr double reference = 2597, memory = 277e6, program = 40e6, seconds = 1.8;
-  constexpr double memory_growth = 1.5, time_growth = 1.9; // powers of the number of nodes
-  constexpr double many_nodes = 10000, long_time = 600;    // s
-  const int nodes = session.model().sprinkling.nodes.size();
-  const bool is_balance = session.scenario().method.method == solvers::Method::collocation;
-  const double bytes =
-      program + (is_balance ? 1.15 : 1.0) * memory * std::pow(static_cast<double>(nodes) / reference, memory_growth);
-  const double one = (is_balance ? 1.5 : 1.0) * seconds * std::pow(static_cast<double>(nodes) / reference, time_growth);
-  const auto cuts = std::count_if(session.steps().begin(), session.steps().end(),
-                                  [](const StepSample& step) { return step.blade.has_value(); });
-  const double all = one * static_cast<double>(1 + cuts);
-  std::string text = fmt::format("estimate: {:.2g} GB; {:.2g} s of one core to make the body", bytes / 1e9, one);
-  if (cuts > 0)
-    text += fmt::format(", up to {:.2g} s for the {} steps of the blade", all, cuts);
-  if (nodes > many_nodes || all > long_time)
-    text +=
-        fmt::format("\nthis is heavy: {} nodes; a larger nodes.fine_spacing or nodes.coarse_spacing, or nodes.count, "
-                    "make it lighter",
-                    nodes);
   return text;
 }
 
@@ -159,6 +136,7 @@ class FolderClaim {
   FolderClaim(const FolderClaim&) = delete;
   FolderClaim& operator=(const FolderClaim&) = delete;
   void begin() { begun_ = true; }
+  void give_up() { begun_ = false; }
 
  private:
   std::filesystem::path folder_;
@@ -226,12 +204,18 @@ RunEnd run_scenario(const std::filesystem::path& file, const std::filesystem::pa
     output.draw_figures(session);
     output.write_summary(session, end == RunEnd::complete ? RunStatus::complete : RunStatus::interrupted, "");
   } catch (const std::exception& error) {
+    const bool is_output = dynamic_cast<const OutputError*>(&error) != nullptr;
+    if (output.findings().steps == 0 && !is_output && dynamic_cast<const InputError*>(&error) != nullptr) {
+      output.withdraw(); // what is refused before its first step is done leaves nothing
+      claim.give_up();
+      throw;
+    }
     try {
       output.write_summary(session, RunStatus::failed, error.what());
     } catch (const OutputError&) { // the first error says why nothing can be written
       say("summary.json could not be written either");
     }
-    if (dynamic_cast<const OutputError*>(&error) != nullptr)
+    if (is_output)
       throw OutputError(fmt::format("{}\nthe run has ended there; kept in {}: {}. Make room, or write less "
                                     "(output.vtp_every, output.figures), and run again into another folder",
                                     error.what(), out.string(), output.kept()));
@@ -256,17 +240,11 @@ void check_scenario(const std::filesystem::path& file, const std::filesystem::pa
   say(law_text(session.scenario().law));
   if (!session.scenario().regions.empty())
     say(regions_text(session.scenario().regions));
-  if (!can_run(session.scenario()))
-    try {
-      require_run(session.scenario());
-    } catch (const InputError& error) {
-      say(fmt::format("a run of it is refused: {}", error.what()));
-    }
+  require_run(session.scenario()); // after what is known of it all the same
   if (session.computes()) {
     say(fmt::format("nodes: {}; spacing {:.3g} to {:.3g} mm", session.model().sprinkling.nodes.size(),
                     1e3 * session.zone().spacing.fine, 1e3 * session.zone().spacing.coarse));
-    if (!is_nonlinear(session.scenario().law)) // measured on linear bodies
-      say(estimate_text(session));
+    say(estimate_text(session));
   }
   say(fmt::format("{}: good, {} step{}", file.string(), session.steps().size(),
                   session.steps().size() == 1 ? "" : "s"));

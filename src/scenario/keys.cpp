@@ -420,7 +420,7 @@ constexpr std::array keys = {
         "",
         "\"hold\"",
         "A severed piece that no fixed region holds: the cut is refused, soft springs hold the piece, or it leaves the "
-        "computation.",
+        "computation. With a law other than linear it is refused whatever stands here: a fixed region must hold it.",
         {},
         "refuse, hold, drop"},
     ScenarioKey{

@@ -373,6 +373,12 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
   for (const Section& section : root.tables("precut"))
     scenario.precuts.push_back(precut(section, file, scenario.precuts.size() + 1, offences));
   scenario.cut = cut(root.table("cut"));
+  if (scenario.cut.sight == solvers::SightRule::appended && scenario.method.method != solvers::Method::galerkin)
+    offences.add(
+        root.table("cut").line("sight"),
+        fmt::format("cut.sight = \"appended\" with method.name = \"{}\"; allowed: with galerkin, or visibility, "
+                    "diffraction, enriched",
+                    solvers::to_string(scenario.method.method)));
   if (root.has("blade"))
     scenario.blade = blade(root.table("blade"), offences);
   if (scenario.blade)

@@ -8,6 +8,16 @@
 #include <fmt/format.h>
 
 namespace spherecut::app {
+namespace {
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string all;
+  for (const std::string& word : words)
+    all += (all.empty() ? "" : ", ") + word;
+  return all;
+}
+
+} // namespace
 
 bool FiniteStepper::solve(const StepSample& sample, bool is_solved, bool is_met) {
   const bool touches = state_.touch && state_.contact && state_.contact->depth > 0;
@@ -20,26 +30,55 @@ bool FiniteStepper::solve(const StepSample& sample, bool is_solved, bool is_met)
   if (is_solved)
     return true;
   interruption_point();
-  try {
-    if (state_.model.finite == nullptr) {
-      make_finite(state_, state_.model);
-      if (state_.touch && free_pose_ &&
-          !has_loads(state_.scenario)) // from there a step goes, should it have to be halved
-        solve_finite(free_time_, free_pose_, state_.model, state_.profile);
-    }
-    contact_.solve(sample, state_.model);
-  } catch (const NumericalError& error) {
-    throw NumericalError(told(sample, error));
+  if (state_.model.finite == nullptr) {
+    make_finite(state_, state_.model);
+    if (state_.touch && free_pose_ &&
+        !has_loads(state_.scenario)) // from there a step goes, should it have to be halved
+      solve_finite(free_time_, free_pose_, state_.model, state_.profile);
   }
+  contact_.solve(sample, state_.model);
   return true;
 }
 
-std::string FiniteStepper::told(const StepSample& sample, const NumericalError& error) const {
-  const bool is_led = state_.leader == Leader::path;
-  return fmt::format("t = {:g} s: {}. {}What a law cannot bear does that, or steps too long for it{}, or nodes too "
-                     "coarse for the tool (nodes.fine_spacing)",
-                     sample.time, error.what(), is_led ? "The rows up to then are kept. " : "",
-                     is_led ? " (tool.step)" : "");
+// Loads act whole from the first solution on. Later ones are driven by what moves alone.
+std::string without_equilibrium(const SessionState& state, double time, bool is_cutting, const NumericalError& error) {
+  const Scenario& scenario = state.scenario;
+  const bool is_led = state.leader == Leader::path;
+  const bool is_first = state.model.finite == nullptr || !state.model.finite->solved();
+  const bool is_pressed = has_grasper(scenario) || (state.touch && state.contact && state.contact->depth > 0);
+  std::vector<std::string> loads, movers, steps, spacings;
+  for (std::size_t k = 0; is_first && k < scenario.precuts.size(); ++k)
+    if (const double pressure = scenario.precuts[k].pressure; pressure != 0)
+      loads.push_back(fmt::format("precut[{}].pressure = {:g} Pa", k + 1, pressure));
+  if (is_first && scenario.gravity)
+    loads.emplace_back("gravity.acceleration");
+  if (is_first && !scenario.pretension.isZero(0))
+    loads.emplace_back("material.pretension");
+  if (scenario.tool && is_pressed) {
+    movers.emplace_back("the tool");
+    steps.emplace_back("tool.step");
+    spacings.emplace_back("nodes.fine_spacing");
+  }
+  if (is_cutting) {
+    movers.emplace_back("the blade");
+    steps.emplace_back("blade.step");
+  }
+  if (has_cuts(scenario))
+    spacings.emplace_back("cut.front_spacing");
+  if (spacings.empty())
+    spacings.emplace_back("nodes.coarse_spacing");
+  std::vector<std::string> all = loads;
+  all.insert(all.end(), movers.begin(), movers.end());
+  std::string help;
+  if (!loads.empty())
+    help += fmt::format("{} whole at once: less of {}, or a stiffer material, may have an equilibrium. ",
+                        loads.size() == 1 ? "A load acts" : "Loads act", loads.size() == 1 ? "it" : "them");
+  if (!movers.empty())
+    help += fmt::format("{} too long for the law do that{}. ", loads.empty() ? "Steps" : "Steps of what moves",
+                        is_led ? fmt::format(" ({})", joined(steps)) : std::string());
+  return fmt::format("t = {:g} s: {}. {}{}Nodes too coarse do that, too ({})", time, error.what(),
+                     all.empty() ? std::string() : fmt::format("The body is driven by {}. ", joined(all)), help,
+                     joined(spacings));
 }
 
 std::vector<Vector3> places_of_contact(const SessionState& state) {

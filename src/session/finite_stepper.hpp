@@ -12,11 +12,8 @@ class FiniteStepper {
   FiniteStepper(SessionState& state, ContactSolver& contact) : state_(state), contact_(contact) {}
 
   /// Goes on to the step, with the cut that it has made; `is_solved`: the body with that is solved already; `is_met`: a
-  /// blade that tissue resists has come into it. False: nothing acts on the tissue yet. Throws NumericalError, which
-  /// says what may help.
+  /// blade that tissue resists has come into it. False: nothing acts on the tissue yet. Throws NumericalError.
   bool solve(const StepSample& sample, bool is_solved, bool is_met);
-  /// What a step without equilibrium says: when, why, and what may help.
-  [[nodiscard]] std::string told(const StepSample& sample, const NumericalError& error) const;
 
  private:
   SessionState& state_;
@@ -24,6 +21,10 @@ class FiniteStepper {
   std::optional<topology::ToolPose> free_pose_; // of the tool before it touched
   double free_time_ = 0;                        // s, then
 };
+
+/// What a solution says that is not found, at `time`, s: why, what drives the body there, and what may help.
+/// `is_cutting`: a blade is there.
+std::string without_equilibrium(const SessionState& state, double time, bool is_cutting, const NumericalError& error);
 
 /// Where the tool touches on its way, as far apart as the contact may leave the centre of a fine zone.
 std::vector<Vector3> places_of_contact(const SessionState& state);

@@ -89,7 +89,12 @@ void Session::Parts::step(const StepSample& sample, std::vector<topology::BladeP
     state.contact = result.contact;
   }
   if (is_nonlinear(state.scenario.law))
-    step_finite(sample, std::move(passed), result);
+    try {
+      step_finite(sample, std::move(passed), result);
+    } catch (const NumericalError& error) {
+      const std::string told = without_equilibrium(state, sample.time, sample.blade.has_value(), error);
+      throw NumericalError(state.leader == Leader::path ? told + ". The rows up to then are kept" : told);
+    }
   else
     step_linear(sample, std::move(passed), result);
   if (result.cut) {
@@ -160,17 +165,13 @@ void Session::Parts::step_finite(const StepSample& sample, std::vector<topology:
     const StageTimer timer(result.stages.body);
     follow_tool(sample, result);
   }
-  try {
-    if (resisted && (is_solved || sample.blade)) {
-      const StageTimer timer(result.stages.cut);
-      loading.cut_surface = resisted->press(sample, *result.cut);
-    }
-    if (is_solved && tears) {
-      const StageTimer timer(result.stages.tear);
-      tears->tear(sample, loading, result);
-    }
-  } catch (const NumericalError& error) {
-    throw NumericalError(finite.told(sample, error));
+  if (resisted && (is_solved || sample.blade)) {
+    const StageTimer timer(result.stages.cut);
+    loading.cut_surface = resisted->press(sample, *result.cut);
+  }
+  if (is_solved && tears) {
+    const StageTimer timer(result.stages.tear);
+    tears->tear(sample, loading, result);
   }
   if (is_solved)
     report.tell_finite(resisted.get(), result);

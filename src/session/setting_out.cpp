@@ -4,6 +4,7 @@
 #include "src/scenario/law_reader.hpp"
 #include "src/session/blade_cutting.hpp"
 #include "src/session/finite_stepper.hpp"
+#include "src/session/foresight.hpp"
 #include "src/tissue/cut_checks.hpp"
 #include "src/tissue/finite_body.hpp"
 #include "topology/base/errors.hpp"
@@ -116,6 +117,9 @@ void lay_first_nodes(SessionState& state, const BodyUpdater& updater) {
     state.zone.judge_walls(state.log);
     if (const std::optional<std::string> front = coarse_front(state.scenario, *state.organ.domain, state.zone.zone()))
       state.log.warn("front", *front);
+    if (!state.scenario.precuts.empty())
+      for (const std::string& pair : close_precuts(state.scenario, *state.incisions->incision(), state.zone.zone()))
+        state.log.warn(pair, pair);
     updater.sprinkle(nullptr, state.model);
   } catch (const InputError& error) { // what was odd about the organ may be why
     std::string all =
@@ -124,7 +128,7 @@ void lay_first_nodes(SessionState& state, const BodyUpdater& updater) {
       all += "\n" + remark;
     throw InputError(all);
   }
-  static_cast<void>(fixed_nodes(state.scenario, *state.organ.domain, state.model.sprinkling.nodes));
+  require_first_steps(state);
   if (has_cuts(state.scenario)) // regions that hold nothing have been told by now: no piece is severed by that
     check_held(state.scenario, state.incisions->wound(), state.steps.front().time, state.log);
 }
@@ -138,7 +142,11 @@ bool approach_hanging(SessionState& state, ContactSolver& contact, BodyUpdater& 
     return false;
   if (is_nonlinear(state.scenario.law)) {
     make_finite(state, state.model);
-    solve_finite(state.steps.front().time, std::nullopt, state.model, state.profile);
+    try {
+      solve_finite(state.steps.front().time, std::nullopt, state.model, state.profile);
+    } catch (const NumericalError& error) {
+      throw NumericalError(without_equilibrium(state, state.steps.front().time, false, error));
+    }
   } else {
     updater.assemble(state.model, {}, contact.candidates(state.model));
     app::condense({}, state.model);

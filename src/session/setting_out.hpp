@@ -10,7 +10,7 @@ namespace spherecut::app {
 void set_out(SessionState& state, Leader leader);
 
 /// The fine zone and the first nodes of a session that has something to compute. Throws InputError where pieces, walls
-/// or fixed regions are too small for the nodes.
+/// or fixed regions are too small for the nodes, and as require_first_steps().
 void lay_first_nodes(SessionState& state, const BodyUpdater& updater);
 
 /// The way of an approach counts from its first touch of the body as its loads hold it before the tool comes: builds

@@ -17,6 +17,7 @@ namespace spherecut::app {
 namespace {
 
 constexpr double stretched_rotation = 10;   // degrees, beyond which linear elasticity is being stretched
+constexpr double at_front = 0.45;           // fine spacings: no lip node is so near to a front, half a spacing off
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr double most_between_shares = 0.1; // of the fine spacing: what may lie in the tool between middles of shares
@@ -66,7 +67,8 @@ void StepReport::tell_nodes(StepResult& result) {
     const Matrix3& gradient = state_.node_states.back().gradient;
     const Matrix3 skew = 0.5 * (gradient - gradient.transpose());
     const double angle = Vector3(skew(2, 1), skew(0, 2), skew(1, 0)).norm() * 180 / std::numbers::pi;
-    result.rotation_degrees = std::max(result.rotation_degrees, angle);
+    if (!is_at_front(x))
+      result.rotation_degrees = std::max(result.rotation_degrees, angle);
     if (const double moved = state_.node_states.back().displacement.norm();
         !std::isnan(farthest) && !(moved <= farthest)) {
       farthest = moved;
@@ -86,6 +88,12 @@ void StepReport::tell_nodes(StepResult& result) {
         fmt::format("tissue rotates by {:.0f} degrees at t = {:g} s (over {:g}): linear elasticity is being "
                     "stretched",
                     result.rotation_degrees, result.time, stretched_rotation));
+}
+
+// The rotation there grows without bound towards the front: it would be that of the place where a node happens to be.
+bool StepReport::is_at_front(const Vector3& x) const {
+  return state_.model.incision != nullptr &&
+         state_.model.incision->front_frame(x, at_front * state_.zone.fine()).has_value();
 }
 
 void StepReport::tell_finite(ResistedBlade* blade, StepResult& result) {
@@ -109,10 +117,19 @@ void StepReport::tell_finite(ResistedBlade* blade, StepResult& result) {
   if (!state_.options.force_only)
     for (const Vector3& x : state_.model.sprinkling.nodes.positions) {
       state_.node_states.push_back(state_.model.at(x));
-      result.rotation_degrees = std::max(
-          result.rotation_degrees, solvers::rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
+      if (!is_at_front(x))
+        result.rotation_degrees =
+            std::max(result.rotation_degrees,
+                     solvers::rotation_degrees(Matrix3::Identity() + state_.node_states.back().gradient));
     }
   judge_banks(result);
+  if (result.least_jacobian < least_sound_jacobian)
+    state_.log.warn(
+        "volume", fmt::format("the least volume ratio is {:.2g} at t = {:g} s (sound from {:g} on): tissue is pressed "
+                              "flat between nodes too coarse for its strain, and forces and stresses there are not "
+                              "to be trusted; finer nodes (nodes.fine_spacing, cut.front_spacing), a larger "
+                              "material.poisson_ratio or less load do",
+                              result.least_jacobian, result.time, least_sound_jacobian));
   if (!state_.touch)
     return;
   judge_fineness(result);

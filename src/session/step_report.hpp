@@ -22,6 +22,7 @@ class StepReport {
 
  private:
   void tell_nodes(StepResult& result);
+  [[nodiscard]] bool is_at_front(const Vector3& x) const;
   void judge_contact(const StepResult& result);
   void judge_fineness(const StepResult& result);
   void judge_banks(StepResult& result);

@@ -7,6 +7,10 @@
 
 namespace spherecut::app {
 
+/// Volume ratio of a body at finite strain below which it is warned of: a confined cube (nu = 0.3) has an equilibrium
+/// down to 0.2.
+inline constexpr double least_sound_jacobian = 0.3;
+
 /// Wall clock of the stages of a step, s.
 struct StageSeconds {
   double contact = 0; // where the tool is on the surface at rest

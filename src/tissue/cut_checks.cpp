@@ -133,13 +133,22 @@ void check_held(const Scenario& scenario, const topology::Wound& wound, double t
                                        unheld.size(), wound.pieces.size(), volume, unheld.size() == 1 ? "is" : "are");
   const bool none_with_law = is_nonlinear(scenario.law);
   if (none_with_law || scenario.cut.unheld == solvers::UnheldPieces::refuse)
-    throw InputError(fmt::format("{}{}; {} allows none",
-                                 scenario.blade || scenario.precuts.empty()
-                                     ? std::string() // a motion or a tear is refused, not a line
-                                     : fmt::format("{}:{}: ", scenario.file.string(), scenario.precuts.front().line),
-                                 what,
-                                 none_with_law ? fmt::format("material.law = \"{}\"", name_of(scenario.law))
-                                               : std::string("cut.unheld = \"refuse\"")));
+    throw InputError(
+        fmt::format("{}{}; {}. A region of [[fixed]] that holds {} does, or a cut ({}) that ends before {}",
+                    scenario.blade || scenario.precuts.empty()
+                        ? std::string() // a motion or a tear is refused, not a line
+                        : fmt::format("{}:{}: ", scenario.file.string(), scenario.precuts.front().line),
+                    what,
+                    none_with_law ? fmt::format("material.law = \"{}\" allows none, whatever cut.unheld "
+                                                "says: \"hold\" and \"drop\" go with law linear",
+                                                name_of(scenario.law))
+                                  : std::string("cut.unheld = \"refuse\" allows none, \"hold\" and "
+                                                "\"drop\" do"),
+                    unheld.size() == 1 ? "it" : "them",
+                    scenario.blade             ? "blade.path"
+                    : scenario.precuts.empty() ? "tool.path"
+                                               : "precut",
+                    unheld.size() == 1 ? "it comes off" : "they come off"));
   log.warn(fmt::format("unheld {}", unheld.size()),
            fmt::format("t = {:g} s: {}: {}", time, what,
                        scenario.cut.unheld == solvers::UnheldPieces::hold ? "soft springs hold it"

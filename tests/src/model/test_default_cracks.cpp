@@ -70,3 +70,37 @@ TEST_CASE("The volume of an opening counts that faces part with the root of the 
   const double exact = experiments::penny_opening_volume(session.scenario().material, radius, pressure);
   CHECK(cut.opening_volume == Approx(exact).epsilon(0.02));
 }
+
+TEST_CASE("Two precuts nearer than two node distances are told, with distance, place and the spacing that does") {
+  const auto told = [](const std::string& below, const std::string& more) {
+    std::string found;
+    const std::string text = block_on_base + disc_precut + replaced(disc_precut, "0.016]", below + "]") + more;
+    const Session session = session_of(text);
+    for (const std::string& warning : session.warnings())
+      found += warning.find("precut[1] and precut[2]") != std::string::npos ? warning : "";
+    return found;
+  };
+  const std::string fine = node_spacings("0.002", "0.002");
+  CHECK_THAT(told("0.013", fine), Catch::Contains("are 3 mm apart at [") && Catch::Contains("= 0.001 m put 3 between"));
+  CHECK(told("0.011", fine).empty());
+  CHECK(told("0.013", fine + "[cut]\nsight = \"appended\"\n").empty());
+  CHECK_FALSE(told("0.011", node_spacings("0.002", "0.012")).empty()); // coarser away from the fronts
+  // Sheets that cross are one cut.
+  std::string crossing;
+  for (const char* normal : {"[1, 0, 0]", "[0, 1, 0]"})
+    crossing += rectangle_precut("[0, 0, 0.03]", normal, "[0, 0, 1]", "0.02", "0.03");
+  const Session crossed = session_of(cut_block + crossing);
+  for (const std::string& warning : crossed.warnings())
+    CHECK(warning.find("precut[2]") == std::string::npos);
+}
+
+TEST_CASE("The rotation about a front is told alike by both rules, wherever nodes happen to be") {
+  std::vector<double> told;
+  for (const std::string sight : {"enriched", "appended"}) {
+    Session session =
+        session_of(block_on_base + node_spacings("0.004", "0.008") + "[cut]\nsight = \"" + sight + "\"\n" +
+                   rectangle_precut("[0, 0, 0.03]", "[1, 0, 0]", "[0, 0, 1]", "0.04", "0.03") + "pressure = 500\n");
+    told.push_back(run(session).back().rotation_degrees);
+  }
+  CHECK(told[1] == Approx(told[0]).epsilon(0.25));
+}

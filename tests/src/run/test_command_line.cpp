@@ -397,6 +397,14 @@ TEST_CASE("Scenarios that cannot be run exit with 2, a line that says why, and l
       {"inside the organ", inside, "case.toml:24: tool.path[1].position = [0, 0, 0.02] m: the tool starts inside"},
       {"incompressible", replaced(small_scenario, "poisson_ratio = 0.3", "poisson_ratio = 0.5"), "poisson_ratio"},
       {"without stiffness", replaced(small_scenario, "young_modulus = 1e4", "young_modulus = -1"), "young_modulus"},
+      {"held at a point",
+       replaced(small_scenario, "lower = [-1, -1, -0.001]\nupper = [1, 1, 0.001]",
+                "lower = [0.029, 0.029, -0.001]\nupper = [0.031, 0.031, 0.001]"),
+       "case.toml:9: fixed: 1 node held leaves the organ 3 of 6 rigid motions"},
+      {"pressed where it is held", replaced(small_scenario, "upper = [1, 1, 0.001]", "upper = [1, 1, 1]"),
+       "case.toml:18: no free surface node within"},
+      {"appended by collocation", small_scenario + "[method]\nname = \"collocation\"\n[cut]\nsight = \"appended\"\n",
+       "cut.sight = \"appended\" with method.name = \"collocation\""},
       {"not a scenario", "[organ\n", "case.toml"},
   };
   const TemporaryFolder folder;
@@ -408,7 +416,10 @@ TEST_CASE("Scenarios that cannot be run exit with 2, a line that says why, and l
     CHECK(result.status == 2);
     CHECK_THAT(result.err, StartsWith("spherecut: error: ") && Contains(c.said));
     CHECK_FALSE(std::filesystem::exists(out));
-    CHECK(run_spherecut({"check", scenario}).status == 2);
+    const ProgramResult checked = run_spherecut({"check", scenario});
+    CHECK(checked.status == 2);
+    CHECK(checked.err == result.err);
+    CHECK_THAT(checked.out, !Contains("good"));
   }
 }
 

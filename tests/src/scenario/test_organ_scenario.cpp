@@ -140,6 +140,14 @@ TEST_CASE("A sheet that ends just below the surface is cut through to it, and th
   CHECK_FALSE(said);
 }
 
+TEST_CASE("A sheet whose border passes through the surface does not end below it") {
+  const Session session = session_of(
+      "[organ]\nshape = \"hemisphere\"\nradius = 0.03\n[material]\nyoung_modulus = 1e4\npoisson_ratio = 0.3\n" +
+      held_below("0.0001") + "[cut]\nfront_spacing = 0.004\n" +
+      rectangle_precut("[0, 0, 0.012]", "[1, 0, 0]", "[0, 0, 1]", "0.03", "0.03"));
+  CHECK_FALSE(warns(session, "its sheet ended"));
+}
+
 TEST_CASE("A small piece is judged by the nodes that it gets") {
   // A corner of 9 mm, on nodes 12 mm apart where nothing asks for finer ones.
   const std::string corner = rectangle_precut("[0.0255, 0.0255, 0.0255]", "[1, 1, 1]", "[1, -1, 0]", "0.08", "0.08") +
