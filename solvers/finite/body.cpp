@@ -519,6 +519,11 @@ double FiniteBody::penalty_stiffness(int entry, double penalty) const {
   return penalty * law_->small_strain().shear_modulus * problem_.nodes.spacings[held_->entries()[entry].node];
 }
 
+double FiniteBody::support_of(int function) const {
+  constexpr double little = 1e-7; // of mu times the spacing
+  return little * law_->small_strain().shear_modulus * problem_.nodes.spacings[node_of(function)];
+}
+
 std::vector<Matrix3> FiniteBody::piola_maps(const VectorX& coefficients) const {
   deform(coefficients);
   std::vector<Matrix3> maps(functions_, Matrix3::Zero());

@@ -134,13 +134,17 @@ class FiniteBody {
   /// with the penalty of the held means: `penalty` times mu times the node's spacing, N/m, for every held component.
   /// With a penalty what a cut appends has a little support of its own, so that the whole is definite.
   void tangent(const VectorX& coefficients, double penalty, SparseMatrix& lower) const;
-  [[nodiscard]] const std::vector<int>& rank() const; // place of every function in the order of elimination
+  /// Place of every function in the order of elimination, which is found when it, or a tangent, is first asked for: not
+  /// by two threads at once.
+  [[nodiscard]] const std::vector<int>& rank() const;
   /// The tangent of all points where they are strained alike, as at rest, and the law is the same everywhere; else of
   /// no value.
   [[nodiscard]] std::optional<UniformTangent> uniform_tangent(const VectorX& coefficients) const;
   /// Where cuts append: for every group of points, that of the uncut body's which it is, or is part of.
   [[nodiscard]] const std::vector<int>& uncut_groups() const { return uncut_groups_; }
   [[nodiscard]] double penalty_stiffness(int entry, double penalty) const;
+  /// Stiffness that holds a function where a cut appends, beside the penalty, N/m.
+  [[nodiscard]] double support_of(int function) const;
 
   /// Map of every function that carries the rest state along: mean of F where it counts over its determinant. Identity
   /// where that is below 0.05.

@@ -4,8 +4,8 @@
 #include "solvers/algebra/dense_products.hpp"
 #include "solvers/finite/cut_functions.hpp"
 #include "topology/base/errors.hpp"
+#include "topology/base/interruption.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -16,8 +16,7 @@ namespace spherecut::solvers {
 
 namespace {
 
-constexpr double same_column = 1e-8;         // difference of columns that are the same, over their norm
-constexpr double support_of_appended = 1e-7; // of mu times the spacing, as the tangent's own
+constexpr double same_column = 1e-12; // difference of columns that are the same, over their norm
 
 bool holds_alike(const Prescribed& a, const Prescribed& b) {
   return a.node == b.node && a.components == b.components;
@@ -52,11 +51,13 @@ HalfSolutions half_solutions(const OrderedCholesky& factor, std::vector<int> key
   for (Eigen::Index k = 0; k < count; ++k) {
     if (before != nullptr)
       from[k] = find_same(*before, result.key[k], result.columns, width * k, width);
-    if (from[k] >= 0)
-      result.halves.middleCols(width * k, width) =
-          before->halves.middleCols(width * static_cast<Eigen::Index>(from[k]), width);
-    else
+    if (from[k] < 0) {
       fresh.push_back(k);
+      continue;
+    }
+    const Eigen::Index was = width * static_cast<Eigen::Index>(from[k]);
+    result.columns.middleCols(width * k, width) = before->columns.middleCols(was, width); // so that they do not drift
+    result.halves.middleCols(width * k, width) = before->halves.middleCols(was, width);
   }
   MatrixX right(result.columns.rows(), width * std::ssize(fresh));
   for (Eigen::Index k = 0; k < std::ssize(fresh); ++k)
@@ -71,81 +72,76 @@ HalfSolutions half_solutions(const OrderedCholesky& factor, std::vector<int> key
 } // namespace
 
 UncutTangent::UncutTangent(const FiniteBody& body, const UniformTangent& uniform,
-                           std::shared_ptr<const OrderedCholesky> factor)
-    : uniform_(uniform), factor_(std::move(factor)), rank_(body.rank()), blocks_(body.blocks()),
-      held_(body.held().entries()), means_(body.held().means()) {}
+                           std::shared_ptr<const OrderedCholesky> factor, double norm)
+    : uniform_(uniform), factor_(std::move(factor)), rank_(body.rank()), blocks_(body.blocks()), norm_(norm),
+      shares_(body.held().entries()), means_(body.held().means()) {}
 
 bool UncutTangent::fits(const FiniteBody& body, const UniformTangent& uniform) const {
-  constexpr double alike = 1e-12;
+  constexpr double alike = 1e-9;
   // Entries of the uncut body are those of the problem; a cut may have parted those of the other.
   const std::vector<Prescribed>& held = body.problem().prescribed;
   return body.cut_functions()->uncut()->size() == std::ssize(rank_) &&
-         (uniform.stiffness - uniform_.stiffness).norm() < alike * uniform_.stiffness.norm() &&
-         (uniform.cofactor - uniform_.cofactor).norm() < alike * uniform_.cofactor.norm() &&
+         (uniform.stiffness - uniform_.stiffness).norm() <= alike * uniform_.stiffness.norm() &&
+         (uniform.cofactor - uniform_.cofactor).norm() <= alike * uniform_.cofactor.norm() &&
          std::abs(uniform.bulk_slope - uniform_.bulk_slope) <= alike * uniform_.bulk_slope &&
          (body.blocks().size() > 0) == (blocks_.size() > 0) &&
-         std::equal(held.begin(), held.end(), held_.begin(), held_.end(), holds_alike);
+         std::equal(held.begin(), held.end(), shares_.begin(), shares_.end(), holds_alike);
 }
 
-std::shared_ptr<const KeptBorder> UncutTangent::border() const {
-  const std::lock_guard lock(guard_);
-  return border_;
-}
-
-void UncutTangent::keep(std::shared_ptr<const KeptBorder> border) const {
-  const std::lock_guard lock(guard_);
-  border_ = std::move(border);
-}
-
-/// Terms of rank one: columns, the sign of each, and what it comes from.
+/// Terms of rank one, and what each comes from.
 struct BorderedOperator::Terms {
   Columns columns;
-  std::vector<double> sign;
   std::vector<int> key;
+
+  /// So many more, of that key; returns the first.
+  Eigen::Index add(Eigen::Index count, int of) {
+    const auto first = std::ssize(key);
+    columns.base.conservativeResizeLike(MatrixX::Zero(columns.base.rows(), first + count));
+    columns.cut.conservativeResizeLike(MatrixX::Zero(columns.cut.rows(), first + count));
+    key.resize(key.size() + static_cast<std::size_t>(count), of);
+    return first;
+  }
+  void append(const Terms& others) {
+    const Eigen::Index first = add(std::ssize(others.key), 0);
+    columns.base.rightCols(std::ssize(others.key)) = others.columns.base;
+    columns.cut.rightCols(std::ssize(others.key)) = others.columns.cut;
+    std::copy(others.key.begin(), others.key.end(), key.begin() + first);
+  }
 };
 
 BorderedOperator::BorderedOperator(const FiniteBody& body, std::shared_ptr<const UncutTangent> uncut,
-                                   const UniformTangent& uniform, double penalty)
+                                   const KeptBorder* before, const UniformTangent& uniform, double penalty)
     : body_(body), uncut_(std::move(uncut)), base_(body.cut_functions()->uncut()->size()),
       appended_(body.cut_functions()->appended()) {
   MatrixX coupling = MatrixX::Zero(3 * base_, 3 * appended_), corner = MatrixX::Zero(3 * appended_, 3 * appended_);
   append_elastic(uniform, coupling, corner);
-  Terms terms{columns(0), {}, {}};
+  interruption_point();
+  Terms come{columns(0), {}}, gone = come;
   if (body.blocks().size() > 0)
-    append_blocks(uniform, coupling, corner, terms);
-  append_held(penalty, terms);
+    append_blocks(uniform, coupling, corner, come, gone);
+  append_held(penalty, come, gone);
   for (Eigen::Index k = 0; k < appended_; ++k)
-    corner.diagonal().segment<3>(3 * k).array() +=
-        support_of_appended * body.law().small_strain().shear_modulus *
-        body.problem().nodes.spacings[body.node_of(base_ + static_cast<int>(k))];
-  const std::shared_ptr<const KeptBorder> before = uncut_->border();
+    corner.diagonal().segment<3>(3 * k).array() += body.support_of(base_ + static_cast<int>(k));
   auto now = std::make_shared<KeptBorder>();
-  border(std::move(coupling), corner, before.get(), *now);
-  lower_ = now->schur;
+  find_halves(std::move(coupling), before, *now);
+  interruption_point();
+  lower_ = corner - now->products;
   if (const int column = factor_lower(lower_); column >= 0)
     throw NumericalError(
         fmt::format("what a cut appends is not positive definite (unknown {} of {})", column, 3 * appended_));
-  terms_.cut = std::move(terms.columns.cut);
+  come_ = static_cast<int>(come.key.size());
+  come.append(gone);
   std::vector<int> from;
-  now->terms = half_solutions(uncut_->factor(), std::move(terms.key), std::move(terms.columns.base), 1,
+  now->terms = half_solutions(uncut_->factor(), std::move(come.key), std::move(come.columns.base), 1,
                               before != nullptr ? &before->terms : nullptr, from);
-  terms_.base = now->terms.halves;
-  border_ = now;
-  uncut_->keep(std::move(now));
+  terms_ = {now->terms.halves, std::move(come.columns.cut)};
+  border_ = std::move(now);
   forward_cut(terms_);
-  MatrixX middle = MatrixX::Zero(terms_.base.cols(), terms_.base.cols());
-  add_product(1, terms_.base, true, terms_.base, middle);
-  add_product(1, terms_.cut, true, terms_.cut, middle);
-  for (Eigen::Index t = 0; t < middle.rows(); ++t)
-    middle(t, t) += terms.sign[t];
-  if (middle.size() > 0)
-    middle_back_ = middle.partialPivLu().inverse();
-  if (!middle_back_.allFinite())
-    throw NumericalError("what a cut parts leaves a singular tangent");
+  factor_terms();
 }
 
-void BorderedOperator::border(MatrixX coupling, const MatrixX& corner, const KeptBorder* before,
-                              KeptBorder& now) const {
+/// W and W^T W of functions that stay are what they were.
+void BorderedOperator::find_halves(MatrixX coupling, const KeptBorder* before, KeptBorder& now) {
   std::vector<int> key(static_cast<std::size_t>(appended_)), from;
   for (int k = 0; k < appended_; ++k)
     key[k] = 2 * body_.node_of(base_ + k) + (body_.cut_functions()->twin(k).is_step ? 1 : 0);
@@ -155,21 +151,44 @@ void BorderedOperator::border(MatrixX coupling, const MatrixX& corner, const Kep
   std::vector<Eigen::Index> kept, fresh;
   for (Eigen::Index k = 0; k < appended_; ++k)
     (from[k] >= 0 ? kept : fresh).push_back(k);
+  kept_ = static_cast<int>(kept.size());
   MatrixX newest(half.rows(), 3 * std::ssize(fresh)), products = MatrixX::Zero(3 * appended_, newest.cols());
-  for (Eigen::Index j = 0; j < std::ssize(fresh); ++j) {
+  for (Eigen::Index j = 0; j < std::ssize(fresh); ++j)
     newest.middleCols<3>(3 * j) = half.middleCols<3>(3 * fresh[j]);
-    products.middleCols<3>(3 * j) = corner.middleCols<3>(3 * fresh[j]);
-  }
-  add_product(-1, half, true, newest, products);
-  now.schur.resize(3 * appended_, 3 * appended_);
+  add_product(1, half, true, newest, products);
+  now.products.resize(3 * appended_, 3 * appended_);
   for (Eigen::Index j = 0; j < std::ssize(fresh); ++j) {
-    now.schur.middleCols<3>(3 * fresh[j]) = products.middleCols<3>(3 * j);
-    now.schur.middleRows<3>(3 * fresh[j]) = products.middleCols<3>(3 * j).transpose();
+    now.products.middleCols<3>(3 * fresh[j]) = products.middleCols<3>(3 * j);
+    now.products.middleRows<3>(3 * fresh[j]) = products.middleCols<3>(3 * j).transpose();
   }
   for (const Eigen::Index j : kept)
     for (const Eigen::Index i : kept)
-      now.schur.block<3, 3>(3 * i, 3 * j) =
-          before->schur.block<3, 3>(3 * static_cast<Eigen::Index>(from[i]), 3 * static_cast<Eigen::Index>(from[j]));
+      now.products.block<3, 3>(3 * i, 3 * j) =
+          before->products.block<3, 3>(3 * static_cast<Eigen::Index>(from[i]), 3 * static_cast<Eigen::Index>(from[j]));
+}
+
+// With P of what comes, Q of what goes and B between, P is definite, and so is B^T P^-1 B - Q where the whole is
+// (the inertia of a Schur complement).
+void BorderedOperator::factor_terms() {
+  MatrixX middle = MatrixX::Zero(terms_.base.cols(), terms_.base.cols());
+  add_product(1, terms_.base, true, terms_.base, middle);
+  add_product(1, terms_.cut, true, terms_.cut, middle);
+  middle.diagonal().head(come_).array() += 1;
+  const Eigen::Index gone = middle.rows() - come_;
+  middle.diagonal().tail(gone).array() -= 1;
+  MatrixX first = middle.topLeftCorner(come_, come_), between = middle.topRightCorner(come_, gone);
+  bool is_definite = factor_lower(first) < 0;
+  if (come_ > 0 && gone > 0)
+    triangular_solve(false, first.data(), come_, between);
+  MatrixX last = -middle.bottomRightCorner(gone, gone);
+  add_product(1, between, true, between, last);
+  is_definite = is_definite && factor_lower(last) < 0;
+  if (!is_definite)
+    throw NumericalError("what a cut parts leaves a tangent that is not positive definite");
+  terms_lower_ = MatrixX::Zero(middle.rows(), middle.cols());
+  terms_lower_.topLeftCorner(come_, come_) = first;
+  terms_lower_.bottomLeftCorner(gone, come_) = between.transpose();
+  terms_lower_.bottomRightCorner(gone, gone) = last;
 }
 
 BorderedOperator::Columns BorderedOperator::columns(Eigen::Index count) const {
@@ -192,8 +211,7 @@ void BorderedOperator::append_elastic(const UniformTangent& uniform, MatrixX& co
   std::vector<int> place(static_cast<std::size_t>(body_.functions()), -1); // in a cell
   std::vector<int> nodes, functions;
   for (int first = 0, end = 0; first < table.groups(); first = end) {
-    while (end < table.groups() && table.cell[end] == table.cell[first])
-      ++end;
+    end = table.end_of_cell(first);
     nodes.clear();
     functions.clear();
     const auto take = [&](int function, std::vector<int>& list) {
@@ -269,8 +287,8 @@ void BorderedOperator::append_elastic(const UniformTangent& uniform, MatrixX& co
 }
 
 // What is appended takes part in the blocks of the uncut body; blocks that the cut has changed go, and others come.
-void BorderedOperator::append_blocks(const UniformTangent& uniform, MatrixX& coupling, MatrixX& corner,
-                                     Terms& terms) const {
+void BorderedOperator::append_blocks(const UniformTangent& uniform, MatrixX& coupling, MatrixX& corner, Terms& come,
+                                     Terms& gone) const {
   const PointTable& table = body_.points();
   const DilatationBlocks &whole = uncut_->blocks(), &parted = body_.blocks();
   std::vector<std::set<int>> parts(whole.volume.size()), wholes(parted.volume.size());
@@ -289,13 +307,12 @@ void BorderedOperator::append_blocks(const UniformTangent& uniform, MatrixX& cou
   const auto is_changed = [&](int block) {
     return parts[block].size() > 1 || wholes[*parts[block].begin()].size() > 1;
   };
-  std::vector<int> gone;
-  std::set<int> come;
+  std::set<int> changed;
   for (int block = 0; block < whole.size(); ++block)
-    if (is_changed(block)) {
-      gone.push_back(block);
-      come.insert(parts[block].begin(), parts[block].end());
-    }
+    if (parts[block].empty())
+      throw NumericalError("a block of the uncut body has no points of the cut one");
+    else if (is_changed(block))
+      changed.insert(block);
   const auto add_swelling = [&](const std::vector<int>& of, double factor, Eigen::Index column, Columns& to) {
     for (const int group : of)
       for (int slot = table.start[group]; slot < table.start[group + 1]; ++slot) {
@@ -316,53 +333,40 @@ void BorderedOperator::append_blocks(const UniformTangent& uniform, MatrixX& cou
           corner.col(j) += here * swelling.cut;
         }
     }
-  const auto first = std::ssize(terms.sign);
-  const auto count = first + std::ssize(gone) + std::ssize(come);
-  terms.columns.base.conservativeResizeLike(MatrixX::Zero(3 * base_, count));
-  terms.columns.cut.conservativeResizeLike(MatrixX::Zero(3 * appended_, count));
-  Eigen::Index column = first;
-  for (const int block : gone) {
-    add_swelling(groups[block], root(whole.volume[block]), column++, terms.columns);
-    terms.sign.push_back(-1);
-    terms.key.push_back(block);
+  std::set<int> new_parts;
+  for (const int block : changed) {
+    add_swelling(groups[block], root(whole.volume[block]), gone.add(1, block), gone.columns);
+    new_parts.insert(parts[block].begin(), parts[block].end());
   }
-  for (const int part : come) {
-    add_swelling(groups_of_part[part], root(parted.volume[part]), column++, terms.columns);
-    terms.sign.push_back(1);
-    terms.key.push_back(*wholes[part].begin());
-  }
+  for (const int part : new_parts)
+    add_swelling(groups_of_part[part], root(parted.volume[part]), come.add(1, *wholes[part].begin()), come.columns);
 }
 
 // Where a cut changes the mean of a held share, the penalty of the whole share goes, and that of each part comes.
-void BorderedOperator::append_held(double penalty, Terms& terms) const {
+void BorderedOperator::append_held(double penalty, Terms& come, Terms& gone) const {
   const HeldMeans& held = body_.held();
   const auto share_of = [](const Prescribed& entry) { return std::pair(entry.node, entry.components); };
   std::map<std::pair<int, std::array<bool, 3>>, std::vector<int>> parts_of;
   for (int e = 0; e < std::ssize(held.entries()); ++e)
     parts_of[share_of(held.entries()[e])].push_back(e);
-  for (int share = 0; share < uncut_->held(); ++share) {
-    const DisplacementMean& whole = uncut_->held(share);
-    const std::vector<int>& parts = parts_of.at(share_of(uncut_->entry(share)));
+  for (int share = 0; share < std::ssize(uncut_->shares()); ++share) {
+    const DisplacementMean& whole = uncut_->means()[share];
+    const std::vector<int>& parts = parts_of.at(share_of(uncut_->shares()[share]));
     if (parts.size() == 1 && is_same(held.means()[parts.front()], whole))
       continue;
     const double root = std::sqrt(body_.penalty_stiffness(parts.front(), penalty));
     for (int axis = 0; axis < 3; ++axis) {
-      if (!uncut_->entry(share).components[axis])
+      if (!uncut_->shares()[share].components[axis])
         continue;
-      const auto first = std::ssize(terms.sign), count = first + 1 + std::ssize(parts);
-      terms.columns.base.conservativeResizeLike(MatrixX::Zero(3 * base_, count));
-      terms.columns.cut.conservativeResizeLike(MatrixX::Zero(3 * appended_, count));
+      const Eigen::Index first = gone.add(1, -1 - share);
       for (std::size_t k = 0; k < whole.nodes.size(); ++k) // displacements of whole spheres alone
-        terms.columns.base(3 * uncut_->rank()[whole.nodes[k]] + axis, first) += root * whole.weights[k];
-      terms.sign.push_back(-1);
-      for (std::size_t p = 0; p < parts.size(); ++p) {
-        const DisplacementMean& part = held.means()[parts[p]];
+        gone.columns.base(3 * uncut_->rank()[whole.nodes[k]] + axis, first) += root * whole.weights[k];
+      for (const int e : parts) {
+        const DisplacementMean& part = held.means()[e];
+        const Eigen::Index column = come.add(1, -1 - share);
         for (std::size_t k = 0; k < part.nodes.size(); ++k)
-          add(part.nodes[k], root * part.weights[k] * Vector3::Unit(axis), first + 1 + static_cast<Eigen::Index>(p),
-              terms.columns);
-        terms.sign.push_back(1);
+          add(part.nodes[k], root * part.weights[k] * Vector3::Unit(axis), column, come.columns);
       }
-      terms.key.resize(terms.sign.size(), -1 - share);
     }
   }
 }
@@ -380,11 +384,13 @@ MatrixX BorderedOperator::solve(const MatrixX& right_hand_sides) const {
       add(f, right_hand_sides.col(c).segment<3>(3 * static_cast<Eigen::Index>(f)), c, half);
   half.base = uncut_->factor().forward_sparse(half.base);
   forward_cut(half);
-  if (middle_back_.size() > 0) {
-    MatrixX answer = MatrixX::Zero(middle_back_.rows(), cases);
+  if (const auto count = static_cast<int>(terms_lower_.rows()); count > 0) {
+    MatrixX answer = MatrixX::Zero(count, cases);
     add_product(1, terms_.base, true, half.base, answer);
     add_product(1, terms_.cut, true, half.cut, answer);
-    answer = (middle_back_ * answer).eval();
+    triangular_solve(false, terms_lower_.data(), count, answer);
+    answer.bottomRows(count - come_) *= -1;
+    triangular_solve(true, terms_lower_.data(), count, answer);
     add_product(-1, terms_.base, false, answer, half.base);
     add_product(-1, terms_.cut, false, answer, half.cut);
   }

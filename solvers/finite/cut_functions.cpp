@@ -93,16 +93,6 @@ bool UncutFunctions::fits(const Problem& problem, int base, double support_radiu
   return true;
 }
 
-std::shared_ptr<const UncutTangent> UncutFunctions::tangent() const {
-  const std::lock_guard lock(guard_);
-  return tangent_;
-}
-
-void UncutFunctions::keep(std::shared_ptr<const UncutTangent> tangent) const {
-  const std::lock_guard lock(guard_);
-  tangent_ = std::move(tangent);
-}
-
 CutFunctions::CutFunctions(std::shared_ptr<const UncutFunctions> uncut, const Problem& problem)
     : uncut_(std::move(uncut)),
       space_(uncut_->boxes(), *problem.domain, uncut_->nodes(), uncut_->spheres(), problem.material, steps_alone()),

@@ -15,14 +15,10 @@
 #include "solvers/points/consistent_gradients.hpp"
 
 #include <memory>
-#include <mutex>
 
 namespace spherecut::solvers {
 
-class UncutTangent; // solvers/finite/bordered_operator.hpp
-
-/// The uncut body: its nodes, spheres and small boxes, whose gradients fit the quadrature. Immutable but for
-/// what it keeps for others.
+/// The uncut body: its nodes, spheres and small boxes, whose gradients fit the quadrature. Immutable.
 class UncutFunctions {
  public:
   /// On the first `base` nodes of a problem; the others are lip nodes, places without spheres. Throws NumericalError
@@ -41,10 +37,6 @@ class UncutFunctions {
   [[nodiscard]] const SurfacePatches& patches() const { return patches_; }
   [[nodiscard]] const ConsistencyReport& consistency() const { return consistency_; }
 
-  /// The factored tangent at rest of the body without a cut, which was the last to be kept; null: none was.
-  [[nodiscard]] std::shared_ptr<const UncutTangent> tangent() const;
-  void keep(std::shared_ptr<const UncutTangent> tangent) const;
-
  private:
   std::shared_ptr<const topology::Domain> domain_;
   NodeCloud nodes_;
@@ -54,8 +46,6 @@ class UncutFunctions {
   SmallBoxes boxes_;
   SurfacePatches patches_;
   ConsistencyReport consistency_;
-  mutable std::mutex guard_;
-  mutable std::shared_ptr<const UncutTangent> tangent_;
 };
 
 class CutFunctions {

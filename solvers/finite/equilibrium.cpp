@@ -34,8 +34,8 @@ FiniteMethod finite_method_from_string(std::string_view name) {
   throw InputError(fmt::format("solver '{}'; allowed: quasi_newton, newton", name));
 }
 
-Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& options)
-    : body_(body), options_(options), rest_(body), memory_(options.memory) {
+Equilibrium::Equilibrium(const FiniteBody& body, const EquilibriumOptions& options, const CutLineage& before)
+    : body_(body), options_(options), rest_(body, before), memory_(options.memory) {
   if (!(options.tolerance > 0 && options.tolerance < 1))
     throw InputError(
         fmt::format("tolerance {} of the unbalanced forces; allowed: above 0, below 1", options.tolerance));

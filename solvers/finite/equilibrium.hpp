@@ -69,8 +69,10 @@ struct EquilibriumStatus {
 
 class Equilibrium {
  public:
-  /// The body outlives it, and is used by one of these at a time.
-  explicit Equilibrium(const FiniteBody& body, const EquilibriumOptions& options = {});
+  /// The body outlives it, and is used by one of these at a time. `before`: of a body with a shorter cut, whose cut
+  /// appends.
+  explicit Equilibrium(const FiniteBody& body, const EquilibriumOptions& options = {}, const CutLineage& before = {});
+  [[nodiscard]] const CutLineage& lineage() const { return rest_.lineage(); }
 
   /// The tool that presses, and the nodes that it may touch; as FiniteContact. With friction, or bonded, what happens
   /// depends on the way: a solve then goes there in strides of a tenth, or half, of the tool's tip radius, and where

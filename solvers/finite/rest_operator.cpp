@@ -1,39 +1,64 @@
 #include "solvers/finite/rest_operator.hpp"
 
-#include "solvers/finite/bordered_operator.hpp"
 #include "solvers/finite/cut_functions.hpp"
 #include "topology/base/errors.hpp"
+#include "topology/incision/incision.hpp"
 
 namespace spherecut::solvers {
 
 namespace {
 
-constexpr int uncut_of_appended = 2; // unknowns of the uncut body to one of the cut: with fewer the whole is factored
+// A border takes less than a factor of the whole, and little more memory, as long as it is so small.
+constexpr long uncut_of_appended = 2; // functions of the uncut body to one of the cut, at least
+constexpr long entries_of_factor = 2; // of the half solutions to one of the factor, at most
+
+bool is_uncut(const FiniteBody& body) {
+  const topology::Incision* const incision = body.problem().incision.get();
+  return body.cut_functions()->appended() == 0 && (incision == nullptr || incision->sheets().empty());
+}
 
 } // namespace
 
-RestOperator::RestOperator(const FiniteBody& body) : body_(body), at_(body.stress_free()) {
+RestOperator::RestOperator(const FiniteBody& body, const CutLineage& before) : body_(body), at_(body.stress_free()) {
   const CutFunctions* const cut = body.cut_functions();
-  const std::optional<UniformTangent> uniform = cut != nullptr ? body.uniform_tangent(at_) : std::nullopt;
-  if (uniform && cut->appended() > 0 && uncut_of_appended * cut->appended() < cut->uncut()->size())
-    if (std::shared_ptr<const UncutTangent> uncut = cut->uncut()->tangent();
-        uncut != nullptr && uncut->fits(body, *uniform)) {
-      try {
-        bordered_ = std::make_unique<const BorderedOperator>(body, std::move(uncut), *uniform, penalty);
-        return;
-      } catch (const NumericalError&) { // the whole has the last word
-      }
-    }
+  std::optional<UniformTangent> uniform;
+  if (cut != nullptr) {
+    uniform = body.uniform_tangent(at_);
+    lineage_.uncut = cut->uncut();
+    if (before.uncut == lineage_.uncut)
+      lineage_.tangent = before.tangent;
+  }
+  if (uniform && cut->appended() > 0 && lineage_.tangent != nullptr && lineage_.tangent->fits(body, *uniform) &&
+      border(*uniform, before))
+    return;
   factor();
-  if (uniform && cut->appended() == 0)
-    cut->uncut()->keep(std::make_shared<const UncutTangent>(body, *uniform, factor_));
+  if (uniform && is_uncut(body))
+    lineage_.tangent = std::make_shared<const UncutTangent>(body, *uniform, factor_, one_norm(lower_, true));
+}
+
+/// False: the cut is too large for the body, or rounding has left nothing definite; the whole has the last word.
+bool RestOperator::border(const UniformTangent& uniform, const CutLineage& before) {
+  const long size = lineage_.uncut->size(), appended = body_.cut_functions()->appended();
+  if (uncut_of_appended * appended > size ||
+      9 * size * appended > entries_of_factor * lineage_.tangent->factor().nonzeros())
+    return false;
+  for (const KeptBorder* kept : {before.border.get(), static_cast<const KeptBorder*>(nullptr)})
+    try {
+      bordered_ = std::make_unique<const BorderedOperator>(body_, lineage_.tangent, kept, uniform, penalty);
+      lineage_.border = bordered_->border();
+      return true;
+    } catch (const NumericalError&) {
+      if (kept == nullptr)
+        return false;
+    }
+  return false;
 }
 
 RestOperator::RestOperator(const FiniteBody& body, const VectorX& coefficients, const RestOperator* other, double shift)
     : body_(body), at_(coefficients) {
   if (other != nullptr && shift > 0) {
-    const SparseMatrix added = other->matrix();
-    lower_ = matrix();
+    static_cast<void>(matrix());
+    const SparseMatrix& added = other->matrix();
     Eigen::Map<VectorX>(lower_.valuePtr(), lower_.nonZeros()) +=
         shift * Eigen::Map<const VectorX>(added.valuePtr(), added.nonZeros());
   }
@@ -41,17 +66,13 @@ RestOperator::RestOperator(const FiniteBody& body, const VectorX& coefficients, 
 }
 
 void RestOperator::factor() {
-  if (lower_.nonZeros() == 0)
-    lower_ = matrix();
-  factor_ = factor_ordered(lower_);
+  factor_ = factor_ordered(matrix());
 }
 
-SparseMatrix RestOperator::matrix() const {
-  if (lower_.nonZeros() > 0)
-    return lower_;
-  SparseMatrix lower;
-  body_.tangent(at_, penalty, lower);
-  return lower;
+const SparseMatrix& RestOperator::matrix() const {
+  if (lower_.nonZeros() == 0)
+    body_.tangent(at_, penalty, lower_);
+  return lower_;
 }
 
 MatrixX RestOperator::solve(const MatrixX& right) const {
@@ -71,9 +92,11 @@ void RestOperator::solve(const VectorX& right, VectorX& solution) const {
   solution = solve(MatrixX(right));
 }
 
+// Of a bordered one with the norm of the uncut body's matrix: assembling the whole would take longer than the rest.
 double RestOperator::condition() const {
-  const Factorisation& whole = bordered_ != nullptr ? *bordered_ : static_cast<const Factorisation&>(*factor_);
-  return condition_estimate(whole, one_norm(matrix(), true), 3 * body_.functions());
+  if (bordered_ != nullptr)
+    return condition_estimate(*bordered_, lineage_.tangent->norm(), static_cast<int>(rows()));
+  return condition_estimate(*factor_, one_norm(lower_, true), static_cast<int>(rows()));
 }
 
 } // namespace spherecut::solvers

@@ -2,7 +2,7 @@
 // deformation: d = A K0^-1 A^T r with A = F / J at every node.
 #pragma once
 
-#include "solvers/finite/body.hpp"
+#include "solvers/finite/bordered_operator.hpp"
 
 namespace spherecut::solvers {
 
@@ -12,9 +12,9 @@ class RestOperator {
   /// not count, as the solver meets them exactly by itself.
   static constexpr double penalty = 1e4;
 
-  /// The tangent of the stress-free body. Where cuts append and the body without a cut has been factored, that factor
-  /// is bordered by what the cut appends (solvers/finite/bordered_operator.hpp). The body must outlive this.
-  explicit RestOperator(const FiniteBody& body);
+  /// The tangent of the stress-free body. Where cuts append and `before` has the factor of the uncut body, that is
+  /// bordered by what the cut appends. The body must outlive this.
+  explicit RestOperator(const FiniteBody& body, const CutLineage& before = {});
   /// The tangent at `coefficients`, or where `shift` > 0 that plus `shift` times `other`. Throws NumericalError where
   /// it is not positive definite.
   RestOperator(const FiniteBody& body, const VectorX& coefficients, const RestOperator* other = nullptr,
@@ -26,18 +26,22 @@ class RestOperator {
   [[nodiscard]] MatrixX solve(const MatrixX& right) const;
   /// Condition number, estimated.
   [[nodiscard]] double condition() const;
-  /// Whether it borders the factor of the uncut body.
-  [[nodiscard]] bool is_bordered() const { return bordered_ != nullptr; }
+  /// Null: it does not border the factor of the uncut body.
+  [[nodiscard]] const BorderedOperator* bordered() const { return bordered_.get(); }
+  /// For the body with a longer cut.
+  [[nodiscard]] const CutLineage& lineage() const { return lineage_; }
 
  private:
+  bool border(const UniformTangent& uniform, const CutLineage& before);
   void factor();
-  [[nodiscard]] SparseMatrix matrix() const; // lower, in order of elimination
+  [[nodiscard]] const SparseMatrix& matrix() const; // lower, in order of elimination
 
   const FiniteBody& body_;
-  VectorX at_; // coefficients of the tangent
-  SparseMatrix lower_;
+  VectorX at_;                 // coefficients of the tangent
+  mutable SparseMatrix lower_; // empty: not asked for yet
   std::shared_ptr<const OrderedCholesky> factor_;
-  std::unique_ptr<const Factorisation> bordered_; // in place of these
+  std::unique_ptr<const BorderedOperator> bordered_; // in place of these
+  CutLineage lineage_;
 };
 
 } // namespace spherecut::solvers

@@ -27,14 +27,6 @@ std::vector<int> sorted_by_rank(std::span<const int> nodes, const std::vector<in
   return order;
 }
 
-/// Groups from this one on that are of the same cell: the first one beyond them.
-int end_of_cell(const PointTable& table, int group) {
-  int end = group + 1;
-  while (end < table.groups() && table.cell[end] == table.cell[group])
-    ++end;
-  return end;
-}
-
 } // namespace
 
 FiniteTangent::FiniteTangent(const FiniteBody& body) : body_(body) {
@@ -69,7 +61,7 @@ void FiniteTangent::find_pattern() {
   std::vector<int> nodes;
   if (block_groups_.empty())
     for (int group = 0, end = 0; group < table.groups(); group = end) {
-      end = sums_by_cell() ? end_of_cell(table, group) : group + 1;
+      end = sums_by_cell() ? table.end_of_cell(group) : group + 1;
       nodes.assign(table.nodes.begin() + table.start[group], table.nodes.begin() + table.start[end]);
       tidy(nodes);
       couple(nodes);
@@ -292,7 +284,7 @@ void FiniteTangent::group_matrix(int group, const LaneValues* tangent, Local& lo
 
 std::optional<UniformTangent> uniform_tangent_of(const FiniteBody& body, const std::vector<LaneValues>& deformation,
                                                  const std::vector<double>& jacobian) {
-  constexpr double alike = 1e-12;
+  constexpr double alike = 1e-10; // coefficients grow with the distance from the origin, and round
   const PointTable& table = body.points();
   if (!body.fibres_.empty() || body.prony_ != nullptr || table.groups() == 0)
     return std::nullopt;
@@ -368,7 +360,7 @@ void FiniteTangent::add_uniform(const UniformTangent& uniform, std::vector<Vecto
     swelling[group] = swelling_of(group, cofactor);
   }
   std::vector<int> cells; // their first groups
-  for (int group = 0; group < table.groups(); group = end_of_cell(table, group))
+  for (int group = 0; group < table.groups(); group = table.end_of_cell(group))
     cells.push_back(group);
   MatrixX moments = MatrixX::Zero(9, std::ssize(rows_));
   std::vector<Local> locals(groups_at_once);
@@ -377,7 +369,7 @@ void FiniteTangent::add_uniform(const UniformTangent& uniform, std::vector<Vecto
     parallel_ranges(here, 4, [&](int begin, int end) {
       std::vector<int> place(body_.functions(), -1);
       for (int k = begin; k < end; ++k)
-        cell_moments(cells[first + k], end_of_cell(table, cells[first + k]), place, locals[k]);
+        cell_moments(cells[first + k], table.end_of_cell(cells[first + k]), place, locals[k]);
     });
     for (int k = 0; k < here; ++k)
       for_each_pair(locals[k].ranks, [&](int i, int j, int entry) {
@@ -429,10 +421,8 @@ void FiniteTangent::add_blocks(const std::vector<double>& jacobian, const std::v
 // Where a cut leaves slivers of the body, more functions may reach a part than it has strains: some of their sums do
 // nothing to any point, and no force moves them.
 void FiniteTangent::add_support(SparseMatrix& lower) const {
-  constexpr double little = 1e-7; // of mu times the spacing
   for (int f = 0; f < body_.functions(); ++f) {
-    const double support =
-        little * body_.law().small_strain().shear_modulus * body_.problem().nodes.spacings[body_.node_of(f)];
+    const double support = body_.support_of(f);
     for (int a = 0; a < 3; ++a) {
       const int column = 3 * rank_[f] + a; // its diagonal comes after those before it in its block
       lower.valuePtr()[lower.outerIndexPtr()[column] + a] += support;

@@ -36,6 +36,13 @@ struct PointTable {
   [[nodiscard]] const LaneValues* gradients_of(int group) const {
     return gradients.data() + 3 * static_cast<std::size_t>(start[group]);
   }
+  /// The first group beyond those of the same cell, from this one on.
+  [[nodiscard]] int end_of_cell(int group) const {
+    int end = group + 1;
+    while (end < groups() && cell[end] == cell[group])
+      ++end;
+    return end;
+  }
   [[nodiscard]] Vector3 gradient(int slot, int lane) const {
     const LaneValues* at = gradients.data() + 3 * static_cast<std::size_t>(slot);
     return {at[0].value[lane], at[1].value[lane], at[2].value[lane]};

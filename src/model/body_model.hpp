@@ -4,6 +4,7 @@
 
 #include "solvers/contact/lip_contact.hpp"
 #include "solvers/cut/growing_body.hpp"
+#include "solvers/finite/cut_lineage.hpp"
 #include "solvers/fracture/tearing.hpp"
 #include "src/model/recondensing.hpp"
 #include "src/model/rest_memo.hpp"
@@ -17,7 +18,6 @@
 
 namespace spherecut::solvers {
 class UncutBody;
-class UncutFunctions;
 } // namespace spherecut::solvers
 
 namespace spherecut::app {
@@ -51,21 +51,21 @@ struct BodyModel {
   std::unique_ptr<solvers::Discretisation> body;   // null before the first load, touch or cut, and at finite strain
   std::shared_ptr<FiniteModel> finite;             // in place of the body where the law is not linear
   std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
-  std::shared_ptr<const solvers::UncutFunctions> uncut_functions; // the same at finite strain
-  const char* not_following = "";                                 // why the body cannot follow a cut; empty: it can
-  topology::SurfaceMesh window_way;               // of the cut, for which a body that follows it was condensed
-  int added_nodes = 0;                            // by updates since then
-  std::optional<topology::BladePose> window_seen; // where the blade was when the window was last seen to cover its way
-  solvers::Field base;                            // without tool and contact
-  solvers::ContactPatch patch;                    // no nodes: the tool is far
-  std::optional<SurfaceWatch> watch;              // of the surface about the patch; empty: not looked at yet
-  int presses = 0;                                // since it was condensed
-  std::optional<solvers::LipPatch> lips;          // pairs, then banks; empty: none has had to be held yet
-  std::optional<solvers::CutContactState> state;  // empty: not solved yet
-  solvers::Field field;                           // solution; at finite strain of that body's shape functions
-  std::optional<solvers::Field> without_blade;    // that without the blade, while `field` is under it
-  mutable solvers::FrontRules front_rules{};      // of these nodes and this cut, found as they are asked for
-  mutable RestMemo rest_memo{};                   // of the solution, likewise
+  solvers::CutLineage lineage;                     // the same at finite strain
+  const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
+  topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
+  int added_nodes = 0;                             // by updates since then
+  std::optional<topology::BladePose> window_seen;  // where the blade was when the window was last seen to cover its way
+  solvers::Field base;                             // without tool and contact
+  solvers::ContactPatch patch;                     // no nodes: the tool is far
+  std::optional<SurfaceWatch> watch;               // of the surface about the patch; empty: not looked at yet
+  int presses = 0;                                 // since it was condensed
+  std::optional<solvers::LipPatch> lips;           // pairs, then banks; empty: none has had to be held yet
+  std::optional<solvers::CutContactState> state;   // empty: not solved yet
+  solvers::Field field;                            // solution; at finite strain of that body's shape functions
+  std::optional<solvers::Field> without_blade;     // that without the blade, while `field` is under it
+  mutable solvers::FrontRules front_rules{};       // of these nodes and this cut, found as they are asked for
+  mutable RestMemo rest_memo{};                    // of the solution, likewise
 
   /// Whether there is a body.
   [[nodiscard]] bool built() const { return body != nullptr || finite != nullptr; }

@@ -123,9 +123,9 @@ bool can_run(const Scenario& scenario) {
 FiniteModel::FiniteModel(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                          const BodyModel& nodes, bool touched, Patience patience)
     : fibres_(fibre_field(scenario.law)), body_(checked_problem(scenario, domain, nodes), law_of(scenario.law),
-                                                body_options(scenario), fibres_, nodes.uncut_functions),
-      equilibrium_(body_, equilibrium_options(patience)), is_prestrained_(!scenario.pretension.isZero(0)),
-      pairs_(body_, nodes.pairs) {
+                                                body_options(scenario), fibres_, nodes.lineage.uncut),
+      equilibrium_(body_, equilibrium_options(patience), nodes.lineage),
+      is_prestrained_(!scenario.pretension.isZero(0)), pairs_(body_, nodes.pairs) {
   if (!nodes.pairs.empty() && scenario.cut.lips != solvers::LipCondition::open)
     equilibrium_.set_lips(nodes.pairs);
   if (!touched)
@@ -257,10 +257,6 @@ void FiniteModel::go_on_from(const BodyModel& before) {
   equilibrium_.set_coefficients(start, 1, old.pose_, std::move(shares));
 }
 
-std::shared_ptr<const solvers::UncutFunctions> FiniteModel::uncut() const {
-  return body_.cut_functions() != nullptr ? body_.cut_functions()->uncut() : nullptr;
-}
-
 // On the same uncut body what is there goes on. Else nodes that both bodies have keep their coefficients; new ones, and
 // those about new ones and about some that are gone, whose shape functions are others now, take those with which the
 // body is strained as it was.
@@ -283,7 +279,7 @@ VectorX FiniteModel::state_from(const BodyModel& before) const {
       deformation += old.segment<3>(3 * static_cast<Eigen::Index>(shape.nodes[k])) * shape.gradient(k).transpose();
     return deformation;
   };
-  if (uncut() != nullptr && uncut() == before.finite->uncut()) {
+  if (lineage().uncut != nullptr && lineage().uncut == before.finite->lineage().uncut) {
     std::vector<char> is_new;
     start = body_.cut_functions()->state_from(*before.finite->body_.cut_functions(), old, is_new);
     return solvers::nearest_state(body_, std::move(start), is_new, strained_before);

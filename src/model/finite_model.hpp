@@ -107,8 +107,8 @@ class FiniteModel {
   void shape_at(const Vector3& x, solvers::ShapeFunctions& shape) const;
   [[nodiscard]] const solvers::Spheres& spheres() const { return body_.spheres(); }
   [[nodiscard]] int functions() const { return body_.functions(); }
-  /// The body without its cut, where cuts only append; else null.
-  [[nodiscard]] std::shared_ptr<const solvers::UncutFunctions> uncut() const;
+  /// What the body with a longer cut goes on from, where cuts only append.
+  [[nodiscard]] const solvers::CutLineage& lineage() const { return equilibrium_.lineage(); }
   [[nodiscard]] bool solved() const { return last_.has_value(); }
   /// Of the last solution: time, s, pose of the tool, and what else there is to tell.
   [[nodiscard]] double time() const { return *time_; }

@@ -251,7 +251,7 @@ BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContac
   there.move_to(centre);
   return [&scenario = scenario_, domain = organ_.domain,
           how = there.sprinkle_options(model_.incision, grasping_.kept_nodes()), previous = model_.sprinkling.nodes,
-          uncut = model_.uncut_functions, coarseness = state_.zone.coarseness(), centre,
+          lineage = model_.lineage, coarseness = state_.zone.coarseness(), centre,
           reach = state_.zone.zone().candidate_radius] {
     BackgroundBody made;
     BodyModel& model = made.model;
@@ -259,7 +259,7 @@ BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContac
     model.sprinkling = resprinkle_held(scenario, *domain, how, previous);
     model.coarseness = coarseness;
     model.touched_from = centre.normal;
-    model.uncut_functions = uncut;
+    model.lineage = lineage;
     const std::vector<int> near = touchable_nodes(scenario, *domain, model.sprinkling.nodes, centre, reach);
     if (is_nonlinear(scenario.law)) {
       make_finite_apart(scenario, domain, near, model);
@@ -280,8 +280,8 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
                                                           : spacing_changed;
   const FineZoneTracker& zone = state_.zone;
   return [&scenario = scenario_, domain = organ_.domain, how = zone.sprinkle_options(incision, grasping_.kept_nodes()),
-          incision_before = model_.incision, sprinkling = model_.sprinkling, uncut = model_.uncut_functions, renewed,
-          reason, coarseness = zone.coarseness(), centre = contact_.is_in_reach() ? zone.centre() : std::nullopt,
+          incision_before = model_.incision, sprinkling = model_.sprinkling, lineage = model_.lineage, renewed, reason,
+          coarseness = zone.coarseness(), centre = contact_.is_in_reach() ? zone.centre() : std::nullopt,
           reach = zone.zone().candidate_radius, facing = zone.facing()] {
     BackgroundBody made;
     BodyModel& model = made.model;
@@ -289,7 +289,7 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
     model.incision = how.incision;
     model.coarseness = coarseness;
     model.touched_from = facing;
-    model.uncut_functions = uncut;
+    model.lineage = lineage;
     BodyModel before;
     before.incision = incision_before;
     before.sprinkling = sprinkling;

@@ -14,10 +14,10 @@ void make_finite(SessionState& state, BodyModel& model, const BodyModel* before)
   const StageTimer timer(state.profile.discretise);
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
   if (before != nullptr)
-    model.uncut_functions = before->uncut_functions;
+    model.lineage = before->lineage;
   model.finite = std::make_shared<FiniteModel>(state.scenario, state.organ.domain, model, state.touch.has_value(),
                                                state.leader == Leader::path ? Patience::of_a_run : Patience::of_a_hand);
-  model.uncut_functions = model.finite->uncut();
+  model.lineage = model.finite->lineage();
   if (before != nullptr && before->solved())
     model.finite->go_on_from(*before);
   if (before != nullptr && !before->pairs.empty()) // what an increment changes is told in cuts.csv
@@ -32,7 +32,7 @@ void make_finite_apart(const Scenario& scenario, const std::shared_ptr<const top
                        const std::vector<int>& wanted, BodyModel& model) {
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
   model.finite = std::make_shared<FiniteModel>(scenario, domain, model, scenario.tool.has_value(), Patience::of_a_hand);
-  model.uncut_functions = model.finite->uncut();
+  model.lineage = model.finite->lineage();
   if (!wanted.empty())
     model.finite->prepare_to_condense(wanted);
 }
