@@ -1,5 +1,6 @@
 #include "src/tissue/cut_checks.hpp"
 
+#include "src/model/finite_model.hpp"
 #include "src/scenario/law_reader.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/wound/splinters.hpp"
