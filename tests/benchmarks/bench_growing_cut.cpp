@@ -55,6 +55,17 @@ struct Scene {
     sweep.move_to({time += 1, Vector3(-0.0619, 0.0013, 0) + travelled * heading});
     travelled += step;
   }
+  /// Makes the nodes those of the cut as it is now; `before` is the one that they were made for.
+  SprinkleIncrement extend_nodes(const topology::Incision* before) {
+    sprinkling.incision = sweep.incision();
+    SprinkleIncrement change = extend_sprinkling(*domain, sprinkling, nodes, before, retired);
+    for (const int node : change.removed)
+      retired[node] = true;
+    for (int j = 0; j < change.added.size(); ++j)
+      nodes.add(change.added, j);
+    retired.resize(nodes.size(), false);
+    return change;
+  }
   [[nodiscard]] Vector3 tip() const { return Vector3(-0.0619, 0.0013, 0) + (travelled - step) * heading; }
 
   [[nodiscard]] Problem problem() const {
@@ -115,15 +126,8 @@ void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
       const auto before = scene.sweep.incision();
       scene.advance();
       const auto sprinkle_start = std::chrono::steady_clock::now();
-      scene.sprinkling.incision = scene.sweep.incision();
-      const SprinkleIncrement increment =
-          extend_sprinkling(*scene.domain, scene.sprinkling, scene.nodes, before.get(), scene.retired);
+      const SprinkleIncrement increment = scene.extend_nodes(before.get());
       sprinkle_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - sprinkle_start).count();
-      for (int node : increment.removed)
-        scene.retired[node] = true;
-      for (int j = 0; j < increment.added.size(); ++j)
-        scene.nodes.add(increment.added, j);
-      scene.retired.resize(scene.nodes.size(), false);
       const NodeChange change{increment.removed, increment.added};
       if (!fan) // the path is scripted: the next increment is known before the blade is there
         prepare_seconds += cut.prepare(change, scene.sweep.incision());
@@ -186,12 +190,7 @@ void growth_by_appending(benchmark::State& state) {
       const auto before = scene.sweep.incision();
       scene.advance();
       start = Clock::now();
-      scene.sprinkling.incision = scene.sweep.incision();
-      const SprinkleIncrement change =
-          extend_sprinkling(*scene.domain, scene.sprinkling, scene.nodes, before.get(), scene.retired);
-      for (int j = 0; j < change.added.size(); ++j)
-        scene.nodes.add(change.added, j);
-      scene.retired.resize(scene.nodes.size(), false);
+      const SprinkleIncrement change = scene.extend_nodes(before.get());
       sprinkle_seconds += since(start);
       start = Clock::now();
       body.grow(change, scene.problem(), {}, true);
@@ -249,12 +248,7 @@ void growth_at_finite_strain(benchmark::State& state) {
     for (int k = 0; k < increments; ++k) {
       const auto was = scene.sweep.incision();
       scene.advance();
-      scene.sprinkling.incision = scene.sweep.incision();
-      const SprinkleIncrement change =
-          extend_sprinkling(*scene.domain, scene.sprinkling, scene.nodes, was.get(), scene.retired);
-      for (int j = 0; j < change.added.size(); ++j)
-        scene.nodes.add(change.added, j);
-      scene.retired.resize(scene.nodes.size(), false);
+      scene.extend_nodes(was.get());
       const auto begin = Clock::now();
       auto body = std::make_unique<FiniteBody>(problem(), law, options, nullptr, before->cut_functions()->uncut());
       body_seconds += since(begin);
