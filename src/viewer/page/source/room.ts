@@ -13,10 +13,18 @@ export class Drape {
   private upper: Vec3 = [0, 0, 0];
   private shown = ''; // camera and size that it was drawn for
 
-  constructor(picture: HTMLCanvasElement) {
+  /** `changed` is called when what was drawn is gone. */
+  constructor(picture: HTMLCanvasElement, changed: () => void) {
     this.canvas.className = 'still';
     this.canvas.setAttribute('aria-hidden', 'true');
     picture.before(this.canvas);
+    // A process of the browser that dies can take this canvas with it, before or after the one of the picture.
+    for (const event of ['contextlost', 'contextrestored']) {
+      this.canvas.addEventListener(event, () => {
+        this.shown = '';
+        changed();
+      });
+    }
   }
 
   /** Below an organ with these bounds. */
@@ -28,11 +36,12 @@ export class Drape {
   draw(camera: PerspectiveCamera, width: number, height: number): void {
     const wanted = `${width} ${height} ${camera.matrixWorld.elements.join()}`;
     if (wanted === this.shown) return;
-    this.shown = wanted;
     this.canvas.width = width;
     this.canvas.height = height;
-    const context = this.canvas.getContext('2d', { alpha: false });
-    if (!context) return;
+    // In memory, where no process that dies takes it away.
+    const context = this.canvas.getContext('2d', { alpha: false, willReadFrequently: true });
+    if (!context || context.isContextLost()) return;
+    this.shown = wanted;
     context.fillStyle = dark;
     context.fillRect(0, 0, width, height);
     const { lower, upper } = this;

@@ -67,7 +67,7 @@ export class View {
   constructor(readonly canvas: HTMLCanvasElement) {
     this.software = drawsInSoftware();
     // The drape, and what is kept of a picture, lie below the canvas and are seen through it.
-    this.drape = new Drape(canvas);
+    this.drape = new Drape(canvas, () => this.change());
     this.renderer = new WebGLRenderer({ canvas, alpha: true, antialias: !this.software, powerPreference: 'high-performance' });
     this.gl = this.renderer.getContext() as WebGL2RenderingContext;
     this.still = this.software ? new Still(this.renderer, canvas, () => this.change()) : null;

@@ -139,6 +139,8 @@ export interface Seen {
   missing: number; // of them the ones that show the backdrop
   tissue: number; // of them the ones of the organ's colours
   strays: number; // px of the organ's colours where there is no organ
+  beside: number; // px where there is no organ and nothing lies over the view
+  drape: number; // of them the ones of the drape
   steel: number; // px of the tool
   arrow: number; // px of the arrow about the line from the tip to its end
   arrowLength: number; // px that this line has
@@ -196,13 +198,15 @@ const isSame = (one: ArrayLike<number>, other: ArrayLike<number>): boolean => on
 
 /** Takes a picture and counts what is seen in it against what the camera should see. */
 export async function see(tab: Tab, wait = 10): Promise<Seen> {
-  // On a busy machine a frame may come between the picture and what the page tells of it: then both are taken again.
+  // On a busy machine a frame may come, or a message go, between the picture and what the page tells of it: then both are
+  // taken again.
   let told = await scene(tab);
   let picture = await composited(tab, wait);
   for (let attempt = 0; attempt < 6; ++attempt) {
     const before = told;
     told = await scene(tab);
-    if (isSame(before.camera, told.camera) && isSame(before.positions, told.positions)) break;
+    const lying = (scene: typeof told): number[] => scene.covers.flatMap(({ left, top, right, bottom }) => [left, top, right, bottom]);
+    if (isSame(before.camera, told.camera) && isSame(before.positions, told.positions) && isSame(lying(before), lying(told))) break;
     picture = await composited(tab, wait);
   }
   const chart = await box(tab, 'chart');
@@ -242,6 +246,8 @@ export async function see(tab: Tab, wait = 10): Promise<Seen> {
     missing: count(picture, 'backdrop', organ),
     tissue: count(picture, 'tissue', organ),
     strays: count(picture, 'tissue', beside),
+    beside: beside.reduce((sum: number, value) => sum + value, 0),
+    drape: count(picture, 'backdrop', beside),
     steel: count(picture, 'steel', open),
     arrow: count(picture, 'arrow', near),
     arrowLength: told.force > 0 ? length : 0,
@@ -263,12 +269,13 @@ export function organIsThere({ expected, missing, picture }: Seen, when: string)
 
 /** The organ is where the camera sees it, whole, in its own colours, and nowhere else. */
 export function organIsSeen(seen: Seen, when: string): void {
-  const { expected, missing, tissue, strays } = seen;
+  const { expected, missing, tissue, strays, beside, drape, steel } = seen;
   const all = JSON.stringify({ ...seen, picture: undefined, open: undefined });
   assert.ok(expected > 3000 * seen.picture.ratio ** 2, `${when}: the organ should cover more than ${expected} px`);
   assert.ok(missing < 0.015 * expected, `${when}: ${missing} of ${expected} px of the organ show what is behind it: ${all}`);
   assert.ok(tissue > 0.6 * expected, `${when}: ${tissue} of ${expected} px have the colours of the organ: ${all}`);
   assert.ok(strays < 0.01 * expected, `${when}: ${strays} px of an organ where none is: ${all}`);
+  assert.ok(drape + steel > 0.8 * beside, `${when}: ${drape} of ${beside} px beside the organ show the drape: ${all}`);
 }
 
 /** The lips of the wound are where the camera sees them; what the tool hides of them is within the share that may be missing. */
