@@ -22,13 +22,6 @@ add_library(spherecut_suitesparse INTERFACE)
 target_include_directories(spherecut_suitesparse SYSTEM INTERFACE $<BUILD_INTERFACE:${SPHERECUT_SUITESPARSE_INCLUDE}>)
 target_link_libraries(spherecut_suitesparse INTERFACE cholmod umfpack amd colamd camd ccolamd suitesparseconfig LAPACK::LAPACK BLAS::BLAS)
 
-# MUMPS 5.5 without MPI; ships no CMake configuration either.
-find_path(SPHERECUT_MUMPS_INCLUDE dmumps_c.h REQUIRED)
-find_library(SPHERECUT_MUMPS_LIBRARY dmumps_seq REQUIRED)
-add_library(spherecut_mumps INTERFACE)
-target_include_directories(spherecut_mumps SYSTEM INTERFACE $<BUILD_INTERFACE:${SPHERECUT_MUMPS_INCLUDE}>)
-target_link_libraries(spherecut_mumps INTERFACE dmumps_seq mumps_common_seq)
-
 find_path(SPHERECUT_VORO_INCLUDE voro++.hh PATH_SUFFIXES voro++ REQUIRED)
 find_library(SPHERECUT_VORO_LIBRARY voro++ REQUIRED)
 add_library(spherecut_voro INTERFACE)

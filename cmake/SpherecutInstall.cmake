@@ -2,7 +2,7 @@
 include(CMakePackageConfigHelpers)
 set(SPHERECUT_PACKAGE_FOLDER "${CMAKE_INSTALL_LIBDIR}/cmake/spherecut")
 
-install(TARGETS spherecut_topology spherecut_solvers spherecut_app spherecut_live spherecut_options spherecut_suitesparse spherecut_mumps spherecut_voro
+install(TARGETS spherecut_topology spherecut_solvers spherecut_app spherecut_live spherecut_options spherecut_suitesparse spherecut_voro
   EXPORT spherecutTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(EXPORT spherecutTargets NAMESPACE spherecut:: DESTINATION "${SPHERECUT_PACKAGE_FOLDER}")
 install(TARGETS spherecut spherecut_live_program spherecut_experiment RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")

@@ -20,7 +20,7 @@ set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 # The libraries come from dpkg-shlibdeps. Besides them: what draws figures, with its letters.
 set(CPACK_DEBIAN_PACKAGE_DEPENDS "gnuplot-nox | gnuplot-qt | gnuplot-x11, fonts-dejavu-core")
 # What programs of one's own are built with (docs/library.md).
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "g++, cmake, libeigen3-dev, libcgal-dev, libopenvdb-dev, libtbb-dev, libfcl-dev, voro++-dev, libsuitesparse-dev, libmumps-seq-dev, libopenblas-dev, liblapack-dev, libtomlplusplus-dev, nlohmann-json3-dev, libfmt-dev")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "g++, cmake, libeigen3-dev, libcgal-dev, libopenvdb-dev, libtbb-dev, libfcl-dev, voro++-dev, libsuitesparse-dev, libopenblas-dev, liblapack-dev, libtomlplusplus-dev, nlohmann-json3-dev, libfmt-dev")
 if(TARGET spherecut_python)
   # The compiled module is for one Python and numpy's interface. The program does without.
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")

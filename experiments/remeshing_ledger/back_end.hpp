@@ -85,7 +85,7 @@ struct Resolution {
 };
 
 enum class Upkeep {
-  update,  // nodes exchanged near the increment, the system updated in its window
+  update,  // galerkin: the cut appends unknowns; collocation: nodes exchanged near the increment, the system anew
   scratch, // everything anew
 };
 std::unique_ptr<BackEnd> make_meshless(const Scenario& scenario, const Resolution& resolution, bool galerkin,

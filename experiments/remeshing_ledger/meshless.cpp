@@ -1,7 +1,8 @@
-// This project's own back end: nodes exchanged near the increment and the system updated, or everything anew.
+// This project's own back end: unknowns appended for the increment, nodes exchanged near it, or everything anew.
 #include "experiments/remeshing_ledger/back_end.hpp"
 #include "experiments/support/cut_body.hpp"
-#include "solvers/cut/growing_body.hpp"
+#include "experiments/support/exchanged_nodes.hpp"
+#include "solvers/appended/appended_body.hpp"
 #include "topology/base/errors.hpp"
 
 #include <algorithm>
@@ -19,6 +20,8 @@ class Meshless final : public BackEnd {
       : scenario_(scenario), resolution_(resolution), upkeep_(upkeep), number_(resolution.first) {
     options_.method = galerkin ? Method::galerkin : Method::collocation;
     options_.estimate_condition = false;
+    if (galerkin && upkeep == Upkeep::update)
+      options_.sight = solvers::SightRule::appended;
   }
 
   std::string name() const override {
@@ -47,23 +50,24 @@ class Meshless final : public BackEnd {
       const StageClock clock(increment.times, Stage::meshing);
       options.spacing = spacing_;
       change = solvers::extend_sprinkling(*scenario_.domain, options, nodes_, before.get());
-      exchange(change);
+      nodes_ = exchanged(nodes_, change);
     } catch (const NumericalError& error) {
       return make_anew(std::move(increment));
     }
-    const double processor = processor_seconds(), wall = wall_seconds();
-    const solvers::BodyGrowth growth = dynamic_cast<solvers::Growable&>(*body_).grow(
-        change, problem(), [this] { return way_ahead(); }, false);
-    if (growth.uncovered[0] != '\0')
-      return discretise(std::move(increment));
-    increment.anew = growth.update.condensed_anew;
-    share_out(increment, processor_seconds() - processor, wall_seconds() - wall, body_->report());
-    return solved(std::move(increment), *body_);
+    if (auto* appended = dynamic_cast<solvers::AppendedBody*>(body_.get())) {
+      const double processor = processor_seconds(), wall = wall_seconds();
+      const bool has_followed = appended->grow(change, problem()).empty();
+      share_out(increment, processor_seconds() - processor, wall_seconds() - wall, body_->report());
+      if (has_followed)
+        return solved(std::move(increment));
+      increment.anew = true;
+    }
+    return discretise(std::move(increment));
   }
 
   Opening opening() const override {
     Opening opening;
-    const solvers::Discretisation& b = body();
+    const solvers::Discretisation& b = *body_;
     const auto jump = [&](const Vector3& x) {
       return opening_at(b, field_, x, scenario_.frame.normal, spacing_.finest()).dot(scenario_.frame.normal);
     };
@@ -94,17 +98,16 @@ class Meshless final : public BackEnd {
   double condition() const override {
     solvers::DiscretisationOptions options = options_;
     options.estimate_condition = true;
-    return solvers::discretise(body().problem(), options)->report().condition_estimate;
+    return solvers::discretise(body_->problem(), options)->report().condition_estimate;
   }
 
  private:
-  [[nodiscard]] const solvers::Discretisation& body() const { return body_ ? *body_ : *rebuilt_; }
-
   /// Made anew the nodes are fine where the front is; nodes that stay must be fine wherever it will come to be.
   solvers::SprinkleOptions sprinkle_options() {
     solvers::SprinkleOptions options;
     options.incision = incision_;
     options.ring_ahead = solvers::wants_ring_ahead(options_.method);
+    options.lips_apart = options_.sight == solvers::SightRule::appended;
     solvers::SpacingField& spacing = options.spacing;
     spacing.fine = resolution_.fine;
     spacing.coarse = resolution_.coarse_over_fine * resolution_.fine;
@@ -142,39 +145,6 @@ class Meshless final : public BackEnd {
     return p;
   }
 
-  void exchange(const solvers::SprinkleIncrement& change) {
-    solvers::NodeCloud kept;
-    for (int i = 0, r = 0; i < nodes_.size(); ++i) {
-      if (r < std::ssize(change.removed) && change.removed[static_cast<std::size_t>(r)] == i) {
-        ++r;
-        continue;
-      }
-      kept.add(nodes_, i);
-    }
-    for (int j = 0; j < change.added.size(); ++j)
-      kept.add(change.added, j);
-    nodes_ = std::move(kept);
-  }
-
-  /// Faces that the next increments add, about three spacings of them.
-  topology::SurfaceMesh way_ahead() const {
-    const int steps = std::max(1, static_cast<int>(std::lround(3 * resolution_.fine / scenario_.advance)));
-    const std::size_t there = scenario_.sheet(number_).triangles.size();
-    topology::SurfaceMesh way = scenario_.sheet(std::min(scenario_.increments, number_ + steps));
-    if (way.triangles.size() > there)
-      way.triangles.erase(way.triangles.begin(), way.triangles.begin() + static_cast<std::ptrdiff_t>(there));
-    else // the last one: nothing is to come
-      way.triangles.erase(way.triangles.begin(), way.triangles.end() - 1);
-    topology::SurfaceMesh used;
-    for (const Triangle& t : way.triangles) {
-      const int first = static_cast<int>(used.vertices.size());
-      for (int v : t)
-        used.vertices.push_back(way.vertices[static_cast<std::size_t>(v)]);
-      used.triangles.push_back({first, first + 1, first + 2});
-    }
-    return used;
-  }
-
   Increment make_anew(Increment increment) {
     increment.anew = true;
     {
@@ -193,18 +163,10 @@ class Meshless final : public BackEnd {
   Increment discretise(Increment increment) {
     const double processor = processor_seconds(), wall = wall_seconds();
     body_.reset();
-    rebuilt_.reset();
-    if (upkeep_ == Upkeep::update) {
-      increment.anew = true;
-      solvers::GrowthOptions growth;
-      growth.method = options_;
-      growth.way = way_ahead();
-      body_ = solvers::make_growable(problem(), growth);
-    } else {
-      rebuilt_ = solvers::discretise(problem(), options_);
-    }
-    share_out(increment, processor_seconds() - processor, wall_seconds() - wall, body().report());
-    return solved(std::move(increment), body());
+    body_ = options_.sight == solvers::SightRule::appended ? solvers::make_appended(problem(), options_, uncut_)
+                                                           : solvers::discretise(problem(), options_);
+    share_out(increment, processor_seconds() - processor, wall_seconds() - wall, body_->report());
+    return solved(std::move(increment));
   }
 
   /// What the library reports by the wall clock, as shares of the processor time.
@@ -219,14 +181,14 @@ class Meshless final : public BackEnd {
     add(Stage::assembly, wall - supports - factor);
   }
 
-  Increment solved(Increment increment, const solvers::Discretisation& body) {
+  Increment solved(Increment increment) {
     {
       const StageClock clock(increment.times, Stage::solve);
-      field_ = body.solve();
+      field_ = body_->solve();
     }
     increment.number = number_;
-    increment.unknowns = 3 * nodes_.size();
-    increment.quality = 1 / std::max(1.0, body.report().worst_moment_condition);
+    increment.unknowns = body_->coefficient_count();
+    increment.quality = 1 / std::max(1.0, body_->report().worst_moment_condition);
     return increment;
   }
 
@@ -238,8 +200,8 @@ class Meshless final : public BackEnd {
   std::shared_ptr<const topology::Incision> incision_;
   solvers::SpacingField spacing_;
   solvers::NodeCloud nodes_;
-  std::unique_ptr<solvers::Discretisation> body_; // Growable, or null
-  std::unique_ptr<solvers::Discretisation> rebuilt_;
+  std::unique_ptr<solvers::Discretisation> body_;
+  std::shared_ptr<const solvers::UncutBody> uncut_; // of a body whose cut only appends
   solvers::Field field_;
 };
 

@@ -1,7 +1,7 @@
-// Problem:   one growing cut, several back ends: finite spheres that follow it by local updates or are built anew, and
-//            finite elements that mesh the organ, or a cavity in its mesh, anew or move their mesh along. A penny crack
-//            under pressure that grows in a cube; a cut that runs 40 mm into a block in 50 increments; an incision into
-//            a liver.
+// Problem:   one growing cut, several back ends: finite spheres that follow it by what it appends, on exchanged nodes
+//            or anew, and finite elements that mesh the organ, or a cavity in its mesh, anew or move their mesh along.
+//            A penny crack under pressure that grows in a cube; a cut that runs 40 mm into a block in 50 increments; an
+//            incision into a liver.
 // Reference: the penny's opening [Sneddon 1946]; for the others quadratic tetrahedra with quarter-point tips on a fine
 //            mesh, checked against a second reference of another kind.
 // Command:   spherecut experiment run remeshing_ledger --out DIR

@@ -472,8 +472,6 @@ void bind_session_steps(py::class_<RunningSession, std::shared_ptr<RunningSessio
            "Whether a grasper is closed from the next step on; None: by the times of the scenario.")
       .def("set_force_only", switch_of(&app::SessionOptions::force_only), "on"_a,
            "On: steps leave out what only output needs: node_values(), the residual, the opening volume.")
-      .def("set_recondensing", switch_of(&app::SessionOptions::recondensing), "on"_a,
-           "On: a body that follows its cut is condensed anew in the background, on a thread of its own.")
       .def("set_following_aside", switch_of(&app::SessionOptions::following_in_background), "on"_a,
            "On: nodes that follow the tool, or a cut that was put off, are made in the background.")
       .def("set_tear_gradually", switch_of(&app::SessionOptions::tear_gradually), "on"_a,

@@ -1082,8 +1082,6 @@ class Session:
         """Whether a grasper is closed from the next step on; None: by the times of the scenario."""
     def set_force_only(self, on: bool) -> None:
         """On: steps leave out what only output needs: node_values(), the residual, the opening volume."""
-    def set_recondensing(self, on: bool) -> None:
-        """On: a body that follows its cut is condensed anew in the background, on a thread of its own."""
     def set_following_aside(self, on: bool) -> None:
         """On: nodes that follow the tool, or a cut that was put off, are made in the background."""
     def set_tear_gradually(self, on: bool) -> None:

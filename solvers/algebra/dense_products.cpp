@@ -94,16 +94,4 @@ void product_with_transposed(const MatrixX& a, const double* b, int ldb, int row
   dgemm_("N", "T", &m, &rows, &k, &one, a.data(), &m, b, &ldb, &none, c.data(), &m);
 }
 
-void triangular_product(bool transposed, const MatrixX& lower, MatrixX& b) {
-  const int rows = static_cast<int>(b.rows()), columns = static_cast<int>(b.cols());
-  if (rows == 0 || columns == 0)
-    return;
-  if (columns == 1) {
-    dtrmv_("L", transposed ? "T" : "N", "N", &rows, lower.data(), &rows, b.data(), &unit);
-    return;
-  }
-  const double one = 1;
-  dtrmm_("L", "L", transposed ? "T" : "N", "N", &rows, &columns, &one, lower.data(), &rows, b.data(), &rows);
-}
-
 } // namespace spherecut::solvers

@@ -22,7 +22,5 @@ void triangular_solve(bool transposed, const double* lower, int lda, MatrixX& b)
 void triangular_solve_from_right(const double* lower, int lda, MatrixX& b);
 /// C = A B^T, B of `rows` rows and as many columns as A, with leading dimension `ldb`. C is resized.
 void product_with_transposed(const MatrixX& a, const double* b, int ldb, int rows, MatrixX& c);
-/// B = L B, or L^T B.
-void triangular_product(bool transposed, const MatrixX& lower, MatrixX& b);
 
 } // namespace spherecut::solvers

@@ -129,11 +129,9 @@ void AppendedBody::follow(const BoundingBox& region) {
     report_.assembly_seconds = watch.seconds();
 }
 
-BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown,
-                              const std::function<topology::SurfaceMesh()>&, bool) {
-  const Stopwatch watch;
+std::string AppendedBody::grow(const SprinkleIncrement& change, Problem grown) {
   if (!change.removed.empty() || base_nodes(grown.nodes) != uncut_->size())
-    return {"nodes have been exchanged", {}};
+    return "nodes have been exchanged";
   double largest = 0;
   for (const SmallBox& box : uncut_->boxes().boxes())
     largest = std::max(largest, box.half.norm());
@@ -152,10 +150,7 @@ BodyGrowth AppendedBody::grow(const SprinkleIncrement& change, Problem grown,
     throw;
   }
   forget_factor_seconds();
-  BodyGrowth growth;
-  growth.update.total_seconds = watch.seconds();
-  growth.update.cells_seconds = growth.update.total_seconds;
-  return growth;
+  return {};
 }
 
 void AppendedBody::find_pieces() {

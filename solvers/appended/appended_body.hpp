@@ -4,24 +4,26 @@
 #pragma once
 
 #include "solvers/appended/kept_places.hpp"
-#include "solvers/cut/growing_body.hpp"
 
 #include <memory>
+#include <string>
 
 namespace spherecut::solvers {
 
 /// How many of the nodes come before the first lip node. Throws InputError where another node comes after one.
 int base_nodes(const NodeCloud& nodes);
 
-class AppendedBody final : public Discretisation, public Growable {
+class AppendedBody final : public Discretisation {
  public:
   /// Throws as discretise().
   AppendedBody(const Problem& problem, const DiscretisationOptions& options);
   /// On an uncut body that is there already.
   AppendedBody(Problem problem, const DiscretisationOptions& options, std::shared_ptr<const UncutBody> uncut);
 
-  BodyGrowth grow(const SprinkleIncrement& change, Problem grown,
-                  const std::function<topology::SurfaceMesh()>& way_ahead, bool only_update) override;
+  /// The body follows its cut to `grown`: what problem() becomes when `change` (ids as they are now, added nodes at the
+  /// end) and the new incision are put in. Returns why the body cannot follow and is as it was; empty: it has followed.
+  /// Throws as discretise(); the body is then as it was.
+  [[nodiscard]] std::string grow(const SprinkleIncrement& change, Problem grown);
 
   [[nodiscard]] Method method() const override { return Method::galerkin; }
   [[nodiscard]] const Problem& problem() const override { return problem_; }

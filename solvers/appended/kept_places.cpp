@@ -11,8 +11,7 @@ namespace {
 
 // In spacings. A share changes where its points see other nodes, or where the points of a face near a front lie closer.
 constexpr double share_reach = 4;
-// Points of a share lie this near to its node, and the nodes that may own them as near to the points.
-constexpr double point_reach = 3;
+constexpr double point_reach = 3; // points of a share lie this near to its node
 
 } // namespace
 
@@ -81,17 +80,15 @@ void KeptPlaces::require(const std::vector<int>& wanted) {
   if (missing.empty())
     return;
   const NodeCloud& nodes = problem_->nodes;
-  const double widest = *std::max_element(nodes.spacings.begin(), nodes.spacings.end());
-  SurfacePatches::Part part{{Vector3::Constant(1e300), Vector3::Constant(-1e300)}, {}};
+  BoundingBox part{Vector3::Constant(1e300), Vector3::Constant(-1e300)};
   bool all_lips = true;
   for (const int node : missing) {
-    part.points.lower = part.points.lower.cwiseMin(nodes.positions[node]);
-    part.points.upper = part.points.upper.cwiseMax(nodes.positions[node]);
+    const Vector3& x = nodes.positions[node];
+    const double reach = point_reach * nodes.spacings[node];
+    part.lower = part.lower.cwiseMin(Vector3(x.array() - reach));
+    part.upper = part.upper.cwiseMax(Vector3(x.array() + reach));
     all_lips = all_lips && nodes.kinds[node] == NodeKind::lip;
   }
-  part.points.lower.array() -= point_reach * widest;
-  part.points.upper.array() += point_reach * widest;
-  part.nodes = {part.points.lower.array() - point_reach * widest, part.points.upper.array() + point_reach * widest};
   const SurfacePatches patches(*problem_->domain, nodes, problem_->incision, part,
                                all_lips ? SurfacePatches::Of::faces : SurfacePatches::Of::skin_and_faces);
   for (const int node : missing) {

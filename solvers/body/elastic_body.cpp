@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
-#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -62,21 +61,15 @@ void check_problem(const Problem& problem) {
 }
 
 NodalSupports nodal_supports(const Spheres& spheres) {
-  std::vector<int> all(static_cast<std::size_t>(spheres.size()));
-  std::iota(all.begin(), all.end(), 0);
-  return nodal_supports(spheres, all);
-}
-
-NodalSupports nodal_supports(const Spheres& spheres, const std::vector<int>& nodes) {
   NodalSupports supports;
-  const std::size_t count = nodes.size();
+  const std::size_t count = spheres.centres().size();
   supports.start.assign(1, 0);
   supports.start.reserve(count + 1);
   supports.nodes.reserve(32 * count);
   supports.value.reserve(32 * count);
   supports.gradient.reserve(32 * count);
   ShapeFunctions shape;
-  for (const int i : nodes) {
+  for (int i = 0; i < spheres.size(); ++i) {
     if (!evaluate(spheres, spheres.centres()[i], shape))
       throw NumericalError(fmt::format("node {}: its support has {} nodes and moment condition {:.1e}; it is not sound",
                                        i, shape.size(), shape.moment_condition));
@@ -87,31 +80,6 @@ NodalSupports nodal_supports(const Spheres& spheres, const std::vector<int>& nod
       supports.gradient.push_back(shape.gradient(k));
     }
     supports.start.push_back(static_cast<int>(supports.nodes.size()));
-    supports.growth.push_back(shape.growth);
-  }
-  return supports;
-}
-
-NodalSupports renewed_supports(const NodalSupports& before, const NodalSupports& fresh, const std::vector<int>& was,
-                               const std::vector<int>& place) {
-  NodalSupports supports;
-  supports.start.assign(1, 0);
-  supports.worst_moment_condition = std::max(fresh.worst_moment_condition, before.worst_moment_condition);
-  const std::size_t expected = before.nodes.size() + fresh.nodes.size();
-  supports.nodes.reserve(expected);
-  supports.value.reserve(expected);
-  supports.gradient.reserve(expected);
-  int next = 0;
-  for (const int old : was) {
-    const NodalSupports& from = old < 0 ? fresh : before;
-    const int row = old < 0 ? next++ : old;
-    for (int k = from.start[row]; k < from.start[row + 1]; ++k) {
-      supports.nodes.push_back(old < 0 ? from.nodes[k] : place[from.nodes[k]]);
-      supports.value.push_back(from.value[k]);
-      supports.gradient.push_back(from.gradient[k]);
-    }
-    supports.start.push_back(static_cast<int>(supports.nodes.size()));
-    supports.growth.push_back(from.growth[row]);
   }
   return supports;
 }

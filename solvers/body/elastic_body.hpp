@@ -19,21 +19,13 @@ struct NodalSupports {
   std::vector<int> nodes;
   std::vector<double> value;
   std::vector<Vector3> gradient; // 1/m
-  std::vector<double> growth;    // per node, of all radii for its support alone
   double worst_moment_condition = 0;
   /// u_h(x_i), 3 a node, m.
   [[nodiscard]] VectorX displacements(const Field& field) const;
 };
 
-/// Evaluates the shape functions at all nodes, or at those listed. Throws NumericalError naming the node whose support
-/// is not sound.
+/// Evaluates the shape functions at all nodes. Throws NumericalError naming the node whose support is not sound.
 NodalSupports nodal_supports(const Spheres& spheres);
-NodalSupports nodal_supports(const Spheres& spheres, const std::vector<int>& nodes);
-
-/// Supports of nodes of which was[i] tells what they were in `before`, with the new numbers `place` of those nodes; -1:
-/// found anew, the next of `fresh`.
-NodalSupports renewed_supports(const NodalSupports& before, const NodalSupports& fresh, const std::vector<int>& was,
-                               const std::vector<int>& place);
 
 /// Throws InputError for bad material, fewer than 4 nodes, arrays of unequal length, non-finite positions, a
 /// prescribed node out of range, a component prescribed twice, or nothing prescribed (the body would float: 6 rigid
@@ -54,10 +46,9 @@ void require_one_material(const Problem& problem, std::string_view what);
 /// How the spheres of a method reach around the cut of a problem. Near incompressibility the enrichment reaches
 /// farther, as the supports of the weak form do: at nu = 0.49 a reach of 1.75 spacings leaves 3.0 % of a penny's volume
 /// and 7.6 % of its K wrong, one of 2.5 leaves 1.0 and 2.3 %; at nu = 0.3 the shorter one is as right (K of a straight
-/// crack in mode II 0.3 against 1.6 %) and an increment of a cut changes less than half as much. The weak form does
-/// with 1.35. Where nodes near the front see too few others for the enriched basis the spheres of collocation grow,
-/// because its stresses are those at points; the weak form leaves that to the points, and keeps its spheres as the cut
-/// goes on.
+/// crack in mode II 0.3 against 1.6 %). The weak form does with 1.35. Where nodes near the front see too few others for
+/// the enriched basis the spheres of collocation grow, because its stresses are those at points; the weak form leaves
+/// that to the points.
 Sight sight_about_cut(const Problem& problem, Method method, SightRule rule);
 
 /// Force of each pattern on each node's coefficients, sum of h_j(x) f over its points: 3N rows, a column a pattern.

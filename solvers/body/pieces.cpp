@@ -3,39 +3,19 @@
 #include "topology/base/errors.hpp"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <fmt/format.h>
 
 namespace spherecut::solvers {
-
-namespace {
-
-/// `piece_of` every node, numbered from 0 without gaps.
-std::vector<Piece> pieces_from(const Problem& problem, const std::vector<int>& piece_of) {
-  std::vector<Piece> pieces(static_cast<std::size_t>(*std::max_element(piece_of.begin(), piece_of.end())) + 1);
-  for (int i = 0; i < std::ssize(piece_of); ++i) {
-    pieces[piece_of[i]].nodes.push_back(i);
-    pieces[piece_of[i]].centroid += problem.nodes.positions[i];
-  }
-  for (Piece& piece : pieces)
-    piece.centroid /= static_cast<double>(piece.nodes.size());
-  for (const Prescribed& entry : problem.prescribed)
-    if (entry.components[0] || entry.components[1] || entry.components[2])
-      pieces[piece_of[entry.node]].held = true;
-  return pieces;
-}
-
-} // namespace
 
 std::vector<Piece> find_pieces(const Problem& problem, const std::vector<int>& start,
                                const std::vector<int>& neighbours) {
   const int count = problem.nodes.size();
   std::vector<int> piece_of(count, -1), pending;
-  int pieces = 0;
+  int count_of_pieces = 0;
   for (int first = 0; first < count; ++first) {
     if (piece_of[first] >= 0)
       continue;
-    const int id = pieces++;
+    const int id = count_of_pieces++;
     piece_of[first] = id;
     pending.push_back(first);
     while (!pending.empty()) {
@@ -48,17 +28,17 @@ std::vector<Piece> find_pieces(const Problem& problem, const std::vector<int>& s
         }
     }
   }
-  return pieces_from(problem, piece_of);
-}
-
-std::vector<Piece> pieces_by_sight(const Problem& problem) {
-  if (problem.incision == nullptr)
-    return {};
-  return pieces_from(problem, node_pieces(problem.nodes, *problem.incision));
-}
-
-int unheld_count(const std::vector<Piece>& pieces) {
-  return static_cast<int>(std::count_if(pieces.begin(), pieces.end(), [](const Piece& piece) { return !piece.held; }));
+  std::vector<Piece> pieces(static_cast<std::size_t>(count_of_pieces));
+  for (int i = 0; i < count; ++i) {
+    pieces[piece_of[i]].nodes.push_back(i);
+    pieces[piece_of[i]].centroid += problem.nodes.positions[i];
+  }
+  for (Piece& piece : pieces)
+    piece.centroid /= static_cast<double>(piece.nodes.size());
+  for (const Prescribed& entry : problem.prescribed)
+    if (entry.components[0] || entry.components[1] || entry.components[2])
+      pieces[piece_of[entry.node]].held = true;
+  return pieces;
 }
 
 void require_held(const std::vector<Piece>& pieces) {

@@ -10,12 +10,6 @@ namespace spherecut::solvers {
 std::vector<Piece> find_pieces(const Problem& problem, const std::vector<int>& start,
                                const std::vector<int>& neighbours);
 
-/// The same of a cut body by which of its nodes see each other; none of an uncut one.
-std::vector<Piece> pieces_by_sight(const Problem& problem);
-
-/// How many of them nothing holds.
-int unheld_count(const std::vector<Piece>& pieces);
-
 /// Throws InputError naming the first piece that nothing holds, by its size and place.
 void require_held(const std::vector<Piece>& pieces);
 

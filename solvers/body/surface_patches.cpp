@@ -29,7 +29,6 @@ DisplacementMean mean_over(const std::vector<SurfacePoint>& points, const std::v
       throw NumericalError(fmt::format("no sound support covers the surface point ({:.6g}, {:.6g}, {:.6g}) m",
                                        points[p].position.x(), points[p].position.y(), points[p].position.z()));
     }
-    mean.growth = std::max(mean.growth, shape.growth);
     mean.area += points[p].weight;
     mean.centroid += points[p].weight * points[p].position;
     mean.share.push_back({points[p].position, points[p].weight});
@@ -130,21 +129,21 @@ DisplacementMean value_at(const Spheres& spheres, const Vector3& x) {
   if (!evaluate(spheres, x, shape))
     throw NumericalError(
         fmt::format("no sound support covers the point ({:.6g}, {:.6g}, {:.6g}) m", x.x(), x.y(), x.z()));
-  return {shape.nodes, shape.value, x, 0, {{x, 1}}, shape.growth};
+  return {shape.nodes, shape.value, x, 0, {{x, 1}}};
 }
 
 SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
                                const std::shared_ptr<const topology::Incision>& incision,
-                               const std::optional<Part>& part, Of of,
+                               const std::optional<BoundingBox>& part, Of of,
                                const std::shared_ptr<const topology::Incision>& opaque)
     : nodes_(nodes), incision_(opaque ? opaque : incision), points_of_node_(nodes.size()) {
   if (of == Of::skin_and_faces)
-    points_ = surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision.get(),
-                                 part ? &part->points : nullptr);
+    points_ =
+        surface_quadrature(domain, nodes, share_edge, share_centroid_below, incision.get(), part ? &*part : nullptr);
   faces_begin_ = static_cast<int>(points_.size());
   if (incision != nullptr) {
-    const std::vector<SurfacePoint> faces = lip_quadrature(*incision, nodes, share_edge, share_centroid_below,
-                                                           part ? &part->points : nullptr, share_finest);
+    const std::vector<SurfacePoint> faces =
+        lip_quadrature(*incision, nodes, share_edge, share_centroid_below, part ? &*part : nullptr, share_finest);
     points_.insert(points_.end(), faces.begin(), faces.end());
   }
   for (const bool lips : {false, true}) {
@@ -154,8 +153,7 @@ SurfacePatches::SurfacePatches(const topology::Domain& domain, const NodeCloud& 
     std::vector<Vector3> positions;
     std::vector<int> ids;
     for (int i = 0; i < nodes.size(); ++i)
-      if (nodes.kinds[i] != NodeKind::interior && (nodes.kinds[i] == NodeKind::lip) == lips &&
-          (!part || part->nodes.contains(nodes.positions[i]))) {
+      if (nodes.kinds[i] != NodeKind::interior && (nodes.kinds[i] == NodeKind::lip) == lips) {
         positions.push_back(nodes.positions[i]);
         ids.push_back(i);
       }

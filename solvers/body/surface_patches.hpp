@@ -17,7 +17,6 @@ struct DisplacementMean {
   Vector3 centroid = Vector3::Zero(); // m, of the share
   double area = 0;                    // m2, 0 when the mean is the value at a point
   std::vector<QuadraturePoint> share; // the points it is taken over; weights add up to one
-  double growth = 1;                  // of the radii for a point of it that the spheres as they are do not support
   [[nodiscard]] Vector3 of(const VectorX& coefficients) const;
   /// The same mean of a field given point by point.
   [[nodiscard]] Vector3 of(const std::function<Vector3(const Vector3& x)>& field) const;
@@ -40,16 +39,11 @@ class SurfacePatches {
  public:
   enum class Of { skin_and_faces, faces };
 
-  /// Part of a surface: the points that some nodes may own, and all nodes that those points may belong to.
-  struct Part {
-    BoundingBox points, nodes; // m
-  };
-
-  /// `opaque`: Problem::opaque. Of a `part` the shares of those nodes alone are meant to be asked for; of `faces` only
-  /// those of lip nodes.
+  /// `opaque`: Problem::opaque. With a `part`, m, only shares that lie within it are meant to be asked for; of `faces`
+  /// only those of lip nodes.
   SurfacePatches(const topology::Domain& domain, const NodeCloud& nodes,
                  const std::shared_ptr<const topology::Incision>& incision = nullptr,
-                 const std::optional<Part>& part = std::nullopt, Of of = Of::skin_and_faces,
+                 const std::optional<BoundingBox>& part = std::nullopt, Of of = Of::skin_and_faces,
                  const std::shared_ptr<const topology::Incision>& opaque = nullptr);
 
   /// All points that the shares are made of.

@@ -39,11 +39,11 @@ std::array<bool, 3> held_beside(const Problem& problem, const topology::Boundary
 class RowAssembly {
  public:
   RowAssembly(const Problem& problem, const topology::CellComplex& cells, const Spheres& spheres,
-              const NodalSupports& supports, bool mixed, const std::vector<char>& wanted)
-      : problem_(problem), cells_(cells), spheres_(spheres), supports_(supports), mixed_(mixed), wanted_(wanted),
+              const NodalSupports& supports, bool mixed)
+      : problem_(problem), cells_(cells), spheres_(spheres), supports_(supports), mixed_(mixed),
         x_(problem.nodes.positions), mu_(problem.material.shear_modulus()),
         lambda_(mixed ? 0 : problem.material.lame_lambda()),
-        operators_(face_operators(cells, problem, spheres, supports, wanted)) {
+        operators_(face_operators(cells, problem, spheres, supports)) {
     list_faces();
   }
 
@@ -53,8 +53,6 @@ class RowAssembly {
     place_.assign(count, -1);
     std::size_t expected = 0; // nodes of a row
     for (int i = 0; i < count; ++i) {
-      if (wanted_[i] == 0)
-        continue;
       row_ = &rows[i];
       row_->nodes.reserve(expected);
       row_->blocks.reserve(expected);
@@ -102,7 +100,6 @@ class RowAssembly {
   const Spheres& spheres_;
   const NodalSupports& supports_;
   const bool mixed_;
-  const std::vector<char>& wanted_;
   const std::vector<Vector3>& x_;
   const double mu_, lambda_; // Pa; lambda is 0 where the pressure is an unknown
   const FaceOperators operators_;
@@ -234,9 +231,8 @@ void RowAssembly::add_volume_balance(int i) {
 } // namespace
 
 void assemble_rows(const Problem& problem, const topology::CellComplex& cells, const Spheres& spheres,
-                   const NodalSupports& supports, bool mixed, const std::vector<char>& wanted,
-                   std::vector<BalanceRow>& rows) {
-  RowAssembly(problem, cells, spheres, supports, mixed, wanted).assemble(rows);
+                   const NodalSupports& supports, bool mixed, std::vector<BalanceRow>& rows) {
+  RowAssembly(problem, cells, spheres, supports, mixed).assemble(rows);
 }
 
 } // namespace spherecut::solvers

@@ -49,10 +49,9 @@ struct BalanceRow {
   std::vector<Eigen::Matrix4d> blocks;
 };
 
-/// Rows of the nodes marked in `wanted`, empty ones of the others, into `rows` (one per node). Throws InputError for a
-/// node without a cell, NumericalError where a face has no sound support.
+/// Rows of all nodes, into `rows`. Throws InputError for a node without a cell, NumericalError where a face has no
+/// sound support.
 void assemble_rows(const Problem& problem, const topology::CellComplex& cells, const Spheres& spheres,
-                   const NodalSupports& supports, bool mixed, const std::vector<char>& wanted,
-                   std::vector<BalanceRow>& rows);
+                   const NodalSupports& supports, bool mixed, std::vector<BalanceRow>& rows);
 
 } // namespace spherecut::solvers

@@ -12,10 +12,8 @@ namespace spherecut::solvers {
 inline constexpr double mixed_above = 0.40; // Poisson ratio from which the pressure unknown is used
 
 inline constexpr double default_collocation_radius = 1.8; // spacings
-/// rho, in spacings.
-double collocation_support_radius(const DiscretisationOptions& options);
 
-class Collocation : public ElasticBody {
+class Collocation final : public ElasticBody {
  public:
   /// Assembles and factors.
   Collocation(Problem problem, const DiscretisationOptions& options);
@@ -34,13 +32,7 @@ class Collocation : public ElasticBody {
   double residual(const Field& field, const std::vector<int>& loaded_nodes,
                   const std::vector<Vector3>& nodal_forces) const override;
 
- protected:
-  struct Assembled {};
-  /// Assembles and does not factor.
-  Collocation(Problem problem, const DiscretisationOptions& options, Assembled);
-
-  /// Unknowns under right-hand sides of the constrained system, one column each.
-  [[nodiscard]] virtual MatrixX solution(const MatrixX& right) const { return factorisation_->solve(right); }
+ private:
   [[nodiscard]] std::vector<Field> responses_to(const MatrixX& right) const;
   void find_constrained();
   /// Which nodes couple, in compressed rows.
@@ -49,9 +41,9 @@ class Collocation : public ElasticBody {
   };
   [[nodiscard]] NodeGraph coupled_nodes() const;
   /// Of the unknowns, from the graph of the nodes: a tenth of the work that their own graph would be.
-  [[nodiscard]] std::vector<int> elimination_order() const;
+  [[nodiscard]] std::vector<int> elimination_order(const NodeGraph& graph) const;
   /// Finds the pieces; springs hold those that nothing holds, or their unknowns are dropped.
-  void treat_pieces(UnheldPieces unheld);
+  void treat_pieces(const NodeGraph& graph, UnheldPieces unheld);
   [[nodiscard]] SparseMatrix constrained_system() const;
   /// Rows of node i in it: visit(row 0 to 3, column, value).
   template <typename Visit>
@@ -104,7 +96,7 @@ class Collocation : public ElasticBody {
           right[stride_ * entry.node + c] =
               constraint_scale(entry.node) * prescribed[3 * static_cast<Eigen::Index>(k) + c];
     }
-    return field_of(solution(right).col(0), load_factor, prescribed);
+    return field_of(factorisation_->solve(right).col(0), load_factor, prescribed);
   }
   [[nodiscard]] Field field_of(const VectorX& unknowns, double load_factor, const VectorX& prescribed) const {
     const int count = problem_.nodes.size();
@@ -151,8 +143,7 @@ class Collocation : public ElasticBody {
   std::vector<char> dropped_;                    // per node: its piece is held by nothing and taken out
   std::vector<Vector3> loads_;                   // N, loads on each cell
   std::vector<BalanceRow> rows_;
-  NodeGraph graph_;                              // while it is assembled
-  std::unique_ptr<Factorisation> factorisation_; // null: solution() knows another way
+  std::unique_ptr<Factorisation> factorisation_;
 };
 
 template <typename Visit>

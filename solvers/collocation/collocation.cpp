@@ -15,34 +15,24 @@
 
 namespace spherecut::solvers {
 
-double collocation_support_radius(const DiscretisationOptions& options) {
-  return options.support_radius > 0 ? options.support_radius : default_collocation_radius;
-}
-
-Collocation::Collocation(Problem problem, const DiscretisationOptions& options, Assembled)
-    : ElasticBody(std::move(problem), Method::collocation, collocation_support_radius(options), options.sight),
+Collocation::Collocation(Problem problem, const DiscretisationOptions& options)
+    : ElasticBody(std::move(problem), Method::collocation,
+                  options.support_radius > 0 ? options.support_radius : default_collocation_radius, options.sight),
       mixed_(problem_.material.poisson_ratio > mixed_above), stride_(mixed_ ? 4 : 3) {
   const Stopwatch assembly;
   const NodeCloud& nodes = problem_.nodes;
   cells_ = topology::voronoi_cells(nodes.positions, nodes.spacings, *problem_.domain, problem_.hiding().get());
   find_constrained();
   loads_ = cell_loads(cells_, problem_, stress_of(problem_.loads.initial_strain));
-  assemble_rows(problem_, cells_, spheres_, supports_, mixed_, std::vector<char>(nodes.positions.size(), 1), rows_);
-  graph_ = coupled_nodes();
-  treat_pieces(options.unheld);
+  assemble_rows(problem_, cells_, spheres_, supports_, mixed_, rows_);
+  const NodeGraph graph = coupled_nodes();
+  treat_pieces(graph, options.unheld);
   report_.unknowns = stride_ * nodes.size();
-  report_.assembly_seconds = assembly.seconds();
-}
-
-Collocation::Collocation(Problem problem, const DiscretisationOptions& options)
-    : Collocation(std::move(problem), options, Assembled{}) {
-  const Stopwatch assembly;
   const SparseMatrix system = constrained_system();
   report_.matrix_nonzeros = system.nonZeros();
-  report_.assembly_seconds += assembly.seconds();
+  report_.assembly_seconds = assembly.seconds();
   const Stopwatch factor;
-  factorisation_ = factor_general(system, elimination_order());
-  graph_ = {};
+  factorisation_ = factor_general(system, elimination_order(graph));
   report_.factor_nonzeros = factorisation_->nonzeros();
   report_.factor_seconds = factor.seconds();
   if (options.estimate_condition) {
@@ -115,18 +105,18 @@ Collocation::NodeGraph Collocation::coupled_nodes() const {
   return graph;
 }
 
-std::vector<int> Collocation::elimination_order() const {
+std::vector<int> Collocation::elimination_order(const NodeGraph& graph) const {
   std::vector<int> order;
   order.reserve(static_cast<std::size_t>(stride_) * problem_.nodes.positions.size());
-  for (const int node : fill_reducing_ordering(graph_.start, graph_.neighbours))
+  for (const int node : fill_reducing_ordering(graph.start, graph.neighbours))
     for (int c = 0; c < stride_; ++c)
       order.push_back(stride_ * node + c);
   return order;
 }
 
-void Collocation::treat_pieces(UnheldPieces unheld) {
+void Collocation::treat_pieces(const NodeGraph& graph, UnheldPieces unheld) {
   const int count = problem_.nodes.size();
-  report_.pieces = find_pieces(problem_, graph_.start, graph_.neighbours);
+  report_.pieces = find_pieces(problem_, graph.start, graph.neighbours);
   dropped_.assign(count, 0);
   if (unheld == UnheldPieces::refuse)
     require_held(report_.pieces);
@@ -205,7 +195,7 @@ SparseMatrix Collocation::constrained_system() const {
 
 std::vector<Field> Collocation::responses_to(const MatrixX& right) const {
   const VectorX no_displacement = VectorX::Zero(3 * std::ssize(problem_.prescribed));
-  const MatrixX solved = solution(right);
+  const MatrixX solved = factorisation_->solve(right);
   std::vector<Field> responses;
   responses.reserve(static_cast<std::size_t>(solved.cols()));
   for (Eigen::Index k = 0; k < solved.cols(); ++k)

@@ -62,10 +62,6 @@ class FaceMeans {
       place_[result_.nodes[k]] = -1;
     result_.start.push_back(static_cast<int>(result_.nodes.size()));
   }
-  void leave_out() {
-    result_.at_front.push_back(0);
-    result_.start.push_back(static_cast<int>(result_.nodes.size()));
-  }
   FaceOperators take() { return std::move(result_); }
 
  private:
@@ -148,13 +144,10 @@ class FaceMeans {
 } // namespace
 
 FaceOperators face_operators(const topology::CellComplex& cells, const Problem& problem, const Spheres& spheres,
-                             const NodalSupports& supports, const std::vector<char>& wanted) {
+                             const NodalSupports& supports) {
   FaceMeans means(cells, problem, spheres, supports);
   for (int f = 0; f < std::ssize(cells.faces); ++f)
-    if (wanted[cells.faces[f].first] != 0 || wanted[cells.faces[f].second] != 0)
-      means.add_face(f);
-    else
-      means.leave_out();
+    means.add_face(f);
   return means.take();
 }
 

@@ -16,9 +16,8 @@ struct FaceOperators {
   std::vector<char> at_front;    // per face: near the front of a cut, in the reach of an enriched basis
 };
 
-/// Of all faces, or of those of the cells of the nodes marked in `wanted`; the others' rows are empty. Throws
-/// NumericalError when a face has no sound support.
+/// Throws NumericalError when a face has no sound support.
 FaceOperators face_operators(const topology::CellComplex& cells, const Problem& problem, const Spheres& spheres,
-                             const NodalSupports& supports, const std::vector<char>& wanted);
+                             const NodalSupports& supports);
 
 } // namespace spherecut::solvers

@@ -3,6 +3,7 @@
 #include "solvers/algebra/dense_cholesky.hpp"
 #include "solvers/algebra/dense_products.hpp"
 #include "solvers/finite/cut_functions.hpp"
+#include "solvers/points/weighed_gradients.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/base/interruption.hpp"
 
@@ -230,32 +231,15 @@ void BorderedOperator::append_elastic(const UniformTangent& uniform, MatrixX& co
         take(host, functions);
     }
     if (!functions.empty()) {
-      const auto points = static_cast<Eigen::Index>(point_lanes) * (end - first);
       const Eigen::Index spheres = std::ssize(nodes), all = spheres + std::ssize(functions);
-      MatrixX weighed = MatrixX::Zero(points, 3 * all); // gradients, times the root of the weight
-      for (int group = first; group < end; ++group) {
-        double root[point_lanes];
-        for (int lane = 0; lane < point_lanes; ++lane)
-          root[lane] = std::sqrt(table.weights[group].value[lane]);
-        const auto row = static_cast<Eigen::Index>(point_lanes) * (group - first);
-        for (int slot = table.start[group]; slot < table.start[group + 1]; ++slot) {
-          const LaneValues* const g = table.gradients.data() + 3 * static_cast<std::size_t>(slot);
-          const auto add_to = [&](Eigen::Index column) {
-            for (int c = 0; c < 3; ++c) {
-              double* const to = &weighed(row, 3 * column + c);
-              for (int lane = 0; lane < point_lanes; ++lane)
-                to[lane] += root[lane] * g[c].value[lane];
-            }
-          };
-          const int function = table.nodes[slot];
-          add_to(place[body_.node_of(function)]);
-          if (function < base_)
-            continue;
-          add_to(spheres + place[function]);
-          if (const int host = body_.cut_functions()->host_of(function - base_); host >= base_)
-            add_to(spheres + place[host]);
-        }
-      }
+      const MatrixX weighed = weighed_gradients(table, first, end, all, [&](int function, const auto& add) {
+        add(place[body_.node_of(function)]);
+        if (function < base_)
+          return;
+        add(spheres + place[function]);
+        if (const int host = body_.cut_functions()->host_of(function - base_); host >= base_)
+          add(spheres + place[host]);
+      });
       const MatrixX beyond = weighed.rightCols(3 * std::ssize(functions));
       MatrixX moments = MatrixX::Zero(3 * all, beyond.cols());
       add_product(1, weighed, true, beyond, moments);

@@ -364,7 +364,7 @@ PointTable CutFunctions::tabulate(BackgroundCells& cells) const {
   cells = {};
   for (const int cell : boxes.cells_by_place()) {
     const BoxShapes& shapes = boxes.cells()[cell];
-    BackgroundBox box{shapes.centre, shapes.half, 0, static_cast<int>(cells.start.size()) - 1, 0};
+    BackgroundBox box{shapes.centre, shapes.half, static_cast<int>(cells.start.size()) - 1, 0};
     for (const std::vector<Place>& side : sides_of(cell)) {
       append_groups(cell, side, static_cast<int>(cells.start.size()) - 1, table);
       for (const Place& place : side)

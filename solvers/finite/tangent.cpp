@@ -4,11 +4,11 @@
 #include "solvers/algebra/elimination_order.hpp"
 #include "solvers/algebra/parallel.hpp"
 #include "solvers/elasticity/function_law.hpp"
+#include "solvers/points/weighed_gradients.hpp"
 #include "topology/base/errors.hpp"
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <fmt/format.h>
 #include <limits>
 #include <numeric>
@@ -328,22 +328,8 @@ void FiniteTangent::cell_moments(int first, int end, std::vector<int>& place, Lo
     place[nodes[i]] = i;
     local.ranks.push_back(rank_[nodes[i]]);
   }
-  const auto points = static_cast<Eigen::Index>(point_lanes) * (end - first);
-  MatrixX weighed = MatrixX::Zero(points, 3 * std::ssize(nodes)); // gradients, times the root of the weight
-  for (int group = first; group < end; ++group) {
-    double root[point_lanes];
-    for (int lane = 0; lane < point_lanes; ++lane)
-      root[lane] = std::sqrt(table.weights[group].value[lane]);
-    const std::span<const int> here = table.nodes_of(group);
-    const LaneValues* g = table.gradients_of(group);
-    for (std::size_t k = 0; k < here.size(); ++k)
-      for (int c = 0; c < 3; ++c) {
-        double* const to = &weighed(static_cast<Eigen::Index>(point_lanes) * (group - first), 3 * place[here[k]] + c);
-        for (int lane = 0; lane < point_lanes; ++lane)
-          to[lane] = root[lane] * g[3 * k + c].value[lane];
-      }
-  }
-  local.matrix = gram(weighed);
+  local.matrix = gram(
+      weighed_gradients(table, first, end, std::ssize(nodes), [&](int node, const auto& add) { add(place[node]); }));
   for (const int node : nodes)
     place[node] = -1;
 }

@@ -42,24 +42,24 @@ Material least_compressible(const Problem& problem) {
 
 class Galerkin final : public ElasticBody {
  public:
-  Galerkin(Problem problem, const DiscretisationOptions& options, bool is_factored = true)
+  Galerkin(Problem problem, const DiscretisationOptions& options)
       : ElasticBody(std::move(problem), Method::galerkin, galerkin_support_radius(problem, options), options.sight,
                     galerkin_lengths(least_compressible(problem))) {
     const Stopwatch assembly;
-    BackgroundOptions background = background_of(options);
-    background.regions = problem_.regions;
+    const BackgroundOptions background{.cell_size = options.cell_size,
+                                       .quadrature = options.quadrature,
+                                       .enriched = options.sight == SightRule::enriched,
+                                       .regions = problem_.regions};
     cells_ = background_cells(*problem_.domain, problem_.nodes, background, problem_.hiding().get(),
                               *BoxMemory::of(problem_.domain));
     if (problem_.regions != nullptr)
       find_materials();
     hold_surface();
-    assemble(options.unheld, !is_factored || !initial_stress(problem_).isZero(0));
+    assemble(options.unheld, !initial_stress(problem_).isZero(0));
     assemble_loads();
     report_.unknowns = 3 * problem_.nodes.size();
     report_.matrix_nonzeros = stiffness_.nonZeros();
     report_.assembly_seconds = assembly.seconds();
-    if (!is_factored)
-      return;
     const Stopwatch factor;
     factorisation_ = factor_ordered(stiffness_);
     report_.factor_nonzeros = factorisation_->nonzeros();
@@ -72,10 +72,7 @@ class Galerkin final : public ElasticBody {
   }
 
   Method method() const override { return Method::galerkin; }
-  OrderedStiffness stiffness() const {
-    return {stiffness_, order_, anchors_,         held_, cells_, spheres_, elastic_stiffness(),
-            shapes_,    loads_, !dropped_.empty()};
-  }
+  OrderedStiffness stiffness() const { return {stiffness_, order_, anchors_}; }
 
   Field solve() const override {
     VectorX prescribed = prescribed_values(problem_);
@@ -278,7 +275,7 @@ class Galerkin final : public ElasticBody {
   std::vector<Anchor> anchors_;    // hold pieces that nothing else holds
   std::vector<int> order_;         // node of every elimination rank
   std::vector<int> rank_;          // elimination rank of every node
-  std::vector<CellShapes> shapes_; // of every cell
+  std::vector<CellShapes> shapes_; // of every cell; empty where no initial strain asks for them
   SparseMatrix stiffness_;         // lower triangle (diagonal blocks full), in ranks
   std::vector<double, InLargePages<double>>
       elastic_; // entries of stiffness_ without the penalties of the prescribed means
@@ -392,9 +389,9 @@ Galerkin::CellSums Galerkin::evaluate_cells(bool shapes_are_kept) {
     }
     parallel_ranges(shares, 1, [&](int share, int) {
       for (int k = 0; k < in_batch; ++k) {
-        tiles.add(workers[k].cluster, 1, share, shares);
+        tiles.add(workers[k].cluster, share, shares);
         if (are_several)
-          sums.volumetric->add(workers[k].volumetric, 1, share, shares);
+          sums.volumetric->add(workers[k].volumetric, share, shares);
       }
     });
   }
@@ -531,10 +528,6 @@ double galerkin_support_radius(const Problem& problem, const DiscretisationOptio
                                                           : problem.tuning.sphere_radius;
 }
 
-BackgroundOptions background_of(const DiscretisationOptions& options) {
-  return {options.cell_size, options.quadrature, options.sight == SightRule::enriched};
-}
-
 std::vector<double> NodeCloud::*galerkin_lengths(const Material& material) {
   return is_nearly_incompressible(material) ? &NodeCloud::spacings : &NodeCloud::reaches;
 }
@@ -547,23 +540,10 @@ double constraint_stiffness(const Problem& problem, int node) {
   return problem.tuning.holding * modulus * spacing;
 }
 
-namespace {
-
-void check_galerkin(const Problem& problem) {
+std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
   require_domain(problem);
   if (problem.hiding() != nullptr)
     require_one_material(problem, "a cut, or a narrow gap of the surface,");
-}
-
-} // namespace
-
-std::unique_ptr<Discretisation> assemble_galerkin(Problem problem, const DiscretisationOptions& options) {
-  check_galerkin(problem);
-  return std::make_unique<Galerkin>(std::move(problem), options, false);
-}
-
-std::unique_ptr<Discretisation> make_galerkin(Problem problem, const DiscretisationOptions& options) {
-  check_galerkin(problem);
   return std::make_unique<Galerkin>(std::move(problem), options);
 }
 

@@ -13,7 +13,7 @@ using Lanes = double __attribute__((vector_size(8 * tile_nodes), aligned(8), may
 // three rows and three factors are as many registers as AVX2 has.
 __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
 add_to_tile(const double* rows, std::uint64_t row_points, const double* columns, const std::uint64_t* column_points,
-            double sign, StiffnessTile& tile) {
+            StiffnessTile& tile) {
   for (int column = 0; column < tile_nodes; ++column) {
     std::uint64_t points = row_points & column_points[column];
     if (points == 0)
@@ -38,15 +38,15 @@ add_to_tile(const double* rows, std::uint64_t row_points, const double* columns,
       zz += z * jz;
     }
     const auto plane = [&](int p) -> Lanes& { return *reinterpret_cast<Lanes*>(tile.plane[column][p]); };
-    plane(0) += sign * xx;
-    plane(1) += sign * xy;
-    plane(2) += sign * xz;
-    plane(3) += sign * yx;
-    plane(4) += sign * yy;
-    plane(5) += sign * yz;
-    plane(6) += sign * zx;
-    plane(7) += sign * zy;
-    plane(8) += sign * zz;
+    plane(0) += xx;
+    plane(1) += xy;
+    plane(2) += xz;
+    plane(3) += yx;
+    plane(4) += yy;
+    plane(5) += yz;
+    plane(6) += zx;
+    plane(7) += zy;
+    plane(8) += zz;
   }
 }
 

@@ -15,10 +15,10 @@ struct StiffnessTile {
   alignas(32) double plane[tile_nodes][9][tile_nodes];
 };
 
-/// tile += sign * sum over points. `rows` and `columns` hold `gradients_at_point` values a point, multiplied by
+/// tile += sum over points. `rows` and `columns` hold `gradients_at_point` values a point, multiplied by
 /// sqrt(w_q). Bit q of `row_points`: some row node reaches point q; of column_points[J]: column node J does. Points
 /// that either does not reach are not looked at; where the one reaches and the other does not, its zeros are.
 void add_to_tile(const double* rows, std::uint64_t row_points, const double* columns,
-                 const std::uint64_t* column_points, double sign, StiffnessTile& tile);
+                 const std::uint64_t* column_points, StiffnessTile& tile);
 
 } // namespace spherecut::solvers

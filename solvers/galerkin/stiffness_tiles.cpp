@@ -96,7 +96,7 @@ int StiffnessTiles::Column::add(int group) {
   return static_cast<int>(groups.size()) - 1;
 }
 
-void StiffnessTiles::add(const CellCluster& cluster, double sign, int share, int shares) {
+void StiffnessTiles::add(const CellCluster& cluster, int share, int shares) {
   std::vector<int>& place = place_in_column(columns_.size());
   for (std::size_t c = 0; c < cluster.members_.size(); ++c) {
     const CellCluster::Group& own = cluster.members_[c];
@@ -111,7 +111,7 @@ void StiffnessTiles::add(const CellCluster& cluster, double sign, int share, int
         continue;
       if (place[other.id] < 0)
         place[other.id] = column.add(other.id);
-      add_to_tile(cluster.gradients_[r].at, other.reached, cluster.gradients_[c].at, own.by_node.data(), sign,
+      add_to_tile(cluster.gradients_[r].at, other.reached, cluster.gradients_[c].at, own.by_node.data(),
                   column.tiles[place[other.id]]);
     }
     for (const int group : column.groups)

@@ -58,23 +58,9 @@ class StiffnessTiles {
 
   [[nodiscard]] const NodeGroups& groups() const { return groups_; }
 
-  /// Adds a cluster of cells times `sign`. Of several threads each may add its `share` of every cluster, in the same
-  /// order: the sums do not depend on how many shares there are.
-  void add(const CellCluster& cluster, double sign = 1, int share = 0, int shares = 1);
-  /// Adds cells one after another, in clusters.
-  template <typename Cells>
-  void add_all(const Cells& cells, double sign = 1) {
-    CellCluster cluster(groups_);
-    for (const CellShapes* cell : cells) {
-      if (!cluster.has_room_for(*cell)) {
-        add(cluster, sign);
-        cluster.clear();
-      }
-      cluster.add(*cell);
-    }
-    if (!cluster.empty())
-      add(cluster, sign);
-  }
+  /// Adds a cluster of cells. Of several threads each may add its `share` of every cluster, in the same order: the sums
+  /// do not depend on how many shares there are.
+  void add(const CellCluster& cluster, int share = 0, int shares = 1);
   /// Adds the penalty `factor` N/m of the components of a mean, m m^T, kept apart from the rest.
   void add_held(const DisplacementMean& mean, const std::array<bool, 3>& components, double factor);
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <limits>
 #include <set>
 
@@ -102,44 +101,11 @@ SpacingField local_field(const SpacingField& spacing, const BoundingBox& box) {
 
 } // namespace
 
-SprinkleIncrement merged(const SprinkleIncrement& first, const SprinkleIncrement& then, int count) {
-  SprinkleIncrement both{first.removed, {}, then.touched};
-  std::vector<int> origin; // of a node between the two: before the first, or count + its place in what that added
-  auto removed = first.removed.begin();
-  for (int i = 0; i < count; ++i) {
-    if (removed != first.removed.end() && *removed == i)
-      ++removed;
-    else
-      origin.push_back(i);
-  }
-  for (int k = 0; k < first.added.size(); ++k)
-    origin.push_back(count + k);
-  std::vector<char> stays(static_cast<std::size_t>(first.added.size()), 1);
-  for (const int node : then.removed) {
-    const int from = origin.at(static_cast<std::size_t>(node));
-    if (from < count)
-      both.removed.push_back(from);
-    else
-      stays[static_cast<std::size_t>(from - count)] = 0;
-  }
-  std::sort(both.removed.begin(), both.removed.end());
-  for (int k = 0; k < first.added.size(); ++k)
-    if (stays[static_cast<std::size_t>(k)] != 0)
-      both.added.add(first.added, k);
-  for (int k = 0; k < then.added.size(); ++k)
-    both.added.add(then.added, k);
-  return both;
-}
-
 SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const SprinkleOptions& options,
-                                    const NodeCloud& previous, const topology::Incision* before,
-                                    const std::vector<bool>& retired) {
+                                    const NodeCloud& previous, const topology::Incision* before) {
   check_options(options);
   if (!options.incision)
     throw InputError("extend_sprinkling: options.incision is null; it must be the cut as it is now");
-  if (!retired.empty() && std::ssize(retired) != previous.size())
-    throw InputError(fmt::format("extend_sprinkling: {} nodes are marked retired or not; there are {} nodes",
-                                 retired.size(), previous.size()));
   SprinkleIncrement increment;
   const BoundingBox region = changed_region(before, *options.incision, domain, options.spacing);
   if ((region.lower.array() > region.upper.array()).any())
@@ -157,7 +123,7 @@ SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const Sprink
   std::vector<int> ids;
   std::vector<bool> fixed;
   for (int j = 0; j < previous.size(); ++j)
-    if (const Vector3& x = previous.positions[j]; (retired.empty() || !retired[j]) && context.contains(x)) {
+    if (const Vector3& x = previous.positions[j]; context.contains(x)) {
       around.add(previous, j);
       ids.push_back(j);
       // Lips outside the region too: their pairs are not chosen anew, and the search for pairs has to know them.

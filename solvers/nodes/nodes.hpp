@@ -142,20 +142,14 @@ struct SprinkleIncrement {
   SprinkleZone touched;     // expected number and density of the region that was looked at
 };
 
-/// One increment that does what `first`, of a cloud of `count` nodes, and `then` do one after the other. Its `touched`
-/// is that of the latter.
-SprinkleIncrement merged(const SprinkleIncrement& first, const SprinkleIncrement& then, int count);
-
 /// The fast variant of resprinkle for a cut that has grown: looks at what lies within two spacings of the sheets' new
 /// triangles alone. Nodes there that the new sheet crowds go, those farther away are left as they are; lip pairs stay
 /// where they are when the front moves on, a ring ahead moves with it, new pairs and nodes fill what has become
 /// empty. options.incision is the cut as it is now, `before` as it was (null: uncut); options.spacing must be the field
-/// that `previous` was placed with, fine where the cut goes. Nodes marked in `retired` (one entry a node, or empty)
-/// have been removed by earlier increments: the ids of the others stay valid. Throws as sprinkle does, of the density
-/// in the region alone.
+/// that `previous` was placed with, fine where the cut goes. Throws as sprinkle does, of the density in the
+/// region alone.
 SprinkleIncrement extend_sprinkling(const topology::Domain& domain, const SprinkleOptions& options,
-                                    const NodeCloud& previous, const topology::Incision* before,
-                                    const std::vector<bool>& retired = {});
+                                    const NodeCloud& previous, const topology::Incision* before);
 
 /// Piece of each node: nodes closer than twice the mean of their spacings that see each other belong together. Pieces
 /// are numbered by falling number of nodes, then by their first node.

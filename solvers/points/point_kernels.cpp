@@ -7,6 +7,45 @@ namespace {
 /// A number of each point; narrower machines take it in parts.
 using PointPack = double __attribute__((vector_size(8 * point_lanes), may_alias));
 
+/// (1, scale (x_k - x)) at the points of a group, zero where the gradient of node k is.
+class LinearBasis {
+ public:
+  [[gnu::always_inline]] LinearBasis(const int* nodes, const LaneValues* gradients, const Vector3* places,
+                                     const Vector3* points, double scale)
+      : nodes_(nodes), gradients_(reinterpret_cast<const PointPack*>(gradients)), places_(places), scale_(scale) {
+    for (int lane = 0; lane < point_lanes; ++lane)
+      for (int axis = 0; axis < 3; ++axis)
+        points_[axis][lane] = points[lane][axis];
+  }
+
+  [[gnu::always_inline]] void at(int k, PointPack* basis) const {
+    const PointPack none{}, one = none + 1.0;
+    const PointPack* g = gradients_ + 3 * static_cast<long>(k);
+    const PointPack reached = ((g[0] != none) | (g[1] != none) | (g[2] != none)) ? one : none;
+    const Vector3& place = places_[nodes_[k]];
+    basis[0] = reached;
+    for (int axis = 0; axis < 3; ++axis)
+      basis[1 + axis] = reached * scale_ * (place[axis] - points_[axis]);
+  }
+
+  /// `inverse` times the moments of a function.
+  [[gnu::always_inline]] static void times(const LaneValues* inverse, const PointPack* moments, PointPack* product) {
+    const auto* m = reinterpret_cast<const PointPack*>(inverse);
+    const PointPack* a = moments;
+    product[0] = m[0] * a[0] + m[1] * a[1] + m[2] * a[2] + m[3] * a[3];
+    product[1] = m[1] * a[0] + m[4] * a[1] + m[5] * a[2] + m[6] * a[3];
+    product[2] = m[2] * a[0] + m[5] * a[1] + m[7] * a[2] + m[8] * a[3];
+    product[3] = m[3] * a[0] + m[6] * a[1] + m[8] * a[2] + m[9] * a[3];
+  }
+
+ private:
+  const int* nodes_;
+  const PointPack* gradients_;
+  const Vector3* places_;
+  double scale_;
+  PointPack points_[3]{};
+};
+
 } // namespace
 
 __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
@@ -85,45 +124,27 @@ group_forces(int count, const LaneValues* gradients, const LaneValues* stress, d
 __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
 take_linear(const int* nodes, int count, const LaneValues* gradients, const Vector3* places, const Vector3* points,
             double scale, const LaneValues* inverse, const double* vectors, LaneValues* change) {
-  PointPack x{}, y{}, z{};
-  for (int lane = 0; lane < point_lanes; ++lane) {
-    x[lane] = points[lane].x();
-    y[lane] = points[lane].y();
-    z[lane] = points[lane].z();
-  }
-  const auto* g = reinterpret_cast<const PointPack*>(gradients);
-  const PointPack none{}, one = none + 1.0;
+  const LinearBasis linear(nodes, gradients, places, points, scale);
   PointPack moments[3][4]{};
   for (int k = 0; k < count; ++k) {
-    const Vector3& at = places[nodes[k]];
-    const PointPack in = ((g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none)) ? one : none;
-    const PointPack px = in * scale * (at.x() - x), py = in * scale * (at.y() - y), pz = in * scale * (at.z() - z);
+    PointPack p[4];
+    linear.at(k, p);
     const double* v = vectors + 3 * static_cast<long>(nodes[k]);
-    for (int axis = 0; axis < 3; ++axis) {
-      moments[axis][0] += v[axis] * in;
-      moments[axis][1] += v[axis] * px;
-      moments[axis][2] += v[axis] * py;
-      moments[axis][3] += v[axis] * pz;
-    }
+    for (int axis = 0; axis < 3; ++axis)
+      for (int j = 0; j < 4; ++j)
+        moments[axis][j] += v[axis] * p[j];
   }
-  const auto* m = reinterpret_cast<const PointPack*>(inverse);
-  PointPack linear[3][4];
-  for (int axis = 0; axis < 3; ++axis) {
-    const PointPack* a = moments[axis];
-    linear[axis][0] = m[0] * a[0] + m[1] * a[1] + m[2] * a[2] + m[3] * a[3];
-    linear[axis][1] = m[1] * a[0] + m[4] * a[1] + m[5] * a[2] + m[6] * a[3];
-    linear[axis][2] = m[2] * a[0] + m[5] * a[1] + m[7] * a[2] + m[8] * a[3];
-    linear[axis][3] = m[3] * a[0] + m[6] * a[1] + m[8] * a[2] + m[9] * a[3];
-  }
+  PointPack fit[3][4];
+  for (int axis = 0; axis < 3; ++axis)
+    LinearBasis::times(inverse, moments[axis], fit[axis]);
   auto* out = reinterpret_cast<PointPack*>(change);
   for (int k = 0; k < count; ++k) {
-    const Vector3& at = places[nodes[k]];
-    const PointPack in = ((g[3 * k] != none) | (g[3 * k + 1] != none) | (g[3 * k + 2] != none)) ? one : none;
-    const PointPack px = scale * (at.x() - x), py = scale * (at.y() - y), pz = scale * (at.z() - z);
+    PointPack p[4];
+    linear.at(k, p);
     const double* v = vectors + 3 * static_cast<long>(nodes[k]);
     for (int axis = 0; axis < 3; ++axis) {
-      const PointPack* l = linear[axis];
-      out[3 * k + axis] = in * (v[axis] - l[0] - l[1] * px - l[2] * py - l[3] * pz);
+      const PointPack* l = fit[axis];
+      out[3 * k + axis] = p[0] * (v[axis] - l[0] - l[1] * p[1] - l[2] * p[2] - l[3] * p[3]);
     }
   }
 }
@@ -131,16 +152,8 @@ take_linear(const int* nodes, int count, const LaneValues* gradients, const Vect
 __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4"))) void
 linear_leftover(const int* nodes, int count, const LaneValues* gradients, const Vector3* places, const Vector3* points,
                 double scale, const LaneValues* inverse, const LaneValues& weights, double* matrix) {
-  PointPack x{}, y{}, z{};
-  for (int lane = 0; lane < point_lanes; ++lane) {
-    x[lane] = points[lane].x();
-    y[lane] = points[lane].y();
-    z[lane] = points[lane].z();
-  }
-  const auto* g = reinterpret_cast<const PointPack*>(gradients);
-  const auto* m = reinterpret_cast<const PointPack*>(inverse);
+  const LinearBasis linear(nodes, gradients, places, points, scale);
   const PointPack w = *reinterpret_cast<const PointPack*>(&weights);
-  const PointPack none{}, one = none + 1.0;
   const auto sum = [](const PointPack& pack) {
     double all = 0;
     for (int lane = 0; lane < point_lanes; ++lane)
@@ -148,25 +161,16 @@ linear_leftover(const int* nodes, int count, const LaneValues* gradients, const 
     return all;
   };
   for (int k = 0; k < count; ++k) {
-    const auto polynomial = [&](int of, PointPack* p) {
-      const PointPack in = ((g[3 * of] != none) | (g[3 * of + 1] != none) | (g[3 * of + 2] != none)) ? one : none;
-      const Vector3& at = places[nodes[of]];
-      p[0] = in;
-      p[1] = in * scale * (at.x() - x);
-      p[2] = in * scale * (at.y() - y);
-      p[3] = in * scale * (at.z() - z);
-    };
     PointPack p[4], q[4];
-    polynomial(k, p);
-    q[0] = w * (m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3] * p[3]);
-    q[1] = w * (m[1] * p[0] + m[4] * p[1] + m[5] * p[2] + m[6] * p[3]);
-    q[2] = w * (m[2] * p[0] + m[5] * p[1] + m[7] * p[2] + m[8] * p[3]);
-    q[3] = w * (m[3] * p[0] + m[6] * p[1] + m[8] * p[2] + m[9] * p[3]);
+    linear.at(k, p);
+    LinearBasis::times(inverse, p, q);
+    for (PointPack& entry : q)
+      entry *= w;
     const PointPack own = w * p[0] - q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3];
     matrix[count * k + k] = sum(own);
     for (int l = 0; l < k; ++l) {
       PointPack other[4];
-      polynomial(l, other);
+      linear.at(l, other);
       const PointPack both = q[0] * other[0] + q[1] * other[1] + q[2] * other[2] + q[3] * other[3];
       matrix[count * k + l] = matrix[count * l + k] = -sum(both);
     }

@@ -40,9 +40,9 @@ class BoxFiller {
         has_walls_(incision != nullptr && incision->cut_sheets() < std::ssize(incision->sheets())), cells_(cells),
         known_(std::move(known)) {}
 
-  /// `spacing`: of the nodes about the box; `distance`: signed distance of its centre to the surface.
-  void fill(const Vector3& centre, const Vector3& half, double spacing, double distance) {
-    BackgroundBox box{centre, half, spacing, static_cast<int>(cells_.start.size()) - 1, 0};
+  /// `distance`: signed distance of its centre to the surface.
+  void fill(const Vector3& centre, const Vector3& half, double distance) {
+    BackgroundBox box{centre, half, static_cast<int>(cells_.start.size()) - 1, 0};
     const bool is_deep = distance < -half.norm();
     BoxMemory::Box* const at_surface = known_ != nullptr && !is_deep ? &remembered(centre, half) : nullptr;
     const bool inside = is_deep || (at_surface != nullptr ? at_surface->inside : corners_inside(centre, half));
@@ -572,14 +572,16 @@ class Octree {
           }
       return;
     }
-    filler_.fill(centre, half, spacing, distance);
+    filler_.fill(centre, half, distance);
   }
 
   bool holds_finer_node(const Vector3& centre, const Vector3& half) {
     found_.clear();
     tree_.within(centre, half.norm(), found_);
     return std::any_of(found_.begin(), found_.end(), [&](const topology::PointTree::Found& node) {
-      return is_too_large({centre, half}, nodes_.positions[node.index], nodes_.spacings[node.index], options_);
+      const Vector3& x = nodes_.positions[node.index];
+      return ((x - centre).cwiseAbs().array() <= half.array()).all() &&
+             2 * half.maxCoeff() > finer_node_slack * options_.slack * options_.cell_size * nodes_.spacings[node.index];
     });
   }
 
@@ -648,19 +650,6 @@ std::shared_ptr<BoxMemory> BoxMemory::of(const std::shared_ptr<const topology::D
   if (memory == nullptr)
     memory = std::make_shared<BoxMemory>();
   return memory;
-}
-
-bool is_too_large(const BackgroundBox& box, const Vector3& x, double spacing, const BackgroundOptions& options) {
-  return ((x - box.centre).cwiseAbs().array() <= box.half.array()).all() &&
-         2 * box.half.maxCoeff() > finer_node_slack * options.slack * options.cell_size * spacing;
-}
-
-void refill_box(const topology::Domain& domain, const BackgroundBox& box, const BackgroundOptions& options,
-                const topology::Incision* incision, BackgroundCells& out) {
-  out.start.assign(1, 0);
-  out.points.clear();
-  out.boxes.clear();
-  BoxFiller(domain, options, incision, out).fill(box.centre, box.half, box.spacing, domain.signed_distance(box.centre));
 }
 
 } // namespace spherecut::solvers

@@ -16,7 +16,6 @@ struct QuadraturePoint {
 /// A leaf of the octree, m. Cells first_cell .. last_cell - 1 share it out: one, or several where a sheet divides it.
 struct BackgroundBox {
   Vector3 centre, half;
-  double spacing = 0; // of the nodes about it
   int first_cell = 0, last_cell = 0;
 };
 
@@ -52,15 +51,6 @@ struct BackgroundOptions {
 /// each is exact for 1 / r where its centroid is up to 20 % off.
 BackgroundCells background_cells(const topology::Domain& domain, const NodeCloud& nodes,
                                  const BackgroundOptions& options = {}, const topology::Incision* incision = nullptr);
-
-/// The cells of one box of an octree whose cut has changed since, as background_cells would make them; replaces what
-/// `out` held.
-void refill_box(const topology::Domain& domain, const BackgroundBox& box, const BackgroundOptions& options,
-                const topology::Incision* incision, BackgroundCells& out);
-
-/// Whether a box of the octree is larger than it would be made with a node of this spacing at x; false when x lies
-/// outside it.
-bool is_too_large(const BackgroundBox& box, const Vector3& x, double spacing, const BackgroundOptions& options);
 
 /// Most points of one cell.
 inline constexpr int most_cell_points = 27;

@@ -17,7 +17,6 @@ void CellEvaluator::evaluate(std::span<const QuadraturePoint> points, CellShapes
   cell.points = static_cast<int>(points.size());
   cell.stride =
       (cell.points + shape_kernel::points_together - 1) / shape_kernel::points_together * shape_kernel::points_together;
-  cell.growth = 1;
   cell.nodes.clear();
   cell.reached.clear();
   if (!evaluate_together(points, cell))
@@ -153,10 +152,7 @@ bool CellEvaluator::evaluate_altered(const Vector3& x, int q, CellShapes& cell) 
                                       spheres_.worst_condition(), shape))
       return true;
   }
-  if (!solvers::evaluate(spheres_, x, shape))
-    return false;
-  cell.growth = std::max(cell.growth, shape.growth);
-  return true;
+  return solvers::evaluate(spheres_, x, shape);
 }
 
 bool CellEvaluator::add_altered(std::span<const QuadraturePoint> points, CellShapes& cell) {
@@ -225,7 +221,6 @@ void CellEvaluator::evaluate_each(std::span<const QuadraturePoint> points, CellS
       throw NumericalError(fmt::format("the quadrature point ({:.6g}, {:.6g}, {:.6g}) m has {} supporting nodes: the "
                                        "nodes leave a hole there",
                                        x.x(), x.y(), x.z(), at_point_[q].size()));
-    cell.growth = std::max(cell.growth, at_point_[q].growth);
     for (int node : at_point_[q].nodes)
       if (place_[node] < 0) {
         place_[node] = 0;

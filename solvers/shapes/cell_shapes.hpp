@@ -14,7 +14,6 @@ struct CellShapes {
   std::vector<std::uint32_t> reached; // bit q: the node supports point q; nodes without a common bit do not couple
   int points = 0;
   int stride = 0;                // room for the points, a multiple of 8
-  double growth = 1;             // of the radii for a point of it that the spheres as they are do not support
   std::vector<double> gradients; // [node][axis][stride], 1/m times sqrt(weight); zero in the room that is left
   /// Of the k-th node at point q.
   [[nodiscard]] Vector3 gradient(std::size_t k, int q) const {

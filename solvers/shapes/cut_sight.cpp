@@ -133,16 +133,9 @@ CutSight::CutSight(const Sight& sight, const std::vector<Vector3>& centres, cons
                                  "positive and the part in [0, 1)",
                                  sight_.blend, sight_.reach));
   if (sight_.rule != SightRule::visibility) {
-    std::vector<Vector3> present;
-    std::vector<double> spacing_of;
-    for (std::size_t j = 0; j < centres.size(); ++j)
-      if (radii[j] > 0) {
-        present.push_back(centres[j]);
-        spacing_of.push_back(spacings[j]);
-      }
-    const topology::PointTree tree(present);
+    const topology::PointTree tree(centres);
     double largest = 0;
-    const auto spacing_at = [&](const Vector3& x) { return spacing_of[tree.nearest(x).index]; };
+    const auto spacing_at = [&](const Vector3& x) { return spacings[tree.nearest(x).index]; };
     for (const topology::FrontSegment& segment : sight_.incision->front()) {
       const std::array<double, 2>& ends =
           front_spacing_.emplace_back(std::array{spacing_at(segment.from), spacing_at(segment.to)});
@@ -160,8 +153,7 @@ void CutSight::update_radii(const std::vector<Vector3>& centres, const std::vect
   concern_.assign(centres.size(), 0);
   smallest_radius_ = std::numeric_limits<double>::infinity();
   for (double radius : radii)
-    if (radius > 0) // a node without a sphere does not count
-      smallest_radius_ = std::min(smallest_radius_, radius);
+    smallest_radius_ = std::min(smallest_radius_, radius);
   for (std::size_t j = 0; j < centres.size(); ++j) {
     if (sight_.incision->near(centres[j], radii[j])) {
       concern_[j] |= touches_sheet;

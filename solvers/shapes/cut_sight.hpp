@@ -55,11 +55,6 @@ class CutSight {
 
   [[nodiscard]] bool concerns(int node) const { return concern_[node] != 0; }
 
-  /// Whether the branch functions at a node are those that `other` knows.
-  [[nodiscard]] bool has_branch_of(const CutSight& other, int node) const {
-    const auto j = static_cast<std::size_t>(node);
-    return branch_.empty() || (j < other.branch_.size() && branch_[j].value == other.branch_[j].value);
-  }
   /// Whether x lies in the reach of the enrichment.
   [[nodiscard]] bool enriches(const Vector3& x) const;
 

@@ -104,10 +104,8 @@ bool evaluate_grown(const Kernel& kernel, const Spheres& spheres, const Vector3&
   double factor = 1;
   for (int step = 0; step < growth_steps_at_point; ++step) {
     collect_grown(spheres, x, factor *= radius_growth, memory.support);
-    if (evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out)) {
-      out.growth = factor;
+    if (evaluate_support(kernel, memory.support, spheres.basis(), second, spheres.worst_condition(), out))
       return true;
-    }
   }
   return nothing(out);
 }
@@ -121,11 +119,8 @@ bool evaluate_grown_near_cut(const Kernel& kernel, const Spheres& spheres, const
     const int steps = enrich == CutSight::Enrich::never ? growth_steps_at_point + 1 : growth_steps_at_point;
     for (int step = 0; step < steps; ++step) {
       collect_grown(spheres, x, factor *= radius_growth, memory.support);
-      if (spheres.cut()->evaluate(kernel, x, memory.support, true, second, 0, spheres.worst_condition(), enrich, out)) {
-        out.growth = std::max(out.growth, factor);
+      if (spheres.cut()->evaluate(kernel, x, memory.support, true, second, 0, spheres.worst_condition(), enrich, out))
         return true;
-      }
-      out.growth = std::max(out.growth, factor); // what was tried decides, too
     }
   }
   return nothing(out);
@@ -161,16 +156,13 @@ std::optional<bool> evaluate_with_ramps(const Spheres& spheres, const Vector3& x
     SupportMemory memory(spheres.size());
     collect_grown(spheres, x, factor *= radius_growth, memory.support);
     outcome = ramps.evaluate(x, memory.support, spheres.worst_condition(), out);
-    out.growth = factor;
   }
   if (outcome == InterfaceRamps::Outcome::sound)
     return true;
-  out.growth = 1;
   return std::nullopt;
 }
 
 bool evaluate_point(const Kernel& kernel, const Spheres& spheres, const Vector3& x, bool second, ShapeFunctions& out) {
-  out.growth = 1;
   const SphereGrid::Cell cell = spheres.grid().find(x);
   SupportMemory memory(cell.padded);
   kernel.collect(cell, x.data(), memory.support);
@@ -244,14 +236,11 @@ double quartic_spline(double s) {
 struct Spheres::Growing {
   Spheres& spheres;
   const std::vector<double>& base; // m, radii that have not grown
-  const std::vector<char>& absent;
   // Near a front the nodes may be too few for the enriched basis: a support that stays so is left to the linear one.
   int enriched_growth;
   std::vector<int> wanted = std::vector<int>(base.size(), 0), level = wanted; // steps
   int round = 0;
   ShapeFunctions shape{};
-
-  [[nodiscard]] bool is_absent(int i) const { return !absent.empty() && absent[i] != 0; }
 
   [[nodiscard]] bool is_sound(int i, Support& support, bool grown) {
     const Kernel& kernel = shape_kernel::dispatched();
@@ -266,8 +255,6 @@ struct Spheres::Growing {
   std::vector<int> unsound_nodes() {
     std::vector<int> unsound;
     for (int i = 0; i < spheres.size(); ++i) {
-      if (is_absent(i))
-        continue;
       const Vector3& x = spheres.centres_[i];
       const SphereGrid::Cell cell = spheres.grid_->find(x);
       SupportMemory memory(cell.padded);
@@ -323,21 +310,19 @@ struct Spheres::Growing {
 };
 
 Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis,
-                 double worst_condition, const Sight& sight, const std::vector<char>& absent, const Spheres* before)
+                 double worst_condition, const Sight& sight)
     : centres_(std::move(centres)), basis_(basis), worst_condition_(worst_condition) {
   check(centres_, spacings, rho, basis, worst_condition);
   const int n = size();
   std::vector<double> base(n);
-  const auto is_absent = [&](int i) { return !absent.empty() && absent[i] != 0; };
   for (int i = 0; i < n; ++i)
-    base[i] = is_absent(i) ? 0 : rho * spacings[i];
+    base[i] = rho * spacings[i];
   if (sight.incision != nullptr && sight.radius_factor != 1)
     for (int i = 0; i < n; ++i)
       if (sight.incision->front_frame(centres_[i], sight.reach * spacings[i]))
         base[i] *= sight.radius_factor;
   radii_ = base;
-  const bool is_as_before = before != nullptr && before->centres_ == centres_ && before->radii_ == radii_;
-  grid_ = is_as_before ? before->grid_ : std::make_shared<const SphereGrid>(centres_, radii_);
+  grid_ = std::make_shared<const SphereGrid>(centres_, radii_);
   if (sight.incision != nullptr) {
     if (basis != Basis::linear)
       throw InputError("shape functions: spheres around a cut have the linear basis alone");
@@ -347,7 +332,7 @@ Spheres::Spheres(std::vector<Vector3> centres, const std::vector<double>& spacin
     cut_ = std::make_shared<CutSight>(sight, centres_, spacings, radii_);
   }
 
-  Growing growing{*this, base, absent, sight.enriched_growth};
+  Growing growing{*this, base, sight.enriched_growth};
   for (std::vector<int> unsound = growing.unsound_nodes(); !unsound.empty(); unsound = growing.unsound_nodes()) {
     while (!unsound.empty())
       unsound = growing.grow(unsound);

@@ -28,12 +28,9 @@ class Spheres {
   /// members or a moment matrix worse conditioned than `worst_condition`, the spheres around it grow by 1.25 until it
   /// is sound. Throws NumericalError naming the node when six steps do not help, InputError when there are fewer than
   /// basis + 2 nodes, a centre is not finite, a spacing, rho or worst_condition is not positive, an incision or regions
-  /// are given with the quadratic basis, or both of them. Nodes marked in `absent` (may be empty) have no sphere,
-  /// radius 0, and support nothing. `before` (may be null): spheres most of which may be the same; where all are, so is
-  /// their grid.
+  /// are given with the quadratic basis, or both of them.
   Spheres(std::vector<Vector3> centres, const std::vector<double>& spacings, double rho, Basis basis = Basis::linear,
-          double worst_condition = 1e9, const Sight& sight = {}, const std::vector<char>& absent = {},
-          const Spheres* before = nullptr);
+          double worst_condition = 1e9, const Sight& sight = {});
 
   [[nodiscard]] int size() const { return static_cast<int>(centres_.size()); }
   [[nodiscard]] const std::vector<Vector3>& centres() const { return centres_; }
@@ -76,7 +73,6 @@ struct ShapeFunctions {
   std::vector<double> dx, dy, dz;                   // gradient, 1/m
   std::vector<double> dxx, dyy, dzz, dxy, dxz, dyz; // 1/m2, filled by evaluate_second alone
   double moment_condition = 0;                      // 1-norm condition of the scaled moment matrix
-  double growth = 1;                                // of all radii, for this point alone
   std::vector<VectorTerm> vectors{}; // of a body with a cut that appends (Discretisation::shape_at alone)
   [[nodiscard]] int size() const { return static_cast<int>(nodes.size()); }
   [[nodiscard]] Vector3 gradient(int k) const { return {dx[k], dy[k], dz[k]}; }

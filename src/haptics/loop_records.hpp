@@ -33,7 +33,7 @@ struct SolveEvent {
   std::uint64_t pose_tick = 0;
   std::uint64_t arrival_tick = never; // tick that first used it; never: overtaken by a newer one, failed, or too late
   int degradation = 0;
-  bool swaps = false; // it takes over the body that has been made or condensed anew in the background
+  bool swaps = false; // it takes over the body that has been made in the background
   /// What follows the tool or a cut that is put off is made there (SessionOptions::following_in_background).
   bool in_background = false;
 };
@@ -53,7 +53,7 @@ struct SolveRecord {
   double blade_edge = 0, blade_release = 0; // N, of its edge alone; J/m2, of that on the front
   solvers::BladeLedger blade_account;       // J since the start
   int blade_contacts = 0;                   // pieces of the edge that press
-  double residual = 0;                      // of a body that has followed its cut by an update; 0: not looked at
+  double residual = 0;                      // of a body to which the cut has appended; 0: not looked at
   double cut_area = 0;                      // m2
   std::string_view update;                  // how the system came to the cut of this solve; empty: nothing was cut
   Vector3 force = Vector3::Zero();          // N, of the solve

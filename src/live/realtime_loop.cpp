@@ -131,7 +131,7 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
     const DeviceState state = shared.poses.front();
     for (; shared.way.waiting() > 0 && shared.way.front().tick < state.tick; shared.way.pop())
       simulation.pass(shared.way.front());
-    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved) && !simulation.recondensed() &&
+    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved) && !simulation.body_is_there() &&
         !simulation.has_put_off()) {
       feed.offer_again(simulation);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -145,7 +145,7 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
     }
     next = began + (session.pending().under_way ? std::max(interval, second / solves_beside) : interval);
     solved = state;
-    const SolveEvent event{++sequence,   state.tick, SolveEvent::never, rule.level(), simulation.recondensed(),
+    const SolveEvent event{++sequence,   state.tick, SolveEvent::never, rule.level(), simulation.body_is_there(),
                            in_background};
     ContactSnapshot& snapshot = shared.snapshots.back();
     const SolveRecord record = solve_recording(simulation, state, event, snapshot);

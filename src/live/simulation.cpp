@@ -67,7 +67,7 @@ void DegradationRule::solved(Rebuild rebuild, double seconds) {
 
 HapticSimulation::HapticSimulation(Scenario scenario, std::function<void(const std::string&)> say)
     : session_(std::move(scenario), std::move(say), Leader::device) {
-  session_.set_options({.force_only = true, .going_on = true, .tear_gradually = true, .recondensing = true});
+  session_.set_options({.force_only = true, .going_on = true, .tear_gradually = true});
   static_cast<void>(path());
   parked_ = parked_tool();
 }
@@ -200,17 +200,6 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   snapshot.solve_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-namespace {
-
-/// Of the blade's cut in this step or, if there was none, of the last increment of a tear.
-SystemUpdate update_of(const StepResult& result) {
-  if (result.cut->update != SystemUpdate::none || !result.tear)
-    return result.cut->update;
-  return result.tear->increments.back().body.update;
-}
-
-} // namespace
-
 SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
                             ContactSnapshot& snapshot) {
   const auto failed = [&](const std::exception& error) {
@@ -240,7 +229,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
   if (const auto& cut = simulation.result().cut) {
     record.cut_area = cut->area;
     record.residual = simulation.result().residual;
-    record.update = to_string(update_of(simulation.result()));
+    record.update = to_string(simulation.result().update());
     record.blade_force = cut->blade.force;
     record.blade_torque = cut->blade.torque;
     record.blade_edge = cut->blade.edge_force;

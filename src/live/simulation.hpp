@@ -48,9 +48,9 @@ class HapticSimulation {
   /// NumericalError or InputError as Session::step; the snapshot is then as before.
   void solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot);
 
-  /// Whether a body that has been condensed anew in the background waits to be taken over; and takes it over, after
-  /// waiting for it where need be (SessionOptions::recondensing).
-  [[nodiscard]] bool recondensed() const { return session_.pending().there; }
+  /// Whether a body that was made in the background waits to be taken over; and takes it over, after waiting for it
+  /// where need be.
+  [[nodiscard]] bool body_is_there() const { return session_.pending().there; }
   void swap_body() { session_.swap_body(); }
   [[nodiscard]] bool has_put_off() const { return session_.pending().put_off; }
   /// SessionOptions::following_in_background.

@@ -15,17 +15,8 @@
 namespace spherecut::app {
 namespace {
 
-constexpr int most_iterations = 300;   // of the contact: deep presses converge slowly
-constexpr double lip_tolerance = 1e-9; // m, lips this far through one another are in contact
-constexpr double largest_share = 0.8;  // of the nodes in a window that is worth its while
-// The same where blade.advance is above so many fine spacings: a window serves fewer increments. 1000 nodes, 0.23 to
-// 0.5 of them in the window, 0.3 spacings an increment: 50 to 65 ms of processor time a step with windows, 24 to 27
-// rebuilt.
-constexpr double long_advance = 0.2, largest_share_of_long = 0.2;
-// Nodes of a body of `collocation` that is followed: the dense L U of its window costs more than the sparse one of the
-// whole body beyond. A run of liver_cut_linear.toml (2000 nodes, increments of 10 mm) took 59 s of processor time with
-// windows and takes 27 s without; steps of 0.1 mm at 1000 nodes a third of the rebuild's time with them.
-constexpr int largest_followed_balance = 1200;
+constexpr int most_iterations = 300;     // of the contact: deep presses converge slowly
+constexpr double lip_tolerance = 1e-9;   // m, lips this far through one another are in contact
 constexpr double crowded_by_sheet = 0.3; // of the fine spacing: nearer to a sheet no node of a fixed region is kept
 constexpr double crowded_by_seed = 0.7;  // likewise, to a node that must be where it is
 constexpr int most_bank_rounds = 6;      // in which banks that have come to each other are held apart
@@ -308,59 +299,13 @@ solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Do
   return held.seeds.size() == options.seeds.size() ? made : solvers::resprinkle(domain, held, previous);
 }
 
-namespace {
-
-bool window_pays(const Scenario& scenario, const solvers::Problem& problem, const topology::SurfaceMesh& way) {
-  if (cut_appends(scenario)) // it has no window
-    return true;
-  const solvers::DiscretisationOptions method = method_of(scenario);
-  if (method.method == solvers::Method::collocation && problem.nodes.size() > largest_followed_balance)
-    return false;
-  const bool goes_far = scenario.blade && scenario.blade->advance.value_or(0) > long_advance;
-  return solvers::window_share(problem, method, way) <= (goes_far ? largest_share_of_long : largest_share);
-}
-
-} // namespace
-
-void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
-              const topology::SurfaceMesh& way_ahead, const std::vector<int>& candidates) {
+void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model) {
   require_linear(scenario.file, scenario.law);
   const solvers::DiscretisationOptions options = method_of(scenario);
   model.pairs = solvers::lip_pairs(model.sprinkling.nodes);
   solvers::Problem problem = problem_of(scenario, domain, model);
-  model.not_following = way_ahead.triangles.empty()                 ? "the body was built without a cut ahead"
-                        : window_pays(scenario, problem, way_ahead) ? ""
-                                                                    : too_much_of_body;
-  model.window_way = {};
-  model.added_nodes = 0;
-  model.window_seen.reset();
-  if (cut_appends(scenario)) {
-    model.not_following = "";
-    model.body = solvers::make_appended(std::move(problem), options, model.uncut);
-    return;
-  }
-  if (model.not_following[0] != '\0') {
-    model.body = solvers::discretise(std::move(problem), options);
-    return;
-  }
-  model.body = solvers::make_growable(
-      std::move(problem),
-      solvers::GrowthOptions{.method = options, .way = way_ahead, .contact = candidates, .room = growth_room});
-  model.window_way = way_ahead;
-}
-
-bool can_follow(const Scenario& scenario, const BodyModel& model, const topology::SurfaceMesh& way_ahead) {
-  return window_pays(scenario, model.body->problem(), way_ahead);
-}
-
-std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyModel& model,
-                                         const topology::SurfaceMesh& way_ahead, int in_one,
-                                         std::unique_ptr<Recondensing> after) {
-  return std::make_unique<Recondensing>(
-      model.body->problem(),
-      solvers::GrowthOptions{
-          .method = method_of(scenario), .way = way_ahead, .contact = model.patch.nodes, .room = growth_room},
-      model.patch.nodes, in_one, std::move(after));
+  model.body = cut_appends(scenario) ? solvers::make_appended(std::move(problem), options, model.uncut)
+                                     : solvers::discretise(std::move(problem), options);
 }
 
 std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model, bool severed) {
@@ -369,7 +314,7 @@ std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model
   if (model.sprinkling.walls != nullptr)
     return "the organ has narrow gaps of its own";
   if (scenario.method.method == solvers::Method::published)
-    return fmt::format("method {} is not updated", solvers::to_string(scenario.method.method));
+    return fmt::format("method {} makes all nodes anew", solvers::to_string(scenario.method.method));
   if (severed && scenario.cut.unheld == solvers::UnheldPieces::drop && !cut_appends(scenario))
     return "a severed piece has left the computation";
   return "";
@@ -406,30 +351,19 @@ solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const 
   return change;
 }
 
-solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
-                               const solvers::SprinkleIncrement& change,
-                               const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
-                               BodyModel& after, bool only_update) {
-  auto* body = dynamic_cast<solvers::Growable*>(before.body.get());
+std::string follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                       const solvers::SprinkleIncrement& change, BodyModel& before, BodyModel& after) {
+  if (before.body == nullptr)
+    return "the first cut";
+  auto* body = dynamic_cast<solvers::AppendedBody*>(before.body.get());
   if (body == nullptr)
-    return {before.body == nullptr ? "the first cut" : before.not_following, {}};
-  topology::SurfaceMesh way = before.window_way;
-  const auto new_way = [&] {
-    topology::SurfaceMesh ahead = way_ahead();
-    if (!ahead.triangles.empty())
-      way = ahead;
-    return ahead;
-  };
-  solvers::BodyGrowth growth = body->grow(change, problem_of(scenario, domain, after), new_way, only_update);
-  if (growth.uncovered[0] != '\0')
-    return growth;
+    return "the body is made anew behind its cut";
+  if (std::string why_not = body->grow(change, problem_of(scenario, domain, after)); !why_not.empty())
+    return why_not;
   after.pairs = solvers::lip_pairs(after.sprinkling.nodes);
-  after.window_way = std::move(way);
-  after.added_nodes = growth.update.condensed_anew ? 0 : before.added_nodes + change.added.size();
-  after.window_seen = growth.update.condensed_anew ? std::nullopt : before.window_seen;
   after.body = std::move(before.body);
   after.uncut = before.uncut;
-  return growth;
+  return "";
 }
 
 void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
@@ -441,8 +375,7 @@ void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few
     model.patch = {};
     model.base = model.body->solve();
   } else {
-    const bool knows_compliance = model.body->method() == solvers::Method::galerkin ||
-                                  dynamic_cast<solvers::Growable*>(model.body.get()) != nullptr;
+    const bool knows_compliance = model.body->method() == solvers::Method::galerkin;
     model.patch = for_few_presses && knows_compliance ? solvers::condense_without_fields(*model.body, candidates)
                                                       : solvers::condense(*model.body, candidates);
     model.base = model.patch.base;

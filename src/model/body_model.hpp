@@ -2,11 +2,10 @@
 // that a refused cut leaves the old one standing.
 #pragma once
 
+#include "solvers/body/elastic_body.hpp"
 #include "solvers/contact/lip_contact.hpp"
-#include "solvers/cut/growing_body.hpp"
 #include "solvers/finite/cut_lineage.hpp"
 #include "solvers/fracture/tearing.hpp"
-#include "src/model/recondensing.hpp"
 #include "src/model/rest_memo.hpp"
 #include "src/model/surface_watch.hpp"
 #include "src/scenario/scenario.hpp"
@@ -52,10 +51,6 @@ struct BodyModel {
   std::shared_ptr<FiniteModel> finite;             // in place of the body where the law is not linear
   std::shared_ptr<const solvers::UncutBody> uncut; // of a body whose cut only appends; it may serve the next one
   solvers::CutLineage lineage;                     // the same at finite strain
-  const char* not_following = "";                  // why the body cannot follow a cut; empty: it can
-  topology::SurfaceMesh window_way;                // of the cut, for which a body that follows it was condensed
-  int added_nodes = 0;                             // by updates since then
-  std::optional<topology::BladePose> window_seen;  // where the blade was when the window was last seen to cover its way
   solvers::Field base;                             // without tool and contact
   solvers::ContactPatch patch;                     // no nodes: the tool is far
   std::optional<SurfaceWatch> watch;               // of the surface about the patch; empty: not looked at yet
@@ -121,30 +116,13 @@ solvers::Sprinkling resprinkle_held(const Scenario& scenario, const topology::Do
 solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
                             const BodyModel& model);
 
-/// Assembles and factors the body of a scenario on the model's nodes and incision. With a way of the cut ahead the body
-/// is one that can follow it. Throws as solvers::discretise does.
-void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model,
-              const topology::SurfaceMesh& way_ahead = {}, const std::vector<int>& candidates = {});
+/// Assembles and factors the body of a scenario on the model's nodes and incision. Throws as solvers::discretise does.
+void assemble(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain, BodyModel& model);
 
-/// Reason not to follow: the window would hold more of the body than pays.
-inline constexpr const char* too_much_of_body = "the cut concerns too much of the body";
-
-/// The same: it is at finite strain.
+/// Reason not to follow: the body is at finite strain.
 inline constexpr const char* not_linear = "the law is not linear";
 
-/// Nodes that updates may add before a body is condensed anew.
-inline constexpr int growth_room = 150;
-
-/// Whether the window of a body that follows its cut along that way is worth its while.
-bool can_follow(const Scenario& scenario, const BodyModel& model, const topology::SurfaceMesh& way_ahead);
-
-/// Begins to condense the model's body anew on a thread of its own, as assemble() would for that way ahead. `in_one`,
-/// `after`: as Recondensing.
-std::unique_ptr<Recondensing> recondense(const Scenario& scenario, const BodyModel& model,
-                                         const topology::SurfaceMesh& way_ahead, int in_one,
-                                         std::unique_ptr<Recondensing> after);
-
-/// Why no body of this scenario on the nodes of `model` can follow its cut; empty: one can.
+/// Why nodes beside a cut cannot be exchanged alone in this scenario, on the nodes of `model`; empty: they can.
 std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model, bool severed);
 
 /// What a cut changes in the nodes of `before`: those beside the new part of the cut are exchanged, the others keep
@@ -152,13 +130,11 @@ std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model
 solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const solvers::SprinkleOptions& options,
                                           const BodyModel& before, solvers::Sprinkling& after);
 
-/// The body of `before` follows the cut to the nodes and incision of `after` and goes over to it; only what the cut
-/// touched is computed. Where it cannot (with `only_update`: not by an update alone), both models stay as they are and
-/// the growth says why. Throws as solvers::Growable::grow does, and all stays as it was.
-solvers::BodyGrowth follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
-                               const solvers::SprinkleIncrement& change,
-                               const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& before,
-                               BodyModel& after, bool only_update = false);
+/// The body of `before`, whose cut only appends, follows the cut to the nodes and incision of `after` and goes over to
+/// it. Where it cannot, both models stay as they are. Returns why; empty: it has followed. Throws as
+/// solvers::AppendedBody::grow does, and all stays as it was.
+std::string follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
+                       const solvers::SprinkleIncrement& change, BodyModel& before, BodyModel& after);
 
 /// Condenses the model onto tool candidates; none: the tool is far. Forgets the state. `for_few_presses`: without the
 /// fields of the patch where the method can do without (contact_solver.hpp).

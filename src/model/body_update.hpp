@@ -8,11 +8,10 @@
 namespace spherecut::app {
 
 enum class SystemUpdate : std::uint8_t {
-  none,           // nothing was cut
-  updated,        // only what the cut touched was computed
-  taken_over,     // made in the background, or updated on a body that had been condensed anew there
-  condensed_anew, // updated, after everything away from the predicted way had been eliminated anew
-  rebuilt,        // from scratch
+  none,       // nothing was cut
+  updated,    // what the cut appends was computed alone
+  taken_over, // made in the background
+  rebuilt,    // from scratch
 };
 std::string_view to_string(SystemUpdate update);
 

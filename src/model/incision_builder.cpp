@@ -244,27 +244,4 @@ void IncisionBuilder::take_back() {
     fields_ = std::make_unique<topology::CutFields>(options_.edge);
 }
 
-topology::SurfaceMesh IncisionBuilder::way_through(const std::vector<topology::BladePose>& poses,
-                                                   const topology::RestMap& to_rest) const {
-  topology::SurfaceMesh way;
-  if (!sweep_)
-    return way;
-  topology::BladeSweep ahead = *sweep_;
-  try {
-    for (const topology::BladePose& pose : poses)
-      for (const topology::AddedTriangles& added : ahead.move_to(pose, to_rest).added) {
-        const topology::SurfaceMesh sheet = ahead.sheets()[static_cast<std::size_t>(added.sheet)];
-        for (int t = added.first; t < added.first + added.count; ++t) {
-          const int first = static_cast<int>(way.vertices.size());
-          for (const int vertex : sheet.triangles[static_cast<std::size_t>(t)])
-            way.vertices.push_back(sheet.vertices[static_cast<std::size_t>(vertex)]);
-          way.triangles.push_back({first, first + 1, first + 2});
-        }
-      }
-  } catch (const std::exception&) { // as far as it can be told
-    return way;
-  }
-  return way;
-}
-
 } // namespace spherecut::app

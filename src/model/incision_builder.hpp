@@ -64,13 +64,6 @@ class IncisionBuilder {
   /// Takes the last growth back: the material there is whole again.
   void take_back();
 
-  /// Whether the blade goes on from where it is; else its next pose only places it.
-  [[nodiscard]] bool is_placed() const { return sweep_ && !sweep_->edge_at_rest().empty(); }
-
-  /// What the edge will sweep on its way through `poses`, in the rest frame; what cannot be mapped there is left out.
-  [[nodiscard]] topology::SurfaceMesh way_through(const std::vector<topology::BladePose>& poses,
-                                                  const topology::RestMap& to_rest) const;
-
  private:
   [[nodiscard]] std::vector<topology::SurfaceMesh> sheets() const;
   void add_own(topology::SurfaceMesh sheet);

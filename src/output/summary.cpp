@@ -161,7 +161,7 @@ OrderedJson tear(const RunFindings& findings) {
   const EnergyLedger& ledger = findings.tear.ledger;
   const std::optional<double> open = ledger.open_share();
   OrderedJson systems = OrderedJson::object();
-  for (const SystemUpdate update : {SystemUpdate::updated, SystemUpdate::condensed_anew, SystemUpdate::rebuilt}) {
+  for (const SystemUpdate update : {SystemUpdate::updated, SystemUpdate::rebuilt}) {
     const auto known = findings.tear_updates.find(update);
     systems[std::string(to_string(update))] = known == findings.tear_updates.end() ? 0 : known->second;
   }

@@ -12,9 +12,9 @@
 namespace spherecut::app {
 
 BladeCutting::BladeCutting(SessionState& state, BladeTrack& blade, ContactSolver& contact, const Grasping& grasping,
-                           BackgroundBodies& background, BodyUpdater& updater, WindowRenewal& renewal)
-    : state_(state), blade_(blade), contact_(contact), grasping_(grasping), background_(background), updater_(updater),
-      renewal_(renewal) {}
+                           BackgroundBodies& background, BodyUpdater& updater)
+    : state_(state), blade_(blade), contact_(contact), grasping_(grasping), background_(background), updater_(updater) {
+}
 
 bool BladeCutting::ends(const StepSample& sample) const {
   return !state_.options.going_on && sample.time == state_.steps.back().time;
@@ -116,7 +116,7 @@ bool BladeCutting::cut(const StepSample& sample, bool places, CutReport& report)
     return false;
   }
   try {
-    return build(sample, to_rest, std::move(wound_before), report);
+    return build(sample, std::move(wound_before), report);
   } catch (const InputError& error) {
     refuse_cut(sample.time, error.what(), report, state_.log);
   } catch (const NumericalError& error) {
@@ -127,8 +127,7 @@ bool BladeCutting::cut(const StepSample& sample, bool places, CutReport& report)
 }
 
 // The body with what has been cut, in the step or in the background. True: it is there and solved.
-bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_rest,
-                         std::optional<topology::Wound> wound_before, CutReport& report) {
+bool BladeCutting::build(const StepSample& sample, std::optional<topology::Wound> wound_before, CutReport& report) {
   BodyModel next = updater_.next();
   if (!grasping_.holds()) // a grasper remembers what it holds
     require_clear_of_tool(*next.incision, state_.model, state_.scenario.contact.condition);
@@ -147,7 +146,7 @@ bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_r
     state_.shown_wound = std::move(wound_before);
   } else {
     state_.rebuild = Rebuild::in_step;
-    updater_.build_cut({.way_ahead = [&] { return renewal_.way_of_blade(sample, to_rest); }}, next, report);
+    updater_.build_cut({}, next, report);
     const StageTimer timer(report.seconds.solve);
     contact_.solve(sample, next);
   }
@@ -156,7 +155,6 @@ bool BladeCutting::build(const StepSample& sample, const topology::RestMap& to_r
   if (in_background)
     return false;
   state_.model = std::move(next);
-  renewal_.lead(sample, updater_.followed(), to_rest);
   return true;
 }
 
@@ -175,7 +173,6 @@ bool BladeCutting::take() {
     state_.profile.discretise += report.seconds.assembly + report.seconds.visibility;
     state_.profile.condense += report.seconds.solve;
     take_over_finite(state_.model, made.model, state_.profile);
-    renewal_.drop();
     contact_.keep_grip();
     state_.model = std::move(made.model);
   } catch (const std::runtime_error& error) {

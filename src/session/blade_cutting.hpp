@@ -10,7 +10,7 @@ class BladeCutting {
  public:
   /// These must outlive it.
   BladeCutting(SessionState& state, BladeTrack& blade, ContactSolver& contact, const Grasping& grasping,
-               BackgroundBodies& background, BodyUpdater& updater, WindowRenewal& renewal);
+               BackgroundBodies& background, BodyUpdater& updater);
 
   /// Moves the blade, or keeps its motion for later: until it has gone blade.advance, the body need not follow. What is
   /// left is cut when the blade leaves the body, is lifted or gone, or the run ends. A refusal leaves body, incision
@@ -27,8 +27,7 @@ class BladeCutting {
 
  private:
   bool cut(const StepSample& sample, bool places, CutReport& report);
-  bool build(const StepSample& sample, const topology::RestMap& to_rest, std::optional<topology::Wound> wound_before,
-             CutReport& report);
+  bool build(const StepSample& sample, std::optional<topology::Wound> wound_before, CutReport& report);
   [[nodiscard]] bool is_put_off(const StepSample& sample);
   [[nodiscard]] bool ends(const StepSample& sample) const;
   [[nodiscard]] bool makes_in_background(const StepSample& sample) const;
@@ -40,7 +39,6 @@ class BladeCutting {
   const Grasping& grasping_;
   BackgroundBodies& background_;
   BodyUpdater& updater_;
-  WindowRenewal& renewal_;
   std::optional<CutReport> taken_; // of the cut whose body has taken over since the last step, or which was refused
 };
 

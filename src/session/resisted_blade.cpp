@@ -6,7 +6,6 @@
 #include "src/tissue/finite_body.hpp"
 #include "topology/base/errors.hpp"
 
-#include <algorithm>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <utility>
@@ -26,10 +25,9 @@ BladeEdge edge_of(const SessionState& state) {
 } // namespace
 
 ResistedBlade::ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact,
-                             BackgroundBodies& background, BodyUpdater& updater, WindowRenewal& renewal,
-                             const TearFronts& fronts)
-    : state_(state), blade_(blade), contact_(contact), background_(background), updater_(updater), renewal_(renewal),
-      fronts_(fronts), force_(state.scenario, edge_of(state)) {
+                             BackgroundBodies& background, BodyUpdater& updater, const TearFronts& fronts)
+    : state_(state), blade_(blade), contact_(contact), background_(background), updater_(updater), fronts_(fronts),
+      force_(state.scenario, edge_of(state)) {
   if (force_.edge().finer_than_nodes())
     state_.log.warn(
         "edge", fmt::format("the contact of the blade's edge is narrower than the nodes; it is taken as {:.3g} m wide: "
@@ -143,7 +141,6 @@ void ResistedBlade::leave(const StepSample& sample) {
 // the steps the blade waits at the force of steady cutting: what it does is then what it would have done, only later.
 // The energy of the surface, J.
 double ResistedBlade::cut_on(const StepSample& sample, bool in_background, CutReport& report) {
-  const topology::RestMap to_rest = state_.to_rest();
   int triangles = report.triangles;
   double surface = 0;
   bool waits = false; // what takes a body over leaves the next one to the next step
@@ -181,7 +178,6 @@ double ResistedBlade::cut_on(const StepSample& sample, bool in_background, CutRe
     BladeForce::Taken taken = force_.take();
     surface += taken.surface;
     state_.model = std::move(taken.body);
-    renewal_.lead(sample, updater_.followed(), to_rest);
     forget_mark();
     waits = in_background;
   }
@@ -237,9 +233,7 @@ bool ResistedBlade::propose(const std::vector<topology::BladePose>& poses, const
       return false;
     BodyModel next = updater_.next();
     state_.rebuild = Rebuild::in_step;
-    const topology::RestMap to_rest = state_.to_rest();
-    updater_.build_cut({.way_ahead = [&] { return renewal_.way_of_blade(sample, to_rest); }, .beside = true}, next,
-                       report);
+    updater_.build_cut({.beside = true}, next, report);
     const StageTimer timer(report.seconds.solve);
     contact_.solve(sample, next);
     const double drawn = fronts_.released(state_.model, *next.incision);

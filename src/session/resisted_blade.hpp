@@ -13,7 +13,7 @@ class ResistedBlade {
  public:
   /// All of these must outlive it. Throws InputError as BladeEdge.
   ResistedBlade(SessionState& state, const BladeTrack& blade, ContactSolver& contact, BackgroundBodies& background,
-                BodyUpdater& updater, WindowRenewal& renewal, const TearFronts& fronts);
+                BodyUpdater& updater, const TearFronts& fronts);
 
   [[nodiscard]] const BladeForce& force() const { return force_; }
   /// Whether a part of the edge is inside the body at the pose of the sample, if that has one.
@@ -53,7 +53,6 @@ class ResistedBlade {
   ContactSolver& contact_;
   BackgroundBodies& background_;
   BodyUpdater& updater_;
-  WindowRenewal& renewal_;
   const TearFronts& fronts_;
   BladeForce force_;
   std::optional<IncisionBuilder::Mark> mark_; // the cut without the proposal; empty: there is none

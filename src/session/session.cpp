@@ -41,10 +41,9 @@ struct Session::Parts {
   Grasping grasping{state.scenario, *state.organ.domain};
   BackgroundBodies background;
   ContactSolver contact{state, grasping, blade, background};
-  WindowRenewal renewal{state, blade};
-  BodyUpdater updater{state, contact, grasping, background, renewal};
-  ToolFollowing tool{state, contact, updater, background, renewal};
-  BladeCutting cutting{state, blade, contact, grasping, background, updater, renewal};
+  BodyUpdater updater{state, contact, grasping, background};
+  ToolFollowing tool{state, contact, updater, background};
+  BladeCutting cutting{state, blade, contact, grasping, background, updater};
   TearFronts fronts{state.scenario, state.toughness, state.zone.zone()};
   std::unique_ptr<ResistedBlade> resisted; // null: nothing resists the blade
   std::unique_ptr<TearPropagation> tears;  // null: nothing tears
@@ -58,15 +57,14 @@ Session::Session(Scenario scenario, std::function<void(const std::string&)> say,
   Parts& of = *parts_;
   set_out(of.state, leader);
   if (resists(of.state.scenario))
-    of.resisted = std::make_unique<ResistedBlade>(of.state, of.blade, of.contact, of.background, of.updater, of.renewal,
-                                                  of.fronts);
+    of.resisted = std::make_unique<ResistedBlade>(of.state, of.blade, of.contact, of.background, of.updater, of.fronts);
   if (of.state.scenario.tearing.enabled)
     of.tears = std::make_unique<TearPropagation>(of.state, of.grasping, of.contact, of.background, of.updater,
                                                  of.fronts, of.resisted.get());
   if (!computes())
     return;
   lay_first_nodes(of.state, of.updater);
-  of.has_hung = approach_hanging(of.state, of.contact, of.updater);
+  of.has_hung = approach_hanging(of.state, of.updater);
 }
 
 Session::~Session() = default;
@@ -115,7 +113,6 @@ void Session::Parts::step_linear(const StepSample& sample, std::vector<topology:
     result.cut = taken.value_or(CutReport{});
   Loading loading;
   loading.releases = timed(stages.solve, [&] { return begin(sample, std::move(passed)); });
-  const std::optional<topology::BladePose> last_blade = blade.last();
   const bool solved = timed(stages.cut, [&] { return cut_freely(sample, taken.has_value(), result); });
   blade.arrive(sample);
   if (is_loaded(sample, result)) {
@@ -129,9 +126,6 @@ void Session::Parts::step_linear(const StepSample& sample, std::vector<topology:
       timed(stages.cut, [&] { loading.cut_surface = resisted->press(sample, *result.cut); });
     if (tears)
       timed(stages.tear, [&] { tears->tear(sample, loading, result); });
-    if (policy() == CutPolicy::in_step_ahead && sample.blade)
-      timed(stages.body,
-            [&] { result.residual = renewal.watch(sample, last_blade, *result.cut).value_or(result.residual); });
     timed(stages.force, [&] { report.tell_linear(resisted.get(), result); });
   } else if (resisted && sample.blade) { // it is outside: from here on its way goes into the tissue
     timed(stages.cut, [&] { resisted->press(sample, *result.cut); });
@@ -295,7 +289,7 @@ void Session::Parts::follow_tool(const StepSample& sample, StepResult& result) {
       background.follows_cut() && !state.zone.is_left_by(centre); // nodes are made at one place at a time
   if (!state.zone.must_follow(centre) || waits)
     return;
-  if (state.options.following_in_background && !renewal.is_under_way() && !sample.blade && !background.follows_cut()) {
+  if (state.options.following_in_background && !sample.blade && !background.follows_cut()) {
     tool.follow_in_background(sample, centre);
     return;
   }
@@ -322,18 +316,6 @@ void Session::prepare(const StepSample& sample) {
     of.updater.build(model);
   if (of.state.touch && !of.state.scenario.tool->grasp && model.patch.nodes.empty())
     of.contact.condense(of.contact.candidates(model), model);
-  if (of.policy() != CutPolicy::in_step_ahead || of.state.scenario.blade->advance.value_or(1) > 0)
-    return; // in the loop it may be made in the background
-  StepSample meeting = sample;
-  if (!meeting.blade)
-    if (const auto first = std::find_if(steps().begin(), steps().end(), [](const StepSample& s) { return !!s.blade; });
-        first != steps().end())
-      meeting = *first;
-  if (!meeting.blade)
-    return;
-  of.renewal.meet_blade(meeting, std::nullopt);
-  if (of.renewal.is_under_way())
-    swap_body();
 }
 
 void Session::lift_blade() {
@@ -347,8 +329,6 @@ void Session::lift_blade() {
 void Session::set_options(const SessionOptions& options) {
   Parts& of = *parts_;
   of.state.options = options;
-  if (!options.recondensing)
-    of.renewal.drop();
   if (options.following_in_background)
     return;
   if (of.background.follows_cut())
@@ -360,11 +340,10 @@ void Session::set_options(const SessionOptions& options) {
 
 PendingBody Session::pending() const {
   const Parts& of = *parts_;
-  const bool is_made_in_background = of.background.is_under_way();
   const bool lags_in_background = of.resisted && of.resisted->lags_in_background();
   PendingBody pending;
-  pending.under_way = is_made_in_background || of.renewal.is_under_way();
-  pending.there = is_made_in_background ? of.background.is_there() : of.renewal.is_there();
+  pending.under_way = of.background.is_under_way();
+  pending.there = of.background.is_there();
   pending.put_off =
       (of.blade.put_off() > 0 && of.policy() == CutPolicy::in_background && !of.background.follows_cut()) ||
       (lags_in_background && of.background.proposing() == nullptr);
@@ -386,7 +365,7 @@ bool Session::swap_body() {
     of.background.let_arrive();
     return true;
   }
-  return of.renewal.is_under_way() && of.updater.take_renewed();
+  return false;
 }
 
 void Session::coarsen(double factor) {

@@ -10,11 +10,9 @@ namespace spherecut::app {
 /// Bodies that the next steps wait for, or take over.
 struct PendingBody {
   bool under_way = false; // one is made in the background
-  /// It is there and has followed what was cut meanwhile, but for the last few increments where every step has one:
-  /// Session::swap_body() has it follow those.
-  bool there = false;
-  bool put_off = false; // a cut is, that the next step would make if the blade rested
-  bool lags = false;    // the blade has gone where the body has not followed it yet
+  bool there = false;     // it is finished
+  bool put_off = false;   // a cut is, that the next step would make if the blade rested
+  bool lags = false;      // the blade has gone where the body has not followed it yet
 };
 
 class Session {
@@ -41,9 +39,7 @@ class Session {
   StepResult step(const StepSample& sample, std::vector<topology::BladePose> passed = {});
 
   /// Builds the body and condenses it onto the tool's candidates before the first touch, so that the first step in
-  /// contact need not; with SessionOptions::recondensing so that it can follow the first cut, where the scenario's
-  /// blade begins near it and every step follows it. `sample`: where the tool is. Does nothing when there is nothing to
-  /// compute.
+  /// contact need not. `sample`: where the tool is. Does nothing when there is nothing to compute.
   void prepare(const StepSample& sample);
 
   /// Where the blade was in the last step that had one.
@@ -58,7 +54,7 @@ class Session {
 
   [[nodiscard]] PendingBody pending() const;
   /// Takes over the body that is under way, after waiting for it where need be; the next step solves with it. False:
-  /// there is none, or it could not follow. Throws what making nodes and body anew throws.
+  /// there is none, or its cut is refused. Throws what making nodes and body anew throws.
   bool swap_body();
 
   /// Spacings `factor` times the scenario's from the next sprinkling on. Throws InputError unless it is positive.

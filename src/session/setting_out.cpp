@@ -133,7 +133,7 @@ void lay_first_nodes(SessionState& state, const BodyUpdater& updater) {
     check_held(state.scenario, state.incisions->wound(), state.steps.front().time, state.log);
 }
 
-bool approach_hanging(SessionState& state, ContactSolver& contact, BodyUpdater& updater) {
+bool approach_hanging(SessionState& state, BodyUpdater& updater) {
   const bool is_loaded = state.scenario.gravity || !state.scenario.pretension.isZero() ||
                          std::any_of(state.scenario.precuts.begin(), state.scenario.precuts.end(),
                                      [](const PrecutSettings& precut) { return precut.pressure != 0; });
@@ -148,7 +148,7 @@ bool approach_hanging(SessionState& state, ContactSolver& contact, BodyUpdater& 
       throw NumericalError(without_equilibrium(state, state.steps.front().time, false, error));
     }
   } else {
-    updater.assemble(state.model, {}, contact.candidates(state.model));
+    updater.assemble(state.model);
     app::condense({}, state.model);
     solve_contact(nullptr, nullptr, state.scenario, state.model);
   }

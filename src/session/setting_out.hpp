@@ -15,6 +15,6 @@ void lay_first_nodes(SessionState& state, const BodyUpdater& updater);
 
 /// The way of an approach counts from its first touch of the body as its loads hold it before the tool comes: builds
 /// and solves that, and finds the steps anew. False: there is no such approach, nothing is done.
-bool approach_hanging(SessionState& state, ContactSolver& contact, BodyUpdater& updater);
+bool approach_hanging(SessionState& state, BodyUpdater& updater);
 
 } // namespace spherecut::app

@@ -45,6 +45,13 @@ struct StepResult {
   StageSeconds stages;            // likewise, of its stages
   std::optional<CutReport> cut;   // in a scenario that cuts
   std::optional<TearReport> tear; // in one that tears, from the first solution on
+
+  /// How the system came to the cut of this step: that of the blade or, if it has cut nothing, of the last increment of
+  /// a tear.
+  [[nodiscard]] SystemUpdate update() const {
+    const SystemUpdate by_blade = cut ? cut->update : SystemUpdate::none;
+    return by_blade != SystemUpdate::none || !tear ? by_blade : tear->increments.back().body.update;
+  }
 };
 
 } // namespace spherecut::app

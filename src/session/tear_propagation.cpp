@@ -190,7 +190,7 @@ bool TearPropagation::take(const StepSample& sample, const std::function<void()>
   std::optional<Grasp> lost;
   const solvers::Discretisation* const body = state_.model.body.get();
   try {
-    build(sample, state_.model.incision, lost, update);
+    build(sample, lost, update);
     return true;
   } catch (const InputError& error) {
     refuse(error.what());
@@ -211,12 +211,10 @@ bool TearPropagation::take(const StepSample& sample, const std::function<void()>
   return false;
 }
 
-// The body with what has been torn since the incision `before`, solved. `lost`: what a grasper held, should that have
-// come off.
-void TearPropagation::build(const StepSample& sample, std::shared_ptr<const topology::Incision> before,
-                            std::optional<Grasp>& lost, BodyUpdate& update) {
+// The body with what has been torn, solved. `lost`: what a grasper held, should that have come off.
+void TearPropagation::build(const StepSample& sample, std::optional<Grasp>& lost, BodyUpdate& update) {
   BodyModel next = updater_.next();
-  CutGrowth growth{.way_ahead = [&] { return way_of_front(before.get(), *next.incision, state_.zone.fine()); }};
+  CutGrowth growth;
   if (!grasping_.holds())
     require_clear_of_tool(*next.incision, state_.model, state_.scenario.contact.condition);
   state_.check_pieces(sample.time);
@@ -224,7 +222,7 @@ void TearPropagation::build(const StepSample& sample, std::shared_ptr<const topo
     const StageTimer timer(update.seconds.level_sets);
     state_.incisions->update_fields();
   }
-  updater_.lead_zone(*next.incision, growth);
+  growth.renewed = updater_.lead_zone(*next.incision);
   if (grasping_.holds() && grasping_.piece_is_free(state_.incisions->wound())) {
     lost = grasping_.lose();
     growth.renewed = "the piece in the grasper has come off";

@@ -43,8 +43,7 @@ class TearPropagation {
   void book_loading(const StepSample& sample, const Loading& loading);
   [[nodiscard]] bool follows_load(const StepSample& sample, const Loading& loading) const;
   bool take(const StepSample& sample, const std::function<void()>& grow, TearReport& report, BodyUpdate& update);
-  void build(const StepSample& sample, std::shared_ptr<const topology::Incision> before, std::optional<Grasp>& lost,
-             BodyUpdate& update);
+  void build(const StepSample& sample, std::optional<Grasp>& lost, BodyUpdate& update);
 
   SessionState& state_;
   Grasping& grasping_;

@@ -72,7 +72,6 @@ void ToolFollowing::take() {
     say_not_followed(error);
     return;
   }
-  renewal_.drop();
   contact_.keep_grip();
   state_.zone.move_to(*following.centre);
   state_.model = std::move(next);

@@ -9,9 +9,8 @@ namespace spherecut::app {
 class ToolFollowing {
  public:
   /// These must outlive it.
-  ToolFollowing(SessionState& state, ContactSolver& contact, BodyUpdater& updater, BackgroundBodies& background,
-                WindowRenewal& renewal)
-      : state_(state), contact_(contact), updater_(updater), background_(background), renewal_(renewal) {}
+  ToolFollowing(SessionState& state, ContactSolver& contact, BodyUpdater& updater, BackgroundBodies& background)
+      : state_(state), contact_(contact), updater_(updater), background_(background) {}
 
   /// The fine zone goes to where the contact is, and the body is built and solved there.
   void follow(const StepSample& sample, const topology::SurfaceContact& centre, StepResult& result);
@@ -30,7 +29,6 @@ class ToolFollowing {
   ContactSolver& contact_;
   BodyUpdater& updater_;
   BackgroundBodies& background_;
-  WindowRenewal& renewal_;
   bool taken_ = false;
 };
 

@@ -42,14 +42,6 @@ class BladeTrack {
   void put_off(double way) { put_off_ += way; }
   void body_follows() { put_off_ = 0; }
 
-  /// Poses on its next way from `here`, of about this length, m, `fine` m apart: those of the path of `steps`, or
-  /// straight on from `last` where something else leads it. `placed`: whether it cuts from where it is, else the first
-  /// pose is its own.
-  [[nodiscard]] std::vector<topology::BladePose> ahead(const StepSample& here,
-                                                       const std::optional<topology::BladePose>& last, bool placed,
-                                                       const std::vector<StepSample>& steps, double length,
-                                                       double fine) const;
-
  private:
   const Scenario& scenario_;
   std::optional<topology::BladePose> last_;

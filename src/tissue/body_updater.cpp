@@ -8,7 +8,6 @@
 #include "src/tissue/finite_body.hpp"
 #include "topology/base/errors.hpp"
 
-#include <algorithm>
 #include <fmt/format.h>
 #include <stdexcept>
 #include <utility>
@@ -16,19 +15,14 @@
 namespace spherecut::app {
 namespace {
 
-// Of the nodes in a window that follows a tear. Processor time of an increment, updated against rebuilt, and what
-// making the window takes in place of the latter: 0.46, 0.95 and 1.7 s where it holds a quarter (1600 nodes), 0.35,
-// 0.34 and 0.55 s at 0.54 (590 nodes), 1.25, 1.4 and 2.9 s at two thirds (1380 nodes). A window serves
-// as many updates as fit into its zone: one of a spacing, three of a half, six of a quarter.
-constexpr double largest_share = 0.5;
 constexpr const char* spacing_changed = "the spacing has changed";
 
 } // namespace
 
 BodyUpdater::BodyUpdater(SessionState& state, ContactSolver& contact, const Grasping& grasping,
-                         BackgroundBodies& background, WindowRenewal& renewal)
+                         BackgroundBodies& background)
     : state_(state), scenario_(state.scenario), organ_(state.organ), model_(state.model), contact_(contact),
-      grasping_(grasping), background_(background), renewal_(renewal) {}
+      grasping_(grasping), background_(background) {}
 
 BodyModel BodyUpdater::next() const {
   BodyModel next;
@@ -60,47 +54,34 @@ void BodyUpdater::build(BodyModel& model) {
     return;
   }
   const std::vector<int> near = contact_.candidates_in_reach(model);
-  assemble(model, {}, near);
+  assemble(model);
   contact_.condense(near, model);
 }
 
-void BodyUpdater::assemble(BodyModel& model, const topology::SurfaceMesh& way_ahead, const std::vector<int>& near) {
+void BodyUpdater::assemble(BodyModel& model) {
   const StageTimer timer(state_.profile.discretise);
-  renewal_.drop();
   background_.drop_following();
-  app::assemble(scenario_, organ_.domain, model, way_ahead, near);
+  app::assemble(scenario_, organ_.domain, model);
   const solvers::SprinkleReport& report = model.sprinkling.report;
   state_.log.say(fmt::format("{} nodes, {} of them on the surface, {} on the faces of the cut, {} fixed",
                              model.sprinkling.nodes.size(), report.surface_nodes + report.edge_nodes, report.lip_nodes,
                              held_nodes(model.body->problem().prescribed)));
 }
 
-// Nodes are fine about a front that tears, as far as its intensities ask for it. Where updates pay, its way ahead is in
-// the fine zone too; elsewhere the zone goes along at every increment.
-void BodyUpdater::lead_zone(const topology::Incision& incision, CutGrowth& growth) {
-  if (incision.front().empty()) {
-    growth.renewed = "no front is left";
-    return;
-  }
-  const auto why_not = [&, way = growth.way_ahead()]() -> std::string {
-    if (is_nonlinear(scenario_.law) && cut_appends(scenario_))
-      return "";
-    if (std::string hindrance = state_.hindrance(); !hindrance.empty())
-      return hindrance;
-    if (cut_appends(scenario_))
-      return "";
-    if (way.triangles.empty())
-      return "no front that has moved goes on";
-    if (solvers::window_share(model_.body->problem(), scenario_.method, way) > largest_share)
-      return too_much_of_body;
-    return can_follow(scenario_, model_, way) ? "" : "too many nodes for a window by this method";
-  };
-  if (growth.renewed = why_not(); !growth.renewed.empty()) {
-    growth.window_pays = false;
-    state_.zone.follow_fronts_and_way(incision);
-    return;
-  }
-  growth.renewed = state_.zone.lead_ahead(incision);
+// Nodes are fine about a front that tears, as far as its intensities ask for it. Where they stay as the cut appends,
+// the front's way ahead is in the fine zone too, so that the zone lasts; elsewhere the zone goes along at every
+// increment.
+std::string BodyUpdater::lead_zone(const topology::Incision& incision) {
+  if (incision.front().empty())
+    return "no front is left";
+  const bool appends = cut_appends(scenario_);
+  if (appends && is_nonlinear(scenario_.law))
+    return state_.zone.lead_ahead(incision);
+  std::string hindrance = state_.hindrance();
+  if (appends && hindrance.empty())
+    return state_.zone.lead_ahead(incision);
+  state_.zone.follow_fronts_and_way(incision);
+  return hindrance.empty() ? "nodes go along with the front" : hindrance;
 }
 
 void BodyUpdater::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report) {
@@ -109,15 +90,14 @@ void BodyUpdater::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate
     return;
   }
   const std::string unfollowed = growth.beside ? "the blade is resisted" : state_.hindrance();
-  const bool follows = state_.options.updating && unfollowed.empty() && growth.window_pays;
-  followed_.reset();
+  std::optional<solvers::SprinkleIncrement> exchanged;
   report.update = SystemUpdate::rebuilt;
   report.update_reason = !unfollowed.empty() ? unfollowed : !spacing_stays() ? spacing_changed : growth.renewed;
   if (report.update_reason.empty()) {
     const StageTimer timer(report.seconds.sprinkling);
     const StageTimer sprinkle_timer(state_.profile.sprinkle);
     try {
-      followed_ = exchange_nodes(*organ_.domain, sprinkle_options(next), model_, next.sprinkling);
+      exchanged = exchange_nodes(*organ_.domain, sprinkle_options(next), model_, next.sprinkling);
       next.coarseness = state_.zone.coarseness();
     } catch (const NumericalError& error) {
       report.update_reason = error.what();
@@ -127,23 +107,24 @@ void BodyUpdater::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate
   const auto make = [&] {
     near = contact_.candidates_in_reach(next);
     const StageTimer timer(report.seconds.assembly);
-    if (followed_ && follows) {
+    if (exchanged && state_.options.updating) {
       const StageTimer growth_timer(state_.profile.discretise);
-      const solvers::BodyGrowth grown = follow_cut(growth.way_ahead, next, report);
-      report.update_reason = next.body == nullptr ? grown.uncovered : grown.update.reason;
+      report.update_reason = follow_cut(scenario_, organ_.domain, *exchanged, model_, next);
+      if (next.body != nullptr)
+        report.update = SystemUpdate::updated;
     }
     if (next.body == nullptr) {
       next.uncut = model_.uncut;
-      assemble(next, follows ? growth.way_ahead() : topology::SurfaceMesh{}, near);
+      assemble(next);
     }
   };
   const double seen = solvers::sight_seconds();
-  if (followed_) {
+  if (exchanged) {
     try {
       make();
     } catch (const std::runtime_error& error) { // no sound support, or no node left where the body is held: with all
       report.update_reason = error.what();      // nodes made anew there may be
-      followed_.reset();
+      exchanged.reset();
     }
   }
   if (next.body == nullptr) {
@@ -175,74 +156,23 @@ void BodyUpdater::build_finite_cut(BodyModel& next, BodyUpdate& report) const {
   report_body(next, 0, report);
 }
 
-// By an update alone where a replacement is on its way; where that cannot be, the replacement takes over and follows.
-solvers::BodyGrowth BodyUpdater::follow_cut(const std::function<topology::SurfaceMesh()>& way_ahead, BodyModel& next,
-                                            BodyUpdate& report) {
-  const bool follows = dynamic_cast<const solvers::Growable*>(model_.body.get()) != nullptr;
-  const auto grow = [&](bool only_update) {
-    return app::follow_cut(scenario_, organ_.domain, *followed_, way_ahead, model_, next, only_update);
-  };
-  // Where motion is put off a body that leaves its window is only given another one if that pays.
-  const auto pays = [&](const topology::SurfaceMesh& way) {
-    return way.triangles.empty() || can_follow(scenario_, model_, way);
-  };
-  const bool renews =
-      !follows || !scenario_.blade || blade_advance(scenario_, state_.options) == 0 || pays(way_ahead());
-  solvers::BodyGrowth growth = grow(renewal_.is_under_way() || !renews);
-  bool taken = false;
-  if (next.body == nullptr && renewal_.is_under_way() && (growth.update.declined || !follows)) {
-    solvers::ContactPatch unused;
-    taken = renewal_.take(unused);
-    if (taken || follows)
-      growth = grow(false);
-  }
-  if (next.body != nullptr)
-    report.update = growth.update.condensed_anew ? SystemUpdate::condensed_anew
-                    : taken                      ? SystemUpdate::taken_over
-                                                 : SystemUpdate::updated;
-  return growth;
-}
-
 bool BodyUpdater::take_back_cut(const solvers::Discretisation* body) {
   state_.incisions->take_back();
   if (model_.body.get() == body)
     return false;
   try {
-    if (model_.body == nullptr) { // it had followed the cut before that was refused; else another had taken over
-      renewal_.drop();
-      app::assemble(scenario_, organ_.domain, model_);
-    }
-    condense_again();
+    // It had followed the cut before that was refused. Contact goes on from where it is.
+    app::assemble(scenario_, organ_.domain, model_);
+    std::optional<solvers::CutContactState> state = std::move(model_.state);
+    contact_.condense(std::vector<int>(model_.patch.nodes), model_, true);
+    model_.state = std::move(state);
+    model_.front_rules = {};
   } catch (const std::runtime_error& error) {
     model_.body.reset(); // the next step builds it
     model_.state.reset();
     throw NumericalError(
         fmt::format("the body cannot be had again as it was before a cut that was refused: {}", error.what()));
   }
-  return true;
-}
-
-// Another body has taken over on the same nodes: contact goes on from where it is.
-void BodyUpdater::condense_again() {
-  std::optional<solvers::CutContactState> state = std::move(model_.state);
-  contact_.condense(std::vector<int>(model_.patch.nodes), model_, true);
-  model_.state = std::move(state);
-  model_.front_rules = {};
-}
-
-// It takes over together with what it was condensed onto, where that is what the tool may touch now.
-bool BodyUpdater::take_renewed() {
-  solvers::ContactPatch patch;
-  if (!renewal_.take(patch))
-    return false;
-  model_.lips.reset();
-  if (patch.nodes != model_.patch.nodes) {
-    condense_again();
-    return true;
-  }
-  model_.base = patch.base;
-  patch.lifts = std::move(model_.patch.lifts);
-  model_.patch = std::move(patch);
   return true;
 }
 
@@ -265,14 +195,13 @@ BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContac
       make_finite_apart(scenario, domain, near, model);
       return made;
     }
-    app::assemble(scenario, domain, model, {}, near);
+    app::assemble(scenario, domain, model);
     app::condense(without_dropped(near, scenario, *model.body), model);
     find_lips(model);
     return made;
   };
 }
 
-// Rebuilt: no window pays that serves one increment.
 BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const topology::Incision>& incision,
                                                   const char* reason) const {
   const std::string renewed = is_nonlinear(scenario_.law) ? not_linear
@@ -309,7 +238,7 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
         if (is_nonlinear(scenario.law))
           make_finite_apart(scenario, domain, near, model);
         else
-          app::assemble(scenario, domain, model, {}, near);
+          app::assemble(scenario, domain, model);
         sight = solvers::sight_seconds() - seen;
       }
       if (model.finite != nullptr)

@@ -27,8 +27,6 @@ std::string_view to_string(SystemUpdate update) {
     return "updated";
   case SystemUpdate::taken_over:
     return "taken over";
-  case SystemUpdate::condensed_anew:
-    return "condensed anew";
   case SystemUpdate::rebuilt:
     return "rebuilt";
   }

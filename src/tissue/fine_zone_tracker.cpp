@@ -6,7 +6,6 @@
 #include "src/scenario/schedule.hpp"
 #include "src/tissue/cut_checks.hpp"
 #include "topology/base/errors.hpp"
-#include "topology/incision/front_growth.hpp"
 #include "topology/incision/gap_walls.hpp"
 
 #include <algorithm>
@@ -22,7 +21,6 @@ constexpr double least_nodes_through = 1; // spacings through a wall, below whic
 constexpr double crowded_by_sheet = 0.3; // nearer to a sheet no node of a contact is put
 constexpr double zone_ahead = 1;         // so far ahead of a front that may tear nodes are fine beforehand
 constexpr double zone_left = 0.5;        // a front this far off the middle of the fine zone has left it
-constexpr double moved_near = 1;         // a front this near to what is new of the cut is expected to go on
 
 } // namespace
 
@@ -161,7 +159,7 @@ void FineZoneTracker::follow_fronts_and_way(const topology::Incision& incision) 
   zone_.spacing.segments = fine_segments(incision);
 }
 
-// Where updates pay, the way ahead is in the fine zone too, so that the zone lasts for some increments.
+// The way ahead is in the fine zone too, so that the zone lasts for some increments.
 std::string FineZoneTracker::lead_ahead(const topology::Incision& incision) {
   const bool leads = !led_segments_.empty() && zone_.spacing.segments == led_segments_;
   const bool holds =
@@ -179,36 +177,6 @@ std::string FineZoneTracker::lead_ahead(const topology::Incision& incision) {
   }
   led_segments_ = zone_.spacing.segments;
   return leads ? "the front has left the fine zone" : "the fine zone had nothing of the way ahead";
-}
-
-topology::SurfaceMesh way_of_front(const topology::Incision* before, const topology::Incision& now, double fine) {
-  std::vector<Vector3> moved;
-  for (std::size_t s = 0; s < now.sheets().size(); ++s) {
-    const topology::SurfaceMesh& sheet = now.sheets()[s];
-    const std::size_t known =
-        before != nullptr && s < before->sheets().size() ? before->sheets()[s].vertices.size() : 0;
-    moved.insert(moved.end(), sheet.vertices.begin() + static_cast<std::ptrdiff_t>(known), sheet.vertices.end());
-  }
-  const topology::FrontGrowth ahead = topology::grow_front(
-      now,
-      [&](const topology::FrontFrame& frame) -> Vector3 {
-        const bool moves = std::any_of(moved.begin(), moved.end(), [&](const Vector3& x) {
-          return (x - frame.point).squaredNorm() < moved_near * moved_near * fine * fine;
-        });
-        return moves ? Vector3((zone_ahead + zone_left) * fine * frame.ahead) : Vector3::Zero();
-      },
-      fine);
-  topology::SurfaceMesh way;
-  for (std::size_t s = 0; s < ahead.sheets.size(); ++s) {
-    const topology::SurfaceMesh& sheet = ahead.sheets[s];
-    for (std::size_t t = now.sheets()[s].triangles.size(); t < sheet.triangles.size(); ++t) {
-      const int first = static_cast<int>(way.vertices.size());
-      for (const int vertex : sheet.triangles[t])
-        way.vertices.push_back(sheet.vertices[static_cast<std::size_t>(vertex)]);
-      way.triangles.push_back({first, first + 1, first + 2});
-    }
-  }
-  return way;
 }
 
 void FineZoneTracker::go_back(Mark mark) {

@@ -85,8 +85,4 @@ class FineZoneTracker {
   std::optional<topology::SurfaceContact> centre_, first_; // of the zone, and the first one
 };
 
-/// Where the fronts that have just moved will come to while a zone that was led ahead lasts, if they go straight on.
-/// `before`: the incision then, may be null; `fine`, m: spacing of the nodes there.
-topology::SurfaceMesh way_of_front(const topology::Incision* before, const topology::Incision& now, double fine);
-
 } // namespace spherecut::app

@@ -33,9 +33,7 @@ CutPolicy cut_policy(const Scenario& scenario, const SessionOptions& options) {
   const bool is_cheap = cut_appends(scenario) && !is_nonlinear(scenario.law); // an increment is found in the step
   if (options.following_in_background && blade_alone && !is_cheap && advance.value_or(background_advance) > 0)
     return CutPolicy::in_background;
-  const bool ahead = options.recondensing && !scenario.tearing.enabled && !cut_appends(scenario) &&
-                     !is_nonlinear(scenario.law); // its bodies have no window
-  return ahead ? CutPolicy::in_step_ahead : CutPolicy::in_step;
+  return CutPolicy::in_step;
 }
 
 double blade_advance(const Scenario& scenario, const SessionOptions& options) {

@@ -9,21 +9,16 @@ namespace spherecut::app {
 
 /// Switches of a session. They may change between two steps.
 struct SessionOptions {
-  /// Steps find contact and force alone and leave out what only output needs, node states, the residual, the opening
-  /// volume and the hash of the wound; the rotation of the tissue is then not watched.
+  /// Steps find contact and force alone and leave out what only output needs, node states, the residual (but where a
+  /// cut has appended to the body), the opening volume and the hash of the wound; the rotation of the tissue is then not
+  /// watched.
   bool force_only = false;
   /// The last of the steps is not the end, and what is put off there waits for the steps that follow.
   bool going_on = false;
   /// A tear makes one increment a step at most, and goes on in the next: a loop in real time gets its solutions.
   bool tear_gradually = false;
-  /// Off: every cut builds its system from scratch, on the nodes that an update would have; what updates are measured
-  /// by.
+  /// Off: every cut builds its system from scratch, on the nodes of one that appends; what that is measured by.
   bool updating = true;
-  /// A body that follows its cut by updates is condensed anew beside them, on a thread of its own, when its window runs
-  /// out or it has drifted, and so is one that a blade comes near to for the first time. It takes over where an update
-  /// needs it, which waits for it, or at Session::swap_body(). Cuts then give their residual now and then. When it
-  /// begins, and what it becomes, depends on the steps alone.
-  bool recondensing = false;
   /// Nodes that follow a tool are sprinkled, and their body assembled and condensed, on a thread of their own, and so
   /// are those that follow a cut which was put off (blade.advance), or which the blade has left off at rest. It takes
   /// over at Session::swap_body(), or, after waiting for it, once the contact has left the fine zone that it would
@@ -38,8 +33,7 @@ struct SessionOptions {
 /// How the body comes to follow what the blade cuts.
 enum class CutPolicy : std::uint8_t {
   none,                   // there is no blade
-  in_step,                // the step that cuts updates or rebuilds it
-  in_step_ahead,          // likewise; windows of its updates are condensed anew in the background
+  in_step,                // the step that cuts appends to it or rebuilds it
   in_background,          // it is made in the background, while the blade goes on
   proposed,               // it is made and solved before the blade, which the tissue resists, has paid for it
   proposed_in_background, // likewise, in the background

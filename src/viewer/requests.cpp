@@ -278,6 +278,13 @@ void apply(const SettingsChange& change, Scenario& scenario) {
     scenario.method.method = *change.method;
   if (change.sight)
     scenario.cut.sight = *change.sight;
+  if (scenario.cut.sight == solvers::SightRule::appended && scenario.method.method != solvers::Method::galerkin) {
+    if (change.sight)
+      throw InputError(fmt::format("sight 'appended' with method '{}'; allowed: with galerkin, or visibility, "
+                                   "diffraction, enriched",
+                                   solvers::to_string(scenario.method.method)));
+    scenario.cut.sight.reset(); // the method's own
+  }
 }
 
 } // namespace spherecut::app

@@ -1,17 +1,14 @@
 // One 2 mm increment of a growing cut: a block of 60 x 60 x 30 mm, base held, an upright blade 15 mm deep that runs in
-// from the side along a slanted line, off every axis and cell. Times are those of the update with real sight lines,
-// including the condensation to the contact; the window covers the next `ahead` increments of the known path, or a fan
-// of +-45 degrees for an unknown one. Beside it: condensing anew (the background's work) and a full rebuild.
-// BM_cholesky_900 (bench_rebuild) is the yardstick of the machine.
+// from the side along a slanted line, off every axis and cell, its way ahead unknown. A cut that appends is followed by
+// its body; by the other rules nodes beside it are exchanged and the body is assembled anew. Times have real sight
+// lines and the condensation to the contact. BM_cholesky_900 (bench_rebuild) is the yardstick of the machine.
+#include "experiments/support/exchanged_nodes.hpp"
 #include "solvers/appended/appended_body.hpp"
-#include "solvers/cut/growing_body.hpp"
 #include "solvers/finite/cut_functions.hpp"
 #include "solvers/finite/equilibrium.hpp"
 #include "solvers/finite/transfer.hpp"
 #include "topology/blade/blade.hpp"
-#include "topology/incision/cut_sheets.hpp"
 
-#include <algorithm>
 #include <benchmark/benchmark.h>
 #include <chrono>
 #include <cmath>
@@ -30,7 +27,6 @@ struct Scene {
   topology::BladeSweep sweep;
   SprinkleOptions sprinkling;
   NodeCloud nodes;
-  std::vector<bool> retired;
   double travelled = 0, time = 0, poisson_ratio = 0.4;
 
   explicit Scene(int target, Method method = Method::galerkin, bool lips_apart = false)
@@ -48,7 +44,6 @@ struct Scene {
         break;
       (nodes.size() > target ? low : high) = sprinkling.spacing.fine;
     }
-    retired.assign(nodes.size(), false);
   }
 
   void advance() {
@@ -58,12 +53,8 @@ struct Scene {
   /// Makes the nodes those of the cut as it is now; `before` is the one that they were made for.
   SprinkleIncrement extend_nodes(const topology::Incision* before) {
     sprinkling.incision = sweep.incision();
-    SprinkleIncrement change = extend_sprinkling(*domain, sprinkling, nodes, before, retired);
-    for (const int node : change.removed)
-      retired[node] = true;
-    for (int j = 0; j < change.added.size(); ++j)
-      nodes.add(change.added, j);
-    retired.resize(nodes.size(), false);
+    SprinkleIncrement change = extend_sprinkling(*domain, sprinkling, nodes, before);
+    nodes = experiments::exchanged(nodes, change);
     return change;
   }
   [[nodiscard]] Vector3 tip() const { return Vector3(-0.0619, 0.0013, 0) + (travelled - step) * heading; }
@@ -81,96 +72,72 @@ struct Scene {
     return p;
   }
 
-  /// The strip that the next `length` of the known path will cut.
-  [[nodiscard]] topology::SurfaceMesh strip(const Vector3& way, double length) const {
-    return topology::make_rectangle_sheet(tip() + 0.5 * length * way - 0.5 * depth * Vector3::UnitZ(),
-                                          way.cross(Vector3::UnitZ()), Vector3::UnitZ(), length, depth, 0.001);
-  }
-
-  [[nodiscard]] GrowthOptions options(int ahead, bool fan, SightRule sight) const {
-    GrowthOptions o;
-    o.method.sight = sight;
-    o.method.estimate_condition = false;
-    const double length = ahead * step;
-    const Vector3 across = Vector3::UnitZ().cross(heading);
-    // Known path: the strip ahead. Unknown: a fan of directions, sampled by three strips.
-    for (double angle : fan ? std::vector<double>{-0.785, 0, 0.785} : std::vector<double>{0}) {
-      const Vector3 way = std::cos(angle) * heading + std::sin(angle) * across;
-      const topology::SurfaceMesh one = strip(way, length);
-      const int offset = static_cast<int>(o.way.vertices.size());
-      o.way.vertices.insert(o.way.vertices.end(), one.vertices.begin(), one.vertices.end());
-      for (const Triangle& t : one.triangles)
-        o.way.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-    }
+  /// Surface nodes about a place ahead of the blade, which a tool may touch.
+  [[nodiscard]] std::vector<int> contact() const {
+    const Vector3 place = tip() + 0.006 * heading;
+    std::vector<int> candidates;
     for (int i = 0; i < nodes.size(); ++i)
       if (nodes.kinds[i] == NodeKind::surface && nodes.positions[i].z() > -1e-9 &&
-          (nodes.positions[i] - tip() - 0.006 * heading).norm() < 0.009)
-        o.contact.push_back(i);
-    return o;
+          (nodes.positions[i] - place).norm() < 0.009)
+        candidates.push_back(i);
+    return candidates;
   }
 };
 
-void growth(benchmark::State& state, int ahead, bool fan, SightRule sight) {
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// On nodes that are exchanged beside the cut, assembled anew: the time is that of the assembly and of the
+/// condensation.
+void growth_by_rebuilding(benchmark::State& state, Method method, SightRule sight) {
   constexpr int increments = 3;
-  GrowthReport sum;
-  double worst = 0, sprinkle_seconds = 0, prepare_seconds = 0, anew = 0;
-  int count = 0, unknowns = 0, factored = 0, unprepared = 0, condensed = 0, nodes = 0;
+  DiscretisationOptions options;
+  options.method = method;
+  options.sight = sight;
+  options.estimate_condition = false;
+  double spheres_seconds = 0, factor_seconds = 0, rebuild_seconds = 0, condense_seconds = 0, sprinkle_seconds = 0;
+  int count = 0, nodes = 0, removed = 0;
   for (auto _ : state) {
-    Scene scene(static_cast<int>(state.range(0)));
-    const auto start = std::chrono::steady_clock::now();
-    GrowingCut cut(scene.problem(), scene.options(ahead, fan, sight));
-    anew += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    Scene scene(static_cast<int>(state.range(0)), method);
     nodes = scene.nodes.size();
-    double seconds = 0;
+    double own = 0;
     for (int k = 0; k < increments; ++k) {
       const auto before = scene.sweep.incision();
       scene.advance();
-      const auto sprinkle_start = std::chrono::steady_clock::now();
-      const SprinkleIncrement increment = scene.extend_nodes(before.get());
-      sprinkle_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - sprinkle_start).count();
-      const NodeChange change{increment.removed, increment.added};
-      if (!fan) // the path is scripted: the next increment is known before the blade is there
-        prepare_seconds += cut.prepare(change, scene.sweep.incision());
-      const GrowthReport report = cut.grow(change, scene.sweep.incision());
-      condensed += report.condensed_anew ? 1 : 0;
-      seconds += report.total_seconds;
-      worst = std::max(worst, report.total_seconds);
-      sum.boxes += report.boxes;
-      sum.spheres_seconds += report.spheres_seconds;
-      sum.cells_seconds += report.cells_seconds;
-      sum.factor_seconds += report.factor_seconds;
-      sum.condense_seconds += report.condense_seconds;
-      factored = std::max(factored, report.factored);
-      unprepared += report.prepared ? 0 : 1;
-      unknowns = cut.window_unknowns();
+      auto start = Clock::now();
+      removed += static_cast<int>(scene.extend_nodes(before.get()).removed.size());
+      sprinkle_seconds += since(start);
+      start = Clock::now();
+      const std::unique_ptr<Discretisation> body = discretise(scene.problem(), options);
+      rebuild_seconds += since(start);
+      own += since(start);
+      const std::vector<int> contact = scene.contact();
+      start = Clock::now();
+      benchmark::DoNotOptimize(body->contact_compliance(contact));
+      condense_seconds += since(start);
+      own += since(start);
+      spheres_seconds += body->report().supports_seconds;
+      factor_seconds += body->report().factor_seconds;
       ++count;
     }
-    state.SetIterationTime(seconds / increments);
+    state.SetIterationTime(own / increments);
   }
   state.counters["nodes"] = nodes;
-  state.counters["window"] = unknowns;
-  state.counters["factored"] = factored;
-  state.counters["unprepared"] = unprepared;
-  state.counters["prepare_ms"] = 1e3 * prepare_seconds / count;
-  state.counters["boxes"] = static_cast<double>(sum.boxes) / count;
-  state.counters["spheres_ms"] = 1e3 * sum.spheres_seconds / count;
-  state.counters["cells_ms"] = 1e3 * sum.cells_seconds / count;
-  state.counters["factor_ms"] = 1e3 * sum.factor_seconds / count;
-  state.counters["condense_ms"] = 1e3 * sum.condense_seconds / count;
-  state.counters["worst_ms"] = 1e3 * worst;
+  state.counters["exchanged"] = static_cast<double>(removed) / count;
+  state.counters["rebuild_ms"] = 1e3 * rebuild_seconds / count;
+  state.counters["spheres_ms"] = 1e3 * spheres_seconds / count;
+  state.counters["factor_ms"] = 1e3 * factor_seconds / count;
+  state.counters["condense_ms"] = 1e3 * condense_seconds / count;
   state.counters["sprinkle_ms"] = 1e3 * sprinkle_seconds / count;
-  state.counters["anew_ms"] = 1e3 * anew * increments / count;
-  state.counters["left_window"] = condensed;
 }
 
-/// The same where the cut appends unknowns, path unknown, at nu in hundredths: the time is that of the update and of
-/// the condensation to the contact, which follows it.
+/// Where the cut appends unknowns, at nu in hundredths: the time is that of what the body does to follow it and of the
+/// condensation to the contact.
 void growth_by_appending(benchmark::State& state) {
   constexpr int increments = 3;
-  using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-  };
   double seconds = 0, condense_seconds = 0, sprinkle_seconds = 0, anew = 0;
   int count = 0, unknowns = 0, nodes = 0;
   for (auto _ : state) {
@@ -179,7 +146,7 @@ void growth_by_appending(benchmark::State& state) {
     DiscretisationOptions options;
     options.sight = SightRule::appended;
     options.estimate_condition = false;
-    const std::vector<int> contact = scene.options(4, true, SightRule::appended).contact;
+    const std::vector<int> contact = scene.contact();
     auto start = Clock::now();
     AppendedBody body(scene.problem(), options);
     anew += since(start);
@@ -193,7 +160,8 @@ void growth_by_appending(benchmark::State& state) {
       const SprinkleIncrement change = scene.extend_nodes(before.get());
       sprinkle_seconds += since(start);
       start = Clock::now();
-      body.grow(change, scene.problem(), {}, true);
+      if (const std::string why_not = body.grow(change, scene.problem()); !why_not.empty())
+        state.SkipWithError(why_not.c_str());
       own += since(start);
       start = Clock::now();
       benchmark::DoNotOptimize(body.contact_compliance(contact));
@@ -218,10 +186,6 @@ void growth_by_appending(benchmark::State& state) {
 /// the way to equilibrium.
 void growth_at_finite_strain(benchmark::State& state) {
   constexpr int increments = 3;
-  using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-  };
   const double modulus = 5000, poisson_ratio = 0.01 * static_cast<double>(state.range(1)),
                shear = modulus / (2 * (1 + poisson_ratio));
   const std::shared_ptr<const Law> law = make_law({NeoHookeanLaw{shear}, bulk_modulus_of(shear, poisson_ratio), {}});
@@ -293,92 +257,8 @@ void growth_at_finite_strain(benchmark::State& state) {
   state.counters["iterations"] = static_cast<double>(iterations) / count;
 }
 
-/// The same with method collocation, whose body prepares itself; condensed to the contact with `condense_seconds`.
-void growth_of_collocation(benchmark::State& state, SightRule sight) {
-  constexpr int increments = 3;
-  using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-  };
-  GrowthReport sum;
-  double anew = 0, rebuild = 0, compliance = 0, prepared_seconds = 0;
-  int count = 0, condensed = 0, prepared = 0;
-  for (auto _ : state) {
-    Scene scene(static_cast<int>(state.range(0)), Method::collocation);
-    GrowthOptions options = scene.options(4, false, sight);
-    options.method.method = Method::collocation;
-    std::vector<Vector3> candidates;
-    for (const int node : options.contact)
-      candidates.push_back(scene.nodes.positions[node]);
-    auto start = Clock::now();
-    const auto body = make_growable(scene.problem(), options);
-    anew += since(start);
-    double seconds = 0;
-    for (int k = 0; k <= increments; ++k) {
-      const auto before = scene.sweep.incision();
-      scene.advance();
-      scene.sprinkling.incision = scene.sweep.incision();
-      const SprinkleIncrement change =
-          extend_sprinkling(*scene.domain, scene.sprinkling, scene.nodes, before.get(), scene.retired);
-      NodeCloud next;
-      for (int i = 0, r = 0; i < scene.nodes.size(); ++i)
-        if (r < std::ssize(change.removed) && change.removed[static_cast<std::size_t>(r)] == i)
-          ++r;
-        else
-          next.add(scene.nodes, i);
-      for (int j = 0; j < change.added.size(); ++j)
-        next.add(change.added, j);
-      scene.nodes = std::move(next);
-      scene.retired.assign(scene.nodes.size(), false);
-      start = Clock::now();
-      const GrowthReport report = dynamic_cast<Growable&>(*body).grow(change, scene.problem(), {}, false).update;
-      std::vector<int> contact;
-      for (const Vector3& x : candidates)
-        if (const auto found = std::find(scene.nodes.positions.begin(), scene.nodes.positions.end(), x);
-            found != scene.nodes.positions.end())
-          contact.push_back(static_cast<int>(found - scene.nodes.positions.begin()));
-      const auto condensing = Clock::now();
-      benchmark::DoNotOptimize(body->contact_compliance(contact));
-      if (k == 0) // what is eliminated ahead is chosen
-        continue;
-      compliance += since(condensing);
-      const double whole = since(start);
-      seconds += whole;
-      if (report.prepared) {
-        prepared_seconds += whole;
-        ++prepared;
-      }
-      condensed += report.condensed_anew ? 1 : 0;
-      sum.boxes += report.boxes;
-      sum.factored += report.factored;
-      sum.window_nodes += report.window_nodes;
-      sum.spheres_seconds += report.spheres_seconds;
-      sum.cells_seconds += report.cells_seconds;
-      sum.factor_seconds += report.factor_seconds;
-      ++count;
-    }
-    state.SetIterationTime(seconds / increments);
-    start = Clock::now();
-    benchmark::DoNotOptimize(discretise(scene.problem(), options.method));
-    rebuild += since(start);
-    state.counters["nodes"] = scene.nodes.size();
-  }
-  state.counters["window"] = static_cast<double>(sum.window_nodes) / count;
-  state.counters["factored"] = static_cast<double>(sum.factored) / count;
-  state.counters["rows"] = static_cast<double>(sum.boxes) / count;
-  state.counters["spheres_ms"] = 1e3 * sum.spheres_seconds / count;
-  state.counters["cells_ms"] = 1e3 * sum.cells_seconds / count;
-  state.counters["factor_ms"] = 1e3 * sum.factor_seconds / count;
-  state.counters["condense_ms"] = 1e3 * compliance / count;
-  state.counters["anew_ms"] = 1e3 * anew * increments / count;
-  state.counters["rebuild_ms"] = 1e3 * rebuild * increments / count;
-  state.counters["left_window"] = condensed;
-  state.counters["prepared"] = prepared;
-  state.counters["prepared_ms"] = prepared > 0 ? 1e3 * prepared_seconds / prepared : 0;
-}
-
 void BM_growing_cut_collocation(benchmark::State& state) {
-  growth_of_collocation(state, SightRule::enriched);
+  growth_by_rebuilding(state, Method::collocation, SightRule::enriched);
 }
 void BM_growing_cut_appended(benchmark::State& state) {
   growth_by_appending(state);
@@ -387,13 +267,10 @@ void BM_growing_cut_finite(benchmark::State& state) {
   growth_at_finite_strain(state);
 }
 void BM_growing_cut_enriched(benchmark::State& state) {
-  growth(state, 3, false, SightRule::enriched);
+  growth_by_rebuilding(state, Method::galerkin, SightRule::enriched);
 }
 void BM_growing_cut_diffraction(benchmark::State& state) {
-  growth(state, 3, false, SightRule::diffraction);
-}
-void BM_growing_cut_diffraction_unknown_path(benchmark::State& state) {
-  growth(state, 3, true, SightRule::diffraction);
+  growth_by_rebuilding(state, Method::galerkin, SightRule::diffraction);
 }
 
 void at_three_sizes(benchmark::internal::Benchmark* benchmark) {
@@ -415,4 +292,3 @@ BENCHMARK(BM_growing_cut_finite)->Apply(at_three_sizes_and_two_ratios);
 BENCHMARK(BM_growing_cut_collocation)->Apply(at_three_sizes);
 BENCHMARK(BM_growing_cut_enriched)->Apply(at_three_sizes);
 BENCHMARK(BM_growing_cut_diffraction)->Apply(at_three_sizes);
-BENCHMARK(BM_growing_cut_diffraction_unknown_path)->Apply(at_three_sizes);

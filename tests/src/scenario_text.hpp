@@ -130,12 +130,14 @@ inline std::string long_bar(double strain, double toughness, const std::string& 
   return replaced(text, "coarse_spacing = 0.005", "coarse_spacing = 0.0034");
 }
 
-/// The shallow notch, which tears on in short increments.
-/// A cut whose bodies are followed by updates of a window, or made in the background.
-inline const std::string by_window = "[cut]\nsight = \"enriched\"\n";
+/// A cut to which the body appends what it needs.
+inline const std::string by_appending = "[cut]\nsight = \"appended\"\n";
+/// A cut whose bodies are made anew, in the step or in the background.
+inline const std::string by_rebuilding = "[cut]\nsight = \"enriched\"\n";
 
-inline std::string growing_notch(const std::string& method) {
-  return shallow_notch + by_window + "[method]\nname = \"" + method + "\"\n[tearing]\nstep = 0.4\n";
+/// The shallow notch, which tears on in short increments, with a cut such as those.
+inline std::string growing_notch(const std::string& cut) {
+  return shallow_notch + cut + "[tearing]\nstep = 0.4\n";
 }
 
 inline std::string stretched(const std::string& text) {

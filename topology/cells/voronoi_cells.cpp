@@ -13,7 +13,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <limits>
 #include <optional>
 #include <voro++.hh>
 
@@ -30,7 +29,6 @@ constexpr double lip_reach = 0.01;      // a node this near to a sheet lies on o
 constexpr double lip_lift = 0.1;        // by which it is lifted to look for its neighbours, in h
 constexpr double smallest_face = 1e-12; // area of a face, in h2
 constexpr double sliver = 1e-3;         // a smaller part of a face is not split off it
-constexpr double half_way = 1.01;       // the cells of two nodes end half way between them; with slack
 constexpr int first_plane_id = -100;
 constexpr int cap_id = -50;
 
@@ -48,8 +46,7 @@ struct CellBuilder {
   const Domain& domain;
   const PointTree& tree;
   const Incision* incision;
-  const std::vector<Vector3>& lookouts; // of the nodes whose cells are made, when there is an incision
-  const std::vector<char>& wanted;      // per node: its cell is made, and its faces with others that are
+  const std::vector<Vector3>& lookouts; // of the nodes, when there is an incision
   bool curved;
   const SurfaceFacets* surface; // null: it is curved
   std::vector<PointTree::Found> near;
@@ -92,8 +89,8 @@ struct CellBuilder {
   /// of both end; normal from i to j.
   [[nodiscard]] std::optional<Plane> middle_of_gap(int i, int j) const {
     int wall = -1;
-    if (incision == nullptr || incision->cut_sheets() == std::ssize(incision->sheets()) || wanted[j] == 0 ||
-        !hidden(i, j, wall) || incision->triangle_of(wall).first < incision->cut_sheets())
+    if (incision == nullptr || incision->cut_sheets() == std::ssize(incision->sheets()) || !hidden(i, j, wall) ||
+        incision->triangle_of(wall).first < incision->cut_sheets())
       return std::nullopt;
     const auto [sheet, triangle] = incision->triangle_of(wall);
     const SurfaceMesh& mesh = incision->sheets()[sheet];
@@ -297,7 +294,7 @@ void CellBuilder::build(int i, CellComplex& cells, std::vector<Vector3>& closure
   CellPolygon polygon;
   for (const int neighbour : neighbours) {
     const int size = face_vertices[position++];
-    if (!near_surface && neighbour >= 0 && (neighbour < i || wanted[neighbour] == 0)) {
+    if (!near_surface && neighbour >= 0 && neighbour < i) {
       position += size; // had from there
       continue;
     }
@@ -358,7 +355,7 @@ void CellBuilder::add_face(int i, int neighbour, const std::vector<Vector3>& pol
     cells.boundary.push_back({i, first_plane_id - neighbour, area, centroid});
     append_corners(polygon, x, h, cells.boundary_corners, cells.boundary_start);
     closure[i] += area;
-  } else if (neighbour < i || wanted[neighbour] == 0) {
+  } else if (neighbour < i) {
     return; // had from there
   } else if (middle_of_gap(i, neighbour)) {
     // In the gap there is nothing; beside its end the two meet in the material.
@@ -446,47 +443,6 @@ std::vector<Vector3> mirrored_lips(const std::vector<Vector3>& nodes, const std:
   return sites;
 }
 
-/// Of what stays, faces, parts of the surface and lips go over from `before`, with the nodes' new numbers.
-void take_over(const CellComplex& before, const std::vector<int>& now, const std::vector<char>& wanted,
-               CellComplex& cells, std::vector<Vector3>& closure) {
-  const auto stays = [&](int node) { return now[node] >= 0 && wanted[now[node]] == 0; };
-  const auto copy = [](const std::vector<Vector3>& from, const std::vector<int>& start, std::size_t k,
-                       std::vector<Vector3>& to, std::vector<int>& to_start) {
-    to.insert(to.end(), from.begin() + start[k], from.begin() + start[k + 1]);
-    to_start.push_back(static_cast<int>(to.size()));
-  };
-  for (std::size_t f = 0; f < before.faces.size(); ++f) {
-    CellFace face = before.faces[f];
-    if (!stays(face.first) && !stays(face.second))
-      continue;
-    face.first = now[face.first];
-    face.second = now[face.second];
-    closure[face.first] += face.area;
-    closure[face.second] -= face.area;
-    cells.faces.push_back(face);
-    copy(before.face_corners, before.face_start, f, cells.face_corners, cells.face_start);
-  }
-  for (std::size_t b = 0; b < before.boundary.size(); ++b) {
-    BoundaryFace face = before.boundary[b];
-    if (!stays(face.node))
-      continue;
-    face.node = now[face.node];
-    cells.boundary.push_back(face);
-    copy(before.boundary_corners, before.boundary_start, b, cells.boundary_corners, cells.boundary_start);
-  }
-  for (std::size_t l = 0; l < before.lips.size(); ++l) {
-    LipFace face = before.lips[l];
-    if (!stays(face.node) && !stays(face.beyond))
-      continue;
-    face.node = now[face.node];
-    face.beyond = now[face.beyond];
-    closure[face.node] += face.area;
-    cells.lips.push_back(face);
-    if (l % 2 == 1)
-      copy(before.lip_corners, before.lip_start, l / 2, cells.lip_corners, cells.lip_start);
-  }
-}
-
 /// Volumes, centroids and reaches by cones from the nodes over the faces.
 void measure_cells(CellComplex& cells) {
   const std::vector<Vector3>& nodes = cells.sites;
@@ -530,51 +486,43 @@ void measure_cells(CellComplex& cells) {
   }
 }
 
-/// The cells of the wanted nodes; what `cells` holds of others stays.
+/// The cells of cells.sites, which stand at `places` or, in lip pairs, beside them.
 void build_cells(const std::vector<Vector3>& places, const std::vector<double>& spacings, const Domain& domain,
-                 const Incision* incision, const std::vector<char>& wanted, CellComplex& cells,
-                 std::vector<Vector3>& closure) {
+                 const Incision* incision, CellComplex& cells) {
   const std::vector<Vector3>& nodes = cells.sites;
   const int count = static_cast<int>(nodes.size());
+  std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
   std::vector<Vector3> lookouts(incision == nullptr ? 0 : nodes.size());
   for (std::size_t i = 0; i < lookouts.size(); ++i)
-    if (wanted[i] != 0)
-      lookouts[i] = lift_off(*incision, places[i], lip_reach * spacings[i], lip_lift * spacings[i]);
+    lookouts[i] = lift_off(*incision, places[i], lip_reach * spacings[i], lip_lift * spacings[i]);
   const PointTree tree(nodes);
-  const std::size_t known = cells.boundary.size();
   const bool curved = count > 0 && std::isfinite(domain.curved_distance(nodes.front()));
-  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, wanted, curved, facets_of(domain),
+  CellBuilder builder{nodes, spacings, domain, tree, incision, lookouts, curved, facets_of(domain),
                       {},    {},       {},     {},   {},       {}};
   for (int i = 0; i < count; ++i)
-    if (wanted[i] != 0)
-      builder.build(i, cells, closure);
+    builder.build(i, cells, closure);
   std::vector<char> on_curve(nodes.size(), 0);
-  // What is left open is the part on the curve; of parts that are known what their rounding leaves.
+  // What is left open is the part on the curve.
   std::vector<Vector3> parts(nodes.size(), Vector3::Zero());
   std::vector<double> sizes(nodes.size(), 0);
-  for (std::size_t b = known; b < cells.boundary.size(); ++b)
-    if (const BoundaryFace& face = cells.boundary[b]; face.plane < 0) {
+  for (const BoundaryFace& face : cells.boundary)
+    if (face.plane < 0) {
       parts[face.node] += face.area;
       sizes[face.node] += face.area.norm();
       on_curve[face.node] = 1;
     }
-  for (std::size_t b = known; b < cells.boundary.size(); ++b)
-    if (BoundaryFace& face = cells.boundary[b]; face.plane < 0) {
+  for (BoundaryFace& face : cells.boundary)
+    if (face.plane < 0) {
       const double share = sizes[face.node] > 0 ? face.area.norm() / sizes[face.node] : 1;
       face.area -= share * (closure[face.node] + parts[face.node]);
     }
   // The surface can leave a cell exactly through its edges, without a crossing: closure still tells.
   for (int i = 0; curved && i < count; ++i)
-    if (wanted[i] != 0 && on_curve[i] == 0 && closure[i].norm() > 1e-9 * spacings[i] * spacings[i]) {
+    if (on_curve[i] == 0 && closure[i].norm() > 1e-9 * spacings[i] * spacings[i]) {
       cells.boundary.push_back({i, -1, -closure[i], domain.closest_surface_point(nodes[i])});
       cells.boundary_start.push_back(static_cast<int>(cells.boundary_corners.size()));
     }
   measure_cells(cells);
-}
-
-std::vector<Vector3> sites_of(const std::vector<Vector3>& nodes, const std::vector<double>& spacings,
-                              const Incision* incision) {
-  return incision == nullptr ? nodes : mirrored_lips(nodes, spacings, *incision);
 }
 
 void reserve(CellComplex& cells, std::size_t nodes) {
@@ -589,45 +537,10 @@ void reserve(CellComplex& cells, std::size_t nodes) {
 CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain,
                           const Incision* incision) {
   CellComplex cells;
-  cells.sites = sites_of(nodes, spacings, incision);
+  cells.sites = incision == nullptr ? nodes : mirrored_lips(nodes, spacings, *incision);
   reserve(cells, nodes.size());
-  std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
-  build_cells(nodes, spacings, domain, incision, std::vector<char>(nodes.size(), 1), cells, closure);
+  build_cells(nodes, spacings, domain, incision, cells);
   return cells;
-}
-
-CellUpdate update_cells(const CellComplex& before, const std::vector<int>& was, const std::vector<Vector3>& nodes,
-                        const std::vector<double>& spacings, const Domain& domain, const Incision* incision,
-                        const std::vector<char>& touched) {
-  CellUpdate update{{}, touched};
-  CellComplex& cells = update.cells;
-  cells.sites = sites_of(nodes, spacings, incision);
-  std::vector<int> now(before.sites.size(), -1);
-  std::vector<Vector3> moved; // places where a node was or is, and another is or was not
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    if (was[i] >= 0)
-      now[was[i]] = static_cast<int>(i);
-    if (was[i] < 0 || before.sites[was[i]] != cells.sites[i]) {
-      update.made[i] = 1;
-      moved.push_back(cells.sites[i]);
-    }
-  }
-  for (std::size_t i = 0; i < now.size(); ++i)
-    if (now[i] < 0 || before.sites[i] != cells.sites[now[i]])
-      moved.push_back(before.sites[i]);
-  // A node cuts no cell that ends before half way to it.
-  if (!moved.empty()) {
-    const PointTree tree(moved);
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-      if (update.made[i] == 0 &&
-          std::sqrt(tree.nearest(cells.sites[i]).squared_distance) < half_way * 2 * before.reaches[was[i]])
-        update.made[i] = 1;
-  }
-  reserve(cells, nodes.size());
-  std::vector<Vector3> closure(nodes.size(), Vector3::Zero());
-  take_over(before, now, update.made, cells, closure);
-  build_cells(nodes, spacings, domain, incision, update.made, cells, closure);
-  return update;
 }
 
 } // namespace spherecut::topology

@@ -57,18 +57,4 @@ struct CellComplex {
 CellComplex voronoi_cells(const std::vector<Vector3>& nodes, const std::vector<double>& spacings, const Domain& domain,
                           const Incision* incision = nullptr);
 
-/// Cells of a body whose nodes or cut have changed.
-struct CellUpdate {
-  CellComplex cells;
-  std::vector<char> made; // per node: its cell was made anew, and may differ from before
-};
-
-/// What voronoi_cells gives (to rounding, faces in another order) where only some cells differ from `before`: those of
-/// nodes that are new, or marked in `touched` because the cut has changed within three reaches of them, and of nodes
-/// beside such as have come, gone or been moved by the cut. `was`: place of each node in `before`, -1 for new ones;
-/// those that were there keep their order. Throws as voronoi_cells.
-CellUpdate update_cells(const CellComplex& before, const std::vector<int>& was, const std::vector<Vector3>& nodes,
-                        const std::vector<double>& spacings, const Domain& domain, const Incision* incision,
-                        const std::vector<char>& touched);
-
 } // namespace spherecut::topology

@@ -53,7 +53,7 @@ TEST_CASE("The matrix of a cut body has the same bits whatever the number of thr
       if (block.nodes.kinds[i] != NodeKind::interior && block.nodes.positions[i].z() < -0.5 + 1e-9)
         problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
     problem.prescribed_region = [](const Vector3& x, const Vector3&) { return x.z() < -0.49; };
-    const auto body = assemble_galerkin(std::move(problem), {});
+    const auto body = discretise(std::move(problem), {});
     return SparseMatrix(stiffness_of(*body).lower);
   };
   const SparseMatrix one = matrix(1);

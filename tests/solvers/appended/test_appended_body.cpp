@@ -2,6 +2,7 @@
 #include "experiments/support/straight_crack.hpp"
 #include "solvers/appended/appended_body.hpp"
 #include "tests/solvers/growing_scene.hpp"
+#include "topology/base/errors.hpp"
 #include "topology/incision/cut_sheets.hpp"
 
 #include <catch2/catch.hpp>
@@ -50,10 +51,7 @@ Vector3 total_of(const std::vector<Vector3>& forces) {
 
 /// Block with a growing cut whose lip nodes are places.
 struct AppendingScene : tests::GrowingScene {
-  AppendingScene() : GrowingScene() {
-    sprinkling.lips_apart = true;
-    nodes = sprinkle(*domain, sprinkling).nodes;
-  }
+  AppendingScene() : GrowingScene(Method::galerkin, true) {}
 };
 
 std::vector<int> nodes_on_top(const NodeCloud& nodes, int count) {
@@ -235,19 +233,45 @@ TEST_CASE("A body whose cut has grown by appending equals one that was cut at on
     const SprinkleIncrement change = scene.grow();
     CHECK(change.removed.empty());
     CHECK(change.added.size() > 0);
-    const BodyGrowth growth = body.grow(change, scene.problem(), {}, true);
-    REQUIRE(std::string(growth.uncovered).empty());
+    REQUIRE(body.grow(change, scene.problem()).empty());
     REQUIRE(body.problem().nodes.positions == scene.nodes.positions);
     const Field field = body.solve();
     CHECK(body.residual(field, {}, {}) < 1e-9);
     const AppendedBody at_once(scene.problem(), appending(), body.uncut());
     const Field expected = at_once.solve();
     const VectorX grown = body.nodal_displacements(field), fresh = at_once.nodal_displacements(expected);
-    CHECK((grown - fresh).norm() < 1e-3 * fresh.norm());
+    CHECK((grown - fresh).norm() < 1e-8 * fresh.norm());
     const std::vector<int> top = nodes_on_top(scene.nodes, 12);
     const MatrixX compliance = body.contact_compliance(top);
-    CHECK((compliance - at_once.contact_compliance(top)).norm() < 1e-3 * compliance.norm());
+    CHECK((compliance - at_once.contact_compliance(top)).norm() < 1e-8 * compliance.norm());
+    std::vector<int> lips;
+    for (int i = base_nodes(scene.nodes); i < scene.nodes.size(); ++i)
+      lips.push_back(i);
+    REQUIRE_FALSE(lips.empty());
+    const MatrixX means = at_once.contact_displacements(lips, {expected});
+    CHECK((body.contact_displacements(lips, {field}) - means).norm() < 1e-8 * means.norm());
   }
+}
+
+TEST_CASE("A load that throws leaves a body whose cut appends as it was") {
+  AppendingScene scene;
+  AppendedBody body(scene.problem(), appending()), untroubled(scene.problem(), appending(), body.uncut());
+  const VectorX before = body.nodal_displacements(body.solve());
+  const int count = scene.nodes.size();
+  const SprinkleIncrement change = scene.grow();
+  Problem grown = scene.problem();
+  grown.loads.body_force = [](const Vector3&) -> Vector3 { throw InputError("no force is known here"); };
+  CHECK_THROWS_WITH(static_cast<void>(body.grow(change, grown)), Catch::Contains("no force is known"));
+  REQUIRE(body.problem().nodes.size() == count);
+  CHECK((body.nodal_displacements(body.solve()) - before).norm() < 1e-9 * before.norm());
+  REQUIRE(body.grow(change, scene.problem()).empty());
+  REQUIRE(untroubled.grow(change, scene.problem()).empty());
+  const VectorX followed = body.nodal_displacements(body.solve()),
+                expected = untroubled.nodal_displacements(untroubled.solve());
+  CHECK((followed - expected).norm() < 1e-9 * expected.norm());
+  const std::vector<int> top = nodes_on_top(scene.nodes, 12);
+  const MatrixX compliance = untroubled.contact_compliance(top);
+  CHECK((body.contact_compliance(top) - compliance).norm() < 1e-9 * compliance.norm());
 }
 
 TEST_CASE("Forces on an appended cut's body act as they should") {
@@ -345,6 +369,6 @@ TEST_CASE("What an appended cut cannot have is refused") {
   const VectorX before = body->solve().coefficients;
   SprinkleIncrement change = scene.grow();
   change.removed.push_back(0);
-  CHECK_FALSE(std::string(dynamic_cast<Growable&>(*body).grow(change, scene.problem(), {}, true).uncovered).empty());
+  CHECK(dynamic_cast<AppendedBody&>(*body).grow(change, scene.problem()) == "nodes have been exchanged");
   CHECK(body->solve().coefficients == before);
 }

@@ -397,32 +397,3 @@ TEST_CASE("Many points at once are evaluated as one by one", "[shape_functions]"
   }
   CHECK_THROWS_AS(evaluate(spheres, points, std::span<ShapeFunctions>(many).first(3)), InputError);
 }
-
-TEST_CASE("A node without a sphere supports nothing, and the others do as if it were not there") {
-  const Cloud cloud = lattice(6, 1, 11);
-  std::vector<char> absent(cloud.centres.size(), 0);
-  std::vector<Vector3> centres;
-  std::vector<double> spacings;
-  std::vector<int> id;
-  for (int i = 0; i < std::ssize(cloud.centres); ++i) {
-    absent[i] = i % 9 == 4 ? 1 : 0;
-    if (absent[i] != 0)
-      continue;
-    centres.push_back(cloud.centres[i]);
-    spacings.push_back(cloud.spacings[i]);
-    id.push_back(i);
-  }
-  const Spheres with(cloud.centres, cloud.spacings, 1.9, Basis::linear, 1e9, {}, absent);
-  const Spheres without(centres, spacings, 1.9);
-  ShapeFunctions a, b;
-  for (const Vector3& x : centres) {
-    REQUIRE(evaluate(with, x, a));
-    REQUIRE(evaluate(without, x, b));
-    REQUIRE(a.size() == b.size());
-    for (int k = 0; k < a.size(); ++k) {
-      CHECK(a.nodes[k] == id[b.nodes[k]]);
-      CHECK(a.value[k] == b.value[k]);
-      CHECK(a.dx[k] == b.dx[k]);
-    }
-  }
-}

@@ -38,12 +38,12 @@ std::string blade_through(const std::vector<std::string>& positions) {
   return text;
 }
 
-const std::string pressed_and_cut = cut_block + by_window + press +
+const std::string pressed_and_cut = cut_block + by_rebuilding + press +
                                     blade_through({"[-0.02, 0.001, 0.034]", "[-0.022, 0, 0.012]"}) +
                                     "[output]\nfigures = false\n";
 
 // In on a way that turns, out again, and in beside it.
-const std::string in_and_out = cut_block + by_window +
+const std::string in_and_out = cut_block + by_rebuilding +
                                blade_through({"[-0.004, 0, 0.034]", "[-0.004, 0, 0.022]", "[0.002, 0.001, 0.020]",
                                               "[0.003, 0, 0.036]", "[0.012, 0, 0.036]", "[0.012, 0, 0.021]"});
 
@@ -88,7 +88,6 @@ TEST_CASE("A body made in the background is the one that a step would have made,
   const Scenario scenario =
       scenario_of((is_pressed ? pressed_and_cut : in_and_out) + "[method]\nname = \"" + std::string(method) + "\"\n");
   Session waits(scenario), goes_on(scenario);
-  waits.set_options({.updating = false});
   goes_on.set_options({.following_in_background = true});
   int followed = 0, nodes_here = 0, nodes_there = 0;
   bool is_same = true;

@@ -51,8 +51,7 @@ TEST_CASE("A blade that is resisted leaves no mark where it is lifted before its
   TissueParts parts(replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 20") +
                     blade({"[0.004, 0, 0.031]", "[0.004, 0, 0.027]"}, 0.04, "0.1"));
   const TearFronts fronts(parts.state.scenario, parts.state.toughness, parts.state.zone.zone());
-  ResistedBlade resisted(parts.state, parts.blade, parts.contact, parts.background, parts.updater, parts.renewal,
-                         fronts);
+  ResistedBlade resisted(parts.state, parts.blade, parts.contact, parts.background, parts.updater, fronts);
   build_and_solve(parts, no_tool(0));
   const std::size_t half = parts.state.steps.size() / 2;
   for (std::size_t i = 0; i < half; ++i) {
@@ -74,27 +73,6 @@ TEST_CASE("A blade that is resisted leaves no mark where it is lifted before its
   CHECK(parts.state.wound() == &parts.state.incisions->wound());
 }
 
-TEST_CASE("A body that the blade comes near to is condensed anew beside it, and takes over with the same solution") {
-  TissueParts parts(long_block + incision_at_end);
-  parts.state.options.recondensing = true;
-  build_and_solve(parts, no_tool(0));
-  const VectorX before = parts.state.model.field.coefficients;
-  const StepSample& first = parts.state.steps.front();
-  REQUIRE(first.blade);
-  parts.renewal.meet_blade(first, std::nullopt);
-  REQUIRE(parts.renewal.is_under_way());
-  parts.renewal.drop();
-  CHECK_FALSE(parts.renewal.is_under_way());
-  parts.renewal.meet_blade(first, std::nullopt);
-  const solvers::Discretisation* const body = parts.state.model.body.get();
-  REQUIRE(parts.updater.take_renewed());
-  CHECK_FALSE(parts.renewal.is_under_way());
-  CHECK(parts.state.model.body.get() != body);
-  CHECK_FALSE(parts.state.model.window_way.triangles.empty());
-  parts.contact.solve(no_tool(1), parts.state.model);
-  CHECK((parts.state.model.field.coefficients - before).norm() < 2e-3 * before.norm()); // finer cells along the way
-}
-
 TEST_CASE("The fine zone that follows the tool in the background becomes the one that follows it within them") {
   TissueParts waits(small_scenario), goes_on(small_scenario);
   for (TissueParts* parts : {&waits, &goes_on}) {
@@ -107,12 +85,12 @@ TEST_CASE("The fine zone that follows the tool in the background becomes the one
   REQUIRE(waits.state.zone.must_follow(centre));
   for (TissueParts* parts : {&waits, &goes_on})
     parts->contact.solve(waits.state.steps.back(), parts->state.model);
-  ToolFollowing within(waits.state, waits.contact, waits.updater, waits.background, waits.renewal);
+  ToolFollowing within(waits.state, waits.contact, waits.updater, waits.background);
   StepResult result;
   within.follow(sample, centre, result);
   CHECK(result.resprinkled);
   CHECK(waits.state.rebuild == Rebuild::in_step);
-  ToolFollowing beside(goes_on.state, goes_on.contact, goes_on.updater, goes_on.background, goes_on.renewal);
+  ToolFollowing beside(goes_on.state, goes_on.contact, goes_on.updater, goes_on.background);
   beside.follow_in_background(sample, centre);
   REQUIRE(goes_on.background.is_following());
   CHECK_FALSE(beside.has_taken());

@@ -63,20 +63,3 @@ TEST_CASE("A lifted blade is nowhere, but what it has put off is still to be cut
   CHECK_FALSE(track.is_lifted());
   CHECK(track.is_hand_led()); // for good
 }
-
-TEST_CASE("The way ahead is that of the path as long as the blade is on it, else straight on") {
-  const Scenario scenario = scenario_of(cut_block + blade({"[0, 0, 0.04]", "[0, 0, 0.02]"}, 0.04, "0.1"));
-  const BladeTrack track(scenario);
-  std::vector<StepSample> steps;
-  for (int k = 0; k <= 10; ++k)
-    steps.push_back(at(0.1 * k, {0, 0, 0.04 - 0.002 * k}));
-  const auto on_path = track.ahead(steps[2], std::nullopt, true, steps, 0.006, fine);
-  REQUIRE(on_path.size() == 3);
-  CHECK(on_path.back().position == steps[5].blade->position);
-  CHECK(track.ahead(steps[2], std::nullopt, false, steps, 0.006, fine).front().position == steps[2].blade->position);
-  const StepSample off_it = at(0.2, {0.01, 0, 0.03});
-  CHECK(track.ahead(off_it, std::nullopt, true, steps, 0.01, fine).empty());
-  const auto straight = track.ahead(off_it, at(0.1, {0, 0, 0.03}).blade, true, steps, 0.01, fine);
-  REQUIRE(straight.size() == 2);
-  CHECK((straight.back().position - Vector3(0.02, 0, 0.03)).norm() < 1e-12);
-}

@@ -33,8 +33,7 @@ TEST_CASE("A body that is built and pressed by hand has the force of the session
 
 TEST_CASE("A blade cuts what its edge sweeps, and its body follows with a front of its own") {
   TissueParts parts(cut_block + blade({"[0.02, 0, 0.04]", "[0.02, 0, 0.02]"}, 0.04, "0.5"));
-  BladeCutting cutting(parts.state, parts.blade, parts.contact, parts.grasping, parts.background, parts.updater,
-                       parts.renewal);
+  BladeCutting cutting(parts.state, parts.blade, parts.contact, parts.grasping, parts.background, parts.updater);
   for (const StepSample& sample : parts.state.steps) {
     CutReport report;
     parts.blade.begin_step(sample, {}, parts.state.zone.fine());

@@ -19,31 +19,34 @@ const std::string tough_block = replaced(cut_block, "poisson_ratio = 0.3", "pois
 
 } // namespace
 
-TEST_CASE("A body follows its blade in the step, ahead of it or beside it, as scenario and options say") {
-  const SessionOptions off_line, ahead{.recondensing = true}, beside{.following_in_background = true},
-      both{.recondensing = true, .following_in_background = true};
+TEST_CASE("A body follows its blade in the step or beside it, as scenario and options say") {
+  const SessionOptions off_line, beside{.following_in_background = true};
   const auto policies = [&](const std::string& text) {
     const Scenario scenario = scenario_of(text);
-    return std::vector{cut_policy(scenario, off_line), cut_policy(scenario, ahead), cut_policy(scenario, beside),
-                       cut_policy(scenario, both)};
+    return std::vector{cut_policy(scenario, off_line), cut_policy(scenario, beside)};
   };
   using enum CutPolicy;
-  CHECK(policies(small_scenario) == std::vector{none, none, none, none});
-  CHECK(policies(cut_block + drawn) == std::vector{in_step, in_step_ahead, in_background, in_background});
-  CHECK(policies(cut_block + at_once) == std::vector{in_step, in_step_ahead, in_step, in_step_ahead});
-  CHECK(policies(cut_block + drawn + "[cut]\nsight = \"appended\"\n") ==
-        std::vector{in_step, in_step, in_step, in_step});
-  CHECK(policies(tough_block + drawn) ==
-        std::vector{proposed, proposed, proposed_in_background, proposed_in_background});
-  CHECK(policies(tough_block + at_once) == std::vector{proposed, proposed, proposed, proposed});
-  CHECK(policies(tough_block + drawn + "[tearing]\n") == std::vector{proposed, proposed, proposed, proposed});
+  CHECK(policies(small_scenario) == std::vector{none, none});
+  CHECK(policies(cut_block + drawn) == std::vector{in_step, in_background});
+  CHECK(policies(cut_block + by_appending + drawn) == std::vector{in_step, in_step}); // found in the step
+  CHECK(policies(cut_block + by_rebuilding + drawn) == std::vector{in_step, in_background});
+  CHECK(policies(cut_block + by_rebuilding + at_once) == std::vector{in_step, in_step});
+  CHECK(policies(cut_block + "[method]\nname = \"collocation\"\n" + drawn) == std::vector{in_step, in_background});
+  CHECK(policies(replaced(cut_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\nlaw = \"neo_hookean\"") + drawn) ==
+        std::vector{in_step, in_background});
+  CHECK(policies(tough_block + drawn) == std::vector{proposed, proposed_in_background});
+  CHECK(policies(tough_block + at_once) == std::vector{proposed, proposed});
+  CHECK(policies(tough_block + drawn + "[tearing]\n") == std::vector{proposed, proposed});
 }
 
 TEST_CASE("A blade goes half a spacing ahead of a body that is made in the background, else as far as it is told") {
-  const Scenario usual = scenario_of(cut_block + drawn), told = scenario_of(cut_block + at_once);
+  const Scenario usual = scenario_of(cut_block + by_rebuilding + drawn),
+                 told = scenario_of(cut_block + by_rebuilding + at_once),
+                 appended = scenario_of(cut_block + by_appending + drawn);
   CHECK(blade_advance(usual, {}) == 0);
   CHECK(blade_advance(usual, {.following_in_background = true}) == background_advance);
   CHECK(blade_advance(told, {.following_in_background = true}) == 0);
+  CHECK(blade_advance(appended, {.following_in_background = true}) == 0); // it is made in the step
 }
 
 TEST_CASE("What cuts, resists or loads is read off the scenario") {

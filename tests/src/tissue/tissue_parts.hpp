@@ -19,8 +19,7 @@ struct TissueParts {
   app::Grasping grasping{state.scenario, *state.organ.domain};
   app::BackgroundBodies background;
   app::ContactSolver contact{state, grasping, blade, background};
-  app::WindowRenewal renewal{state, blade};
-  app::BodyUpdater updater{state, contact, grasping, background, renewal};
+  app::BodyUpdater updater{state, contact, grasping, background};
 };
 
 } // namespace spherecut::tests

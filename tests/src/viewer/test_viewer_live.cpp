@@ -290,6 +290,14 @@ TEST_CASE("Messages are read as they are meant and refused in words") {
   Scenario scenario;
   CHECK_THROWS_WITH(apply(parse_request(R"({"type":"set","poisson_ratio":0.7})").settings, scenario),
                     Catch::Contains("material.poisson_ratio = 0.7"));
+  const auto set = [&](const std::string& text) {
+    apply(parse_request(R"({"type":"set",)" + text + "}").settings, scenario);
+  };
+  set(R"("sight":"appended")");
+  CHECK(scenario.cut.sight == solvers::SightRule::appended);
+  set(R"("method":"collocation")"); // which has other rules: its own
+  CHECK_FALSE(scenario.cut.sight);
+  CHECK_THROWS_WITH(set(R"("sight":"appended")"), Catch::Contains("'appended' with method 'collocation'"));
 }
 
 TEST_CASE("The picture is the field at every vertex, evaluated anew only near the cut") {
