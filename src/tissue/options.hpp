@@ -10,8 +10,8 @@ namespace spherecut::app {
 /// Switches of a session. They may change between two steps.
 struct SessionOptions {
   /// Steps find contact and force alone and leave out what only output needs, node states, the residual (but where a
-  /// cut has appended to the body), the opening volume and the hash of the wound; the rotation of the tissue is then not
-  /// watched.
+  /// cut has appended to the body), the opening volume and the hash of the wound; the rotation of the tissue is then
+  /// not watched.
   bool force_only = false;
   /// The last of the steps is not the end, and what is put off there waits for the steps that follow.
   bool going_on = false;
