@@ -23,6 +23,10 @@ UncutOptions uncut_options(const Problem& problem, const DiscretisationOptions& 
   return uncut;
 }
 
+CutSpaceOptions space_options(const DiscretisationOptions& options) {
+  return options.tip_functions ? CutSpaceOptions{} : steps_alone();
+}
+
 BoundingBox everywhere(const Problem& problem) {
   BoundingBox box = problem.domain->bounds();
   const Vector3 margin = 0.01 * box.extent();
@@ -103,7 +107,7 @@ AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options
     throw InputError(
         fmt::format("{} nodes with spheres on an uncut body of {}", base_nodes(problem_.nodes), uncut_->size()));
   space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
-                                      problem_.material, CutSpaceOptions{});
+                                      problem_.material, space_options(options_));
   system_ = std::make_unique<CutSystem>(*uncut_, *space_);
   places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
   follow(everywhere(problem_));
@@ -143,7 +147,7 @@ std::string AppendedBody::grow(const SprinkleIncrement& change, Problem grown) {
     // As it was: the functions do not depend on the way that led to a cut.
     problem_ = std::move(before);
     space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
-                                        problem_.material, CutSpaceOptions{});
+                                        problem_.material, space_options(options_));
     system_ = std::make_unique<CutSystem>(*uncut_, *space_);
     places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
     follow(everywhere(problem_));

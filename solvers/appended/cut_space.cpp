@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -24,12 +25,20 @@ double farthest_from_front(const NodeCloud& nodes, const Spheres& spheres, const
 
 } // namespace
 
+CutSpaceOptions steps_alone() {
+  CutSpaceOptions options;
+  options.front.radius = 0;
+  options.steps_by_run = true;
+  return options;
+}
+
 CutSpace::CutSpace(const SmallBoxes& boxes, const topology::Domain& domain, const NodeCloud& nodes,
                    const Spheres& spheres, const Material& material, CutSpaceOptions options)
     : boxes_(boxes), domain_(domain), nodes_(nodes), spheres_(spheres), material_(material), options_(options),
       cut_(boxes, domain), places_(cut_, domain, material, farthest_from_front(nodes, spheres, options)),
       twins_of_(nodes.positions.size()), groups_of_(nodes.positions.size()), group_weights_(nodes.positions.size()),
-      faint_(nodes.positions.size()), local_(most_parts * static_cast<std::size_t>(boxes.size()), -1) {}
+      faint_(nodes.positions.size()), local_(most_parts * static_cast<std::size_t>(boxes.size()), -1),
+      connected_(nodes.positions.size(), -1) {}
 
 // Step of a partly cut sphere at x and its gradient; `place` null: far from every front, where the step is the side.
 double CutSpace::step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const {
@@ -128,21 +137,88 @@ double CutSpace::energy_in(int node, PartId part) const {
          cell.gradient_at(at - cell.nodes.begin(), boxes_.lane_of(box)).squaredNorm();
 }
 
+/// Whether the boxes in reach of a sphere hang together without a cut.
+bool CutSpace::is_connected(int node) {
+  if (connected_[node] >= 0)
+    return connected_[node] == 1;
+  const std::vector<int>& reach = boxes_.in_reach(node);
+  std::vector<char> seen(reach.size(), 0);
+  std::vector<int> pending(1, 0);
+  seen[0] = 1;
+  for (std::size_t done = 0; done < pending.size(); ++done)
+    for (const int next : boxes_.neighbours(reach[pending[done]])) {
+      const auto at = std::lower_bound(reach.begin(), reach.end(), next);
+      if (at == reach.end() || *at != next || std::exchange(seen[at - reach.begin()], 1) != 0)
+        continue;
+      pending.push_back(static_cast<int>(at - reach.begin()));
+    }
+  connected_[node] = pending.size() == reach.size() ? 1 : 0;
+  return connected_[node] == 1;
+}
+
+/// Whether all parts in reach of a sphere hang together, told from those about its divided boxes alone. Every way
+/// between boxes that hang together without a cut comes to the neighbours of a divided box before it meets the cut: it
+/// is enough that those hang together among themselves. False: not known.
+bool CutSpace::hangs_together(int node, const std::vector<int>& divided) {
+  if (!is_connected(node))
+    return false;
+  const std::vector<int>& reach = boxes_.in_reach(node);
+  std::vector<PartId> allowed;
+  const auto allow = [&](int box) {
+    if (local_[part_id(box, 0)] >= 0 || !std::binary_search(reach.begin(), reach.end(), box))
+      return;
+    for (int k = 0; k < cut_.part_count(box); ++k) {
+      local_[part_id(box, k)] = 0;
+      allowed.push_back(part_id(box, k));
+    }
+  };
+  for (const int box : divided)
+    allow(box);
+  std::size_t ring = 0, core = 0; // a ring of neighbours, which have to be joined, and one beyond, which may join them
+  for (int round = 0; round < 2; ++round)
+    for (core = allowed.size(); ring < core; ++ring)
+      for (const int next : boxes_.neighbours(box_of(allowed[ring])))
+        allow(next);
+  std::vector<PartId> pending(1, allowed.front());
+  local_[allowed.front()] = 1;
+  for (std::size_t done = 0; done < pending.size(); ++done)
+    cut_.for_each_linked(pending[done], [&](PartId next) {
+      if (local_[next] == 0) {
+        local_[next] = 1;
+        pending.push_back(next);
+      }
+    });
+  const bool joined = std::all_of(allowed.begin(), allowed.begin() + static_cast<std::ptrdiff_t>(core),
+                                  [&](PartId part) { return local_[part] == 1; });
+  for (const PartId part : allowed)
+    local_[part] = -1;
+  return joined;
+}
+
 // Components of the parts in reach of a sphere: its node's own one, and a twin for each of the others. Where all hang
 // together although a sheet divides some, the sphere has a step.
 void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   faint_[node].clear();
   const std::vector<int>& reach = boxes_.in_reach(node);
-  if (std::none_of(reach.begin(), reach.end(), [&](int box) { return cut_.is_divided(box); }))
+  std::vector<int> divided;
+  std::copy_if(reach.begin(), reach.end(), std::back_inserter(divided), [&](int box) { return cut_.is_divided(box); });
+  if (divided.empty())
+    return;
+  const bool meets_front = incision_->front_frame(spheres_.centres()[node], spheres_.radii()[node]).has_value();
+  const bool has_step = largest_on_cut(node, divided) >= options_.step_share;
+  const bool is_whole = meets_front && hangs_together(node, divided);
+  if (is_whole && !has_step)
     return;
   std::vector<PartId> parts;
   for (const int box : reach)
     for (int k = 0; k < cut_.part_count(box); ++k)
       parts.push_back(part_id(box, k));
-  std::vector<int> component;
-  int count = find_components(parts, component, {});
-  if (count == 1 && !incision_->front_frame(spheres_.centres()[node], spheres_.radii()[node]))
+  std::vector<int> component(is_whole ? parts.size() : 0, 0);
+  int count = is_whole ? 1 : find_components(parts, component, {});
+  if (count == 1 && !meets_front)
     count = find_components(parts, component, faint_of(node, parts));
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    local_[parts[k]] = static_cast<int>(k);
   const int own_place = local_[cut_.part_at(spheres_.centres()[node], *incision_)];
   const int own = own_place < 0 ? component.front() : component[own_place];
   for (const PartId part : parts)
@@ -168,6 +244,8 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
       found.push_back(std::move(function));
   }
   std::sort(faint_[node].begin(), faint_[node].end());
+  if (!has_step)
+    return;
   if (options_.steps_by_run)
     add_run_steps(node, parts, component, count, own, found);
   else if (count == 1 && options_.step_reach > 0)
@@ -250,8 +328,6 @@ void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunc
   const bool from_beyond = nearest->distance > carried_[nearest->segment] && nearest->distance < radius;
   if (curved_[nearest->segment] == 0 && !from_beyond)
     return;
-  if (largest_on_cut(node, parts) < options_.step_share)
-    return;
   CutFunction function;
   Twin& twin = function.twin;
   twin.node = node;
@@ -264,13 +340,10 @@ void CutSpace::add_step(int node, std::vector<PartId> parts, std::vector<CutFunc
   found.push_back(std::move(function));
 }
 
-/// The largest value of the shape function of a node at a box that the cut divides.
-double CutSpace::largest_on_cut(int node, const std::vector<PartId>& parts) const {
+/// The largest value of the shape function of a node at boxes that the cut divides.
+double CutSpace::largest_on_cut(int node, const std::vector<int>& divided) const {
   double largest = 0;
-  for (const PartId part : parts) {
-    const int box = box_of(part);
-    if (part % most_parts != 0 || !cut_.is_divided(box))
-      continue;
+  for (const int box : divided) {
     const BoxShapes& cell = boxes_.cells()[boxes_.cell_of(box)];
     const auto at = std::lower_bound(cell.nodes.begin(), cell.nodes.end(), node);
     if (at != cell.nodes.end() && *at == node)
@@ -346,7 +419,7 @@ void CutSpace::find_curved_front() {
 }
 
 /// Nodes whose twins or steps may be others now.
-std::set<int> CutSpace::concerned_nodes(const std::vector<char>& changed, bool has_curved) const {
+std::set<int> CutSpace::concerned_nodes(const std::vector<char>& changed, bool comes_with_run) const {
   std::set<int> concerned;
   for (int box = 0; box < boxes_.size(); ++box)
     if (changed[box] == 1) {
@@ -358,7 +431,7 @@ std::set<int> CutSpace::concerned_nodes(const std::vector<char>& changed, bool h
                  at.centre + at.half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1))))
           concerned.insert(node);
     }
-  if (has_curved) // a step comes or goes with its run
+  if (comes_with_run) // a step comes or goes with its run
     for (int box = 0; box < boxes_.size(); ++box)
       if (cut_.is_divided(box))
         for (const int node : boxes_.cells()[boxes_.cell_of(box)].nodes)
@@ -419,6 +492,7 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   std::vector<char> changed(boxes_.size(), 0);
   for (const int box : cut_.update(*incision_, region))
     changed[box] = 1;
+  const int runs_before = functions_.empty() ? 0 : places_.runs().count();
   places_.follow(incision_, region, changed);
   std::vector<char> cell_changed(boxes_.cells().size(), 0);
   for (int box = 0; box < boxes_.size(); ++box)
@@ -427,11 +501,15 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
 
   // Twins of spheres in reach of what has changed are found anew.
   const std::vector<char> was_curved = std::move(curved_);
-  find_curved_front();
   const auto any = [](const std::vector<char>& flags) {
     return std::any_of(flags.begin(), flags.end(), [](char is) { return is != 0; });
   };
-  const std::set<int> concerned = concerned_nodes(changed, any(was_curved) || any(curved_));
+  bool comes_with_run = places_.runs().count() != 1 || runs_before != 1; // by run: those may be numbered anew
+  if (!options_.steps_by_run) {
+    find_curved_front();
+    comes_with_run = any(was_curved) || any(curved_);
+  }
+  const std::set<int> concerned = concerned_nodes(changed, comes_with_run);
   Wanted wanted;
   for (const int node : concerned)
     add_twins(node, wanted.twins);

@@ -18,7 +18,7 @@ struct CutSpaceOptions {
   double step_reach = 1;
   double step_turn = 20; // degrees
   /// Where the shape function of a sphere is nowhere on the cut larger than this, it has no step: a large sphere among
-  /// small ones, which open the cut by themselves.
+  /// small ones, which open the cut by themselves. A step of its own would change what it does far from the cut.
   double step_share = 0.1;
   double shallow = 1.2; // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
   /// A step for every run of the front that ends in a sphere, or in a part of it that is parted from its node, whatever
@@ -26,6 +26,10 @@ struct CutSpaceOptions {
   bool steps_by_run = false;
   double corner = 45; // degrees from one segment to the next: a corner, which is no curvature
 };
+
+/// Steps by run in place of functions along the front. Those are of near-tip fields, which do not turn with the tissue
+/// and do not hold where something presses within their reach of the front.
+CutSpaceOptions steps_alone();
 
 /// A second vector unknown of a sphere: h_J psi. Where the cut parts the sphere, psi is 1 in one component of what is
 /// hidden from its node and 0 elsewhere. Where a front ends in it, psi = (step(x) - step(x_J)) / 2,
@@ -114,6 +118,8 @@ class CutSpace {
 
  private:
   void add_twins(int node, std::vector<CutFunction>& found);
+  [[nodiscard]] bool hangs_together(int node, const std::vector<int>& divided);
+  [[nodiscard]] bool is_connected(int node);
   int find_components(const std::vector<PartId>& parts, std::vector<int>& component, const std::vector<char>& marked);
   [[nodiscard]] std::vector<char> faint_of(int node, const std::vector<PartId>& parts) const;
   [[nodiscard]] double energy_in(int node, PartId part) const;
@@ -121,9 +127,9 @@ class CutSpace {
   void add_run_steps(int node, const std::vector<PartId>& parts, const std::vector<int>& component, int count, int own,
                      std::vector<CutFunction>& found);
   [[nodiscard]] bool is_opened(const std::vector<PartId>& parts, int run);
-  [[nodiscard]] double largest_on_cut(int node, const std::vector<PartId>& parts) const;
+  [[nodiscard]] double largest_on_cut(int node, const std::vector<int>& divided) const;
   void find_curved_front();
-  [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool has_curved) const;
+  [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool comes_with_run) const;
   struct Wanted;
   bool front_stays(CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const;
   bool twin_stays(const CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned,
@@ -154,6 +160,7 @@ class CutSpace {
   mutable std::vector<Blend> blends_; // of one cell
   mutable std::vector<int> blend_of_; // by function, -1 between calls
   mutable std::vector<int> local_;    // of a part among those of a sphere, -1 between calls
+  std::vector<signed char> connected_; // by node: the boxes in reach hang together without a cut; -1: not known
   std::vector<char> curved_;          // by segment of the front: its run is curved
   std::vector<double> carried_;       // m, likewise: nodes so near to it carry functions along the front
   int next_id_ = 0;

@@ -94,6 +94,9 @@ struct DiscretisationOptions {
   /// The body will be cut: `galerkin` takes the spheres of cut bodies from the start, so that the first cut changes
   /// nothing away from it.
   bool cut_ahead = false;
+  /// A cut that appends has functions of the near-tip fields along its front: few unknowns, and the intensities. False:
+  /// its spheres have steps alone, for a body on which something presses near the front or whose cut goes on.
+  bool tip_functions = true;
   UnheldPieces unheld = UnheldPieces::refuse; // galerkin, collocation
   bool estimate_condition = true;             // a dozen more solves; leave out where every rebuild counts
 };

@@ -24,15 +24,6 @@ NodeCloud first_nodes(NodeCloud nodes, int base) {
   return nodes;
 }
 
-/// Every sphere that a front ends in has a step, and there are no functions along the front: those are of fields that
-/// do not turn with the tissue.
-CutSpaceOptions steps_alone() {
-  CutSpaceOptions options;
-  options.front.radius = 0;
-  options.steps_by_run = true;
-  return options;
-}
-
 BoundingBox everywhere(const topology::Domain& domain) {
   const BoundingBox box = domain.bounds();
   const Vector3 margin = 0.01 * box.extent();

@@ -66,6 +66,7 @@ solvers::DiscretisationOptions method_of(const Scenario& scenario) {
   solvers::DiscretisationOptions options = scenario.method;
   options.unheld = scenario.cut.unheld;
   options.sight = sight_of(scenario);
+  options.tip_functions = !scenario.tool && !scenario.blade && !scenario.tearing.enabled;
   return options;
 }
 
@@ -128,7 +129,8 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
 // flap's tear is left open by less than a tenth, by `appended` on the same spacing by a third.
 solvers::SightRule sight_of(const Scenario& scenario) {
   const bool is_cut = scenario.blade || !scenario.precuts.empty();
-  const bool appends = is_nonlinear(scenario.law) && is_cut && !scenario.tearing.enabled;
+  const bool can_append = is_nonlinear(scenario.law) || scenario.method.method == solvers::Method::galerkin;
+  const bool appends = is_cut && can_append && !scenario.tearing.enabled;
   return scenario.cut.sight.value_or(appends ? solvers::SightRule::appended : scenario.method.sight);
 }
 
