@@ -106,6 +106,12 @@ AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options
   if (base_nodes(problem_.nodes) != uncut_->size())
     throw InputError(
         fmt::format("{} nodes with spheres on an uncut body of {}", base_nodes(problem_.nodes), uncut_->size()));
+  build();
+}
+
+/// From the uncut body to its cut as it is.
+void AppendedBody::build() {
+  twin_loads_.clear();
   space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
                                       problem_.material, space_options(options_));
   system_ = std::make_unique<CutSystem>(*uncut_, *space_);
@@ -146,11 +152,7 @@ std::string AppendedBody::grow(const SprinkleIncrement& change, Problem grown) {
   } catch (...) {
     // As it was: the functions do not depend on the way that led to a cut.
     problem_ = std::move(before);
-    space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
-                                        problem_.material, space_options(options_));
-    system_ = std::make_unique<CutSystem>(*uncut_, *space_);
-    places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
-    follow(everywhere(problem_));
+    build();
     throw;
   }
   forget_factor_seconds();
@@ -266,30 +268,48 @@ void AppendedBody::add_volume_loads_of_cut() {
       for (int m = 0; m < 3; ++m)
         to[m] += share * volume_of(part) * initial.cwiseProduct(term.gradient[m]).sum();
     });
+  std::unordered_map<int, Vector3> known; // of functions that are kept nothing has changed
   for (int k = 0; k < std::ssize(space_->functions()); ++k) {
     const CutFunction& function = space_->functions()[k];
-    auto to = loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(k));
     if (function.is_front)
       continue;
-    PartId last = -1;
-    for (const PartId id : system_->parts_of(k)) {
-      if (id == last || is_dropped(id))
-        continue;
-      last = id;
-      ScalarTerm term;
-      if (!function.twin.is_step) { // its value is that at the middle of the box
-        if (!space_->term_at(k, id, 0, term))
-          continue;
-        const Vector3 off = space_->cut().part(id).centroid - boxes.boxes()[box_of(id)].middle;
-        to += (term.value + term.gradient.dot(off)) * weight_of(id) + volume_of(id) * initial * term.gradient;
-        continue;
-      }
-      const PlacedPart& samples = space_->samples(id);
-      for (int n = 0; n < std::ssize(samples); ++n)
-        if (space_->term_at(k, id, n, term))
-          to += samples[n].share * (term.value * weight_of(id) + volume_of(id) * initial * term.gradient);
-    }
+    const auto before = dropped_.empty() ? twin_loads_.find(function.id) : twin_loads_.end();
+    const Vector3 load = before != twin_loads_.end() ? before->second : twin_load(k, initial);
+    loads_.cut.col(0).segment<3>(3 * static_cast<Eigen::Index>(k)) += load;
+    if (dropped_.empty())
+      known.emplace(function.id, load);
   }
+  twin_loads_ = std::move(known);
+}
+
+/// N, of body force and initial stress on a twin.
+Vector3 AppendedBody::twin_load(int k, const Matrix3& initial) const {
+  const Loads& loads = problem_.loads;
+  const SmallBoxes& boxes = uncut_->boxes();
+  const CutFunction& function = space_->functions()[k];
+  Vector3 load = Vector3::Zero();
+  PartId last = -1;
+  for (const PartId id : system_->parts_of(k)) {
+    if (id == last || is_dropped(id))
+      continue;
+    last = id;
+    const CutPart part = space_->cut().part(id);
+    const double volume = part.share * boxes.boxes()[box_of(id)].volume;
+    const Vector3 weight = loads.body_force ? Vector3(volume * loads.body_force(part.centroid)) : Vector3::Zero();
+    ScalarTerm term;
+    if (!function.twin.is_step) { // its value is that at the middle of the box
+      if (!space_->term_at(k, id, 0, term))
+        continue;
+      const Vector3 off = part.centroid - boxes.boxes()[box_of(id)].middle;
+      load += (term.value + term.gradient.dot(off)) * weight + volume * initial * term.gradient;
+      continue;
+    }
+    const PlacedPart& samples = space_->samples(id);
+    for (int n = 0; n < std::ssize(samples); ++n)
+      if (space_->term_at(k, id, n, term))
+        load += samples[n].share * (term.value * weight + volume * initial * term.gradient);
+  }
+  return load;
 }
 
 void AppendedBody::assemble_loads() {

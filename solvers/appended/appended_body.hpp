@@ -7,6 +7,7 @@
 
 #include <memory>
 #include <string>
+#include <unordered_map>
 
 namespace spherecut::solvers {
 
@@ -21,7 +22,7 @@ class AppendedBody final : public Discretisation {
   AppendedBody(Problem problem, const DiscretisationOptions& options, std::shared_ptr<const UncutBody> uncut);
 
   /// The body follows its cut to `grown`: what problem() becomes when `change` (ids as they are now, added nodes at the
-  /// end) and the new incision are put in. Returns why the body cannot follow and is as it was; empty: it has followed.
+  /// end) and the new incision are put in; its loads are those of before. Returns why the body cannot follow and is as it was; empty: it has followed.
   /// Throws as discretise(); the body is then as it was.
   [[nodiscard]] std::string grow(const SprinkleIncrement& change, Problem grown);
 
@@ -66,11 +67,13 @@ class AppendedBody final : public Discretisation {
   [[nodiscard]] Vector3 front_intensities(const Field& field, const topology::FrontFrame& front) const;
 
  private:
+  void build();
   void follow(const BoundingBox& region);
   void find_pieces();
   void add_force(const Vector3& x, const Vector3& force);
   [[nodiscard]] VectorX volume_loads_of_uncut() const;
   void add_volume_loads_of_cut();
+  [[nodiscard]] Vector3 twin_load(int k, const Matrix3& initial) const;
   void assemble_loads();
   [[nodiscard]] CutFunctional value_at(const Vector3& x) const;
   [[nodiscard]] bool is_dropped(PartId part) const { return !dropped_.empty() && dropped_[components_.of(part)] != 0; }
@@ -94,6 +97,7 @@ class AppendedBody final : public Discretisation {
   CutBoxes::Components components_;
   CutVectors loads_;
   VectorX uncut_loads_; // body force and initial stress on the functions of the uncut body; empty: not known
+  std::unordered_map<int, Vector3> twin_loads_; // N, the same on twins, by CutFunction::id
   std::unique_ptr<KeptPlaces> places_; // what they keep is found as it is asked for
 };
 

@@ -205,7 +205,8 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   if (divided.empty())
     return;
   const bool meets_front = incision_->front_frame(spheres_.centres()[node], spheres_.radii()[node]).has_value();
-  const bool has_step = largest_on_cut(node, divided) >= options_.step_share;
+  const bool has_step = largest_on_cut(node, divided) >= options_.step_share ||
+                        (options_.steps_by_run && nodes_.spacings[node] <= options_.step_coarser * spacing_on_cut(node));
   const bool is_whole = meets_front && hangs_together(node, divided);
   if (is_whole && !has_step)
     return;
@@ -350,6 +351,19 @@ double CutSpace::largest_on_cut(int node, const std::vector<int>& divided) const
       largest = std::max(largest, std::abs(cell.value_at(at - cell.nodes.begin(), boxes_.lane_of(box))));
   }
   return largest;
+}
+
+/// m, of the node nearest to the place on the cut that is nearest to a node; 0: the cut is not in its sphere.
+double CutSpace::spacing_on_cut(int node) const {
+  const auto on_cut = incision_->closest(spheres_.centres()[node], spheres_.radii()[node]);
+  double nearest = std::numeric_limits<double>::infinity(), spacing = 0;
+  if (on_cut)
+    for (const int other : spheres_.candidates(on_cut->point))
+      if (const double distance = (spheres_.centres()[other] - on_cut->point).norm(); distance < nearest) {
+        nearest = distance;
+        spacing = nodes_.spacings[other];
+      }
+  return spacing;
 }
 
 // A run of the front is curved where it turns by more than step_turn within a sphere, over most of its length; corners,

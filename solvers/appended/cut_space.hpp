@@ -18,8 +18,10 @@ struct CutSpaceOptions {
   double step_reach = 1;
   double step_turn = 20; // degrees
   /// Where the shape function of a sphere is nowhere on the cut larger than this, it has no step: a large sphere among
-  /// small ones, which open the cut by themselves. A step of its own would change what it does far from the cut.
+  /// small ones, which open the cut by themselves. A step of its own would change what it does far from the cut. By runs
+  /// that holds for spheres whose node is so much coarser than the one nearest to the cut.
   double step_share = 0.1;
+  double step_coarser = 1.2;
   double shallow = 1.2; // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
   /// A step for every run of the front that ends in a sphere, or in a part of it that is parted from its node, whatever
   /// the run's shape: where two fronts are near, each step knows of its own alone and is smooth.
@@ -128,6 +130,7 @@ class CutSpace {
                      std::vector<CutFunction>& found);
   [[nodiscard]] bool is_opened(const std::vector<PartId>& parts, int run);
   [[nodiscard]] double largest_on_cut(int node, const std::vector<int>& divided) const;
+  [[nodiscard]] double spacing_on_cut(int node) const;
   void find_curved_front();
   [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool comes_with_run) const;
   struct Wanted;

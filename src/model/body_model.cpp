@@ -125,12 +125,11 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
   return problem;
 }
 
-// Release rates ask for nodes on the faces behind a front: with those that `enriched` puts there the account of a
-// flap's tear is left open by less than a tenth, by `appended` on the same spacing by a third.
+// At finite strain release rates ask for nodes on the faces behind a front.
 solvers::SightRule sight_of(const Scenario& scenario) {
   const bool is_cut = scenario.blade || !scenario.precuts.empty();
   const bool can_append = is_nonlinear(scenario.law) || scenario.method.method == solvers::Method::galerkin;
-  const bool appends = is_cut && can_append && !scenario.tearing.enabled;
+  const bool appends = is_cut && can_append && !(is_nonlinear(scenario.law) && scenario.tearing.enabled);
   return scenario.cut.sight.value_or(appends ? solvers::SightRule::appended : scenario.method.sight);
 }
 
