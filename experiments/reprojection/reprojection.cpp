@@ -42,6 +42,13 @@ bool appends(const PrecutMethod& way) {
   return way.sight == SightRule::appended;
 }
 
+/// As a session has it.
+solvers::DiscretisationOptions options_of(const PrecutMethod& way) {
+  solvers::DiscretisationOptions options = way.options();
+  options.tip_functions = false;
+  return options;
+}
+
 solvers::SprinkleOptions sprinkle_options(const std::shared_ptr<const topology::Incision>& incision, double spacing,
                                           int seed, const PrecutMethod& way) {
   solvers::SprinkleOptions options;
@@ -129,7 +136,7 @@ Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, const topo
   grown.kept = nodes.size();
   std::shared_ptr<const solvers::UncutBody> uncut;
   if (appends(way))
-    grown.body = solvers::make_appended(pulled(domain, sweep.incision(), nodes), way.options(), uncut);
+    grown.body = solvers::make_appended(pulled(domain, sweep.incision(), nodes), options_of(way), uncut);
   for (int k = 1; k <= increments; ++k) {
     const auto before = sweep.incision();
     move_to(first_piece + k * step);
@@ -146,7 +153,7 @@ Grown grow_cut(const std::shared_ptr<const topology::Domain>& domain, const topo
     if (!why_not.empty())
       throw NumericalError("the body has not followed its cut: " + why_not);
   }
-  const auto scratch = [&] { return solvers::discretise(pulled(domain, sweep.incision(), nodes), way.options()); };
+  const auto scratch = [&] { return solvers::discretise(pulled(domain, sweep.incision(), nodes), options_of(way)); };
   if (appends(way))
     grown.update_error = difference_of_nodes(*grown.body, *scratch());
   else
@@ -208,7 +215,7 @@ std::vector<Check> run_reprojection(const ExperimentContext& context) {
         update_error = std::max(update_error, grown.update_error);
         const solvers::NodeCloud direct =
             solvers::sprinkle(*domain, sprinkle_options(at_once, spacing, seed, way)).nodes;
-        const auto made_at_once = solvers::discretise(pulled(domain, at_once, direct), way.options());
+        const auto made_at_once = solvers::discretise(pulled(domain, at_once, direct), options_of(way));
         const double difference = difference_of_fields(*grown.body, *made_at_once, points);
         differences[way.name()].push_back(difference);
         table.add({way.name(), fmt::format("{:g}", spacing), fmt::format("{}", seed),

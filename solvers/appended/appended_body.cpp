@@ -106,17 +106,24 @@ AppendedBody::AppendedBody(Problem problem, const DiscretisationOptions& options
   if (base_nodes(problem_.nodes) != uncut_->size())
     throw InputError(
         fmt::format("{} nodes with spheres on an uncut body of {}", base_nodes(problem_.nodes), uncut_->size()));
-  build();
-}
-
-/// From the uncut body to its cut as it is.
-void AppendedBody::build() {
-  twin_loads_.clear();
   space_ = std::make_unique<CutSpace>(uncut_->boxes(), *problem_.domain, uncut_->nodes(), uncut_->spheres(),
                                       problem_.material, space_options(options_));
   system_ = std::make_unique<CutSystem>(*uncut_, *space_);
   places_ = std::make_unique<KeptPlaces>(*uncut_, *space_, *system_);
   follow(everywhere(problem_));
+}
+
+AppendedBody::AppendedBody(const AppendedBody& other)
+    : problem_(other.problem_), options_(other.options_), report_(other.report_), uncut_(other.uncut_),
+      space_(std::make_unique<CutSpace>(*other.space_)), system_(std::make_unique<CutSystem>(*other.system_, *space_)),
+      loose_(other.loose_), dropped_(other.dropped_), components_(other.components_), loads_(other.loads_),
+      uncut_loads_(other.uncut_loads_), twin_loads_(other.twin_loads_),
+      places_(std::make_unique<KeptPlaces>(*other.places_, *space_, *system_, problem_, dropped_places())) {}
+
+KeptPlaces::IsDropped AppendedBody::dropped_places() const {
+  if (dropped_.empty())
+    return {};
+  return [this](const Vector3& x) { return is_dropped(space_->cut().part_at(x, *problem_.incision)); };
 }
 
 // Functions and system follow problem_.incision, which differs from what they know in `region` alone.
@@ -127,16 +134,17 @@ void AppendedBody::follow(const BoundingBox& region) {
     change = space_->update(problem_.incision, region);
   find_pieces();
   system_->update(change, loose_);
-  KeptPlaces::IsDropped is_dropped_at;
-  if (!dropped_.empty())
-    is_dropped_at = [this](const Vector3& x) { return is_dropped(space_->cut().part_at(x, *problem_.incision)); };
-  places_->follow(problem_, region, change, std::move(is_dropped_at));
+  places_->follow(problem_, region, change, dropped_places());
   assemble_loads();
   report_.nodes = problem_.nodes.size();
   report_.unknowns = coefficient_count();
   report_.supports_seconds = 0;
   if (problem_.incision != nullptr)
     report_.assembly_seconds = watch.seconds();
+}
+
+std::unique_ptr<AppendedBody> AppendedBody::copy() const {
+  return std::unique_ptr<AppendedBody>(new AppendedBody(*this));
 }
 
 std::string AppendedBody::grow(const SprinkleIncrement& change, Problem grown) {
@@ -146,15 +154,8 @@ std::string AppendedBody::grow(const SprinkleIncrement& change, Problem grown) {
   for (const SmallBox& box : uncut_->boxes().boxes())
     largest = std::max(largest, box.half.norm());
   const BoundingBox region = changed_region(problem_.incision.get(), *grown.incision, 2 * largest);
-  Problem before = std::exchange(problem_, std::move(grown));
-  try {
-    follow(region);
-  } catch (...) {
-    // As it was: the functions do not depend on the way that led to a cut.
-    problem_ = std::move(before);
-    build();
-    throw;
-  }
+  problem_ = std::move(grown);
+  follow(region);
   forget_factor_seconds();
   return {};
 }

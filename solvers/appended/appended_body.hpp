@@ -20,10 +20,13 @@ class AppendedBody final : public Discretisation {
   AppendedBody(const Problem& problem, const DiscretisationOptions& options);
   /// On an uncut body that is there already.
   AppendedBody(Problem problem, const DiscretisationOptions& options, std::shared_ptr<const UncutBody> uncut);
+  AppendedBody& operator=(const AppendedBody&) = delete;
 
+  /// One like this, to grow while this one stays as it is.
+  [[nodiscard]] std::unique_ptr<AppendedBody> copy() const;
   /// The body follows its cut to `grown`: what problem() becomes when `change` (ids as they are now, added nodes at the
-  /// end) and the new incision are put in; its loads are those of before. Returns why the body cannot follow and is as it was; empty: it has followed.
-  /// Throws as discretise(); the body is then as it was.
+  /// end) and the new incision are put in; its loads are those of before. Returns why the body cannot follow and is as
+  /// it was; empty: it has followed. Throws as discretise(); the body is then of no more use.
   [[nodiscard]] std::string grow(const SprinkleIncrement& change, Problem grown);
 
   [[nodiscard]] Method method() const override { return Method::galerkin; }
@@ -67,7 +70,8 @@ class AppendedBody final : public Discretisation {
   [[nodiscard]] Vector3 front_intensities(const Field& field, const topology::FrontFrame& front) const;
 
  private:
-  void build();
+  AppendedBody(const AppendedBody& other);
+  [[nodiscard]] KeptPlaces::IsDropped dropped_places() const;
   void follow(const BoundingBox& region);
   void find_pieces();
   void add_force(const Vector3& x, const Vector3& force);
@@ -98,7 +102,7 @@ class AppendedBody final : public Discretisation {
   CutVectors loads_;
   VectorX uncut_loads_; // body force and initial stress on the functions of the uncut body; empty: not known
   std::unordered_map<int, Vector3> twin_loads_; // N, the same on twins, by CutFunction::id
-  std::unique_ptr<KeptPlaces> places_; // what they keep is found as it is asked for
+  std::unique_ptr<KeptPlaces> places_;          // what they keep is found as it is asked for
 };
 
 /// A body of method galerkin with rule `appended`, on `uncut` where that fits its nodes (else, or where it is null, on

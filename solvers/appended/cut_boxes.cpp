@@ -125,10 +125,11 @@ bool CutBoxes::lies_at_sheet(int box, const topology::Incision& incision) const 
 std::vector<int> CutBoxes::update(const topology::Incision& incision, const BoundingBox& region) {
   std::vector<int> concerned, fresh;
   boxes_.within(region, concerned);
-  std::unordered_map<int, std::unique_ptr<Divided>> before;
+  std::unordered_map<int, Divided> before;
   for (const int box : concerned) {
-    if (divided_[box] != nullptr) {
-      before[box] = std::move(divided_[box]);
+    if (divided_[box]) {
+      before.emplace(box, std::move(*divided_[box]));
+      divided_[box].reset();
       fresh.push_back(box);
     }
     std::vector<CutPart> parts = divide(box, incision);
@@ -136,8 +137,7 @@ std::vector<int> CutBoxes::update(const topology::Incision& incision, const Boun
         lies_at_sheet(box, incision)) {
       if (fresh.empty() || fresh.back() != box)
         fresh.push_back(box);
-      divided_[box] = std::make_unique<Divided>();
-      divided_[box]->parts = std::move(parts);
+      divided_[box].emplace().parts = std::move(parts);
     }
   }
   // Links of what has been divided anew, and of what lies beside it.
@@ -151,13 +151,13 @@ std::vector<int> CutBoxes::update(const topology::Incision& incision, const Boun
   std::vector<int> changed;
   for (const int box : relinked) {
     const auto old = before.find(box);
-    if (divided_[box] == nullptr) {
+    if (!divided_[box]) {
       changed.push_back(box);
       continue;
     }
     Divided& divided = *divided_[box];
     const bool is_new = old == before.end() && std::binary_search(fresh.begin(), fresh.end(), box);
-    const Divided was = old != before.end() ? *old->second : divided;
+    const Divided was = old != before.end() ? old->second : divided;
     const SmallBox& at = boxes_.boxes()[box];
     const auto front = incision.front_frame(at.centre, at.half.norm());
     divided.joined = front && ((front->point - at.centre).cwiseAbs().array() <= at.half.array()).all();

@@ -4,7 +4,7 @@
 #include "solvers/appended/small_boxes.hpp"
 #include "topology/incision/incision.hpp"
 
-#include <memory>
+#include <optional>
 #include <unordered_map>
 
 namespace spherecut::solvers {
@@ -36,17 +36,17 @@ class CutBoxes {
   std::vector<int> update(const topology::Incision& incision, const BoundingBox& region);
 
   [[nodiscard]] int part_count(int box) const {
-    return divided_[box] == nullptr ? 1 : static_cast<int>(divided_[box]->parts.size());
+    return !divided_[box] ? 1 : static_cast<int>(divided_[box]->parts.size());
   }
   [[nodiscard]] CutPart part(PartId id) const {
     const int box = box_of(id);
-    if (divided_[box] != nullptr)
+    if (divided_[box])
       return divided_[box]->parts[id % most_parts];
     const Vector3& middle = boxes_.boxes()[box].middle;
     return {1, middle, middle};
   }
   /// Whether the cut divides the box, or parts it from a neighbour.
-  [[nodiscard]] bool is_divided(int box) const { return divided_[box] != nullptr; }
+  [[nodiscard]] bool is_divided(int box) const { return divided_[box].has_value(); }
   /// Calls visit(part) for the parts that hang together with this one across a face of its box, or around a front
   /// within it.
   template <class Visit>
@@ -80,15 +80,14 @@ class CutBoxes {
 
   const SmallBoxes& boxes_;
   const topology::Domain& domain_;
-  std::vector<std::unique_ptr<Divided>> divided_; // by box; null: one part
+  std::vector<std::optional<Divided>> divided_; // by box; of no value: one part
 };
 
 template <class Visit>
 void CutBoxes::for_each_linked(PartId id, Visit&& visit) const {
   const int box = box_of(id), k = id % most_parts;
   const std::span<const int> neighbours = boxes_.neighbours(box);
-  const Divided* const own = divided_[box].get();
-  if (own != nullptr) {
+  if (const std::optional<Divided>& own = divided_[box]) {
     if (own->joined)
       for (int other = 0; other < std::ssize(own->parts); ++other)
         if (other != k)
@@ -100,8 +99,8 @@ void CutBoxes::for_each_linked(PartId id, Visit&& visit) const {
     return;
   }
   for (const int neighbour : neighbours) {
-    const Divided* const other = divided_[neighbour].get();
-    if (other == nullptr) {
+    const std::optional<Divided>& other = divided_[neighbour];
+    if (!other) {
       visit(part_id(neighbour, 0));
       continue;
     }

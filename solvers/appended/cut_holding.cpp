@@ -39,7 +39,7 @@ void CutSystem::add_held(int first_new, const CutSpace::Change& change) {
       mark(carriers_[k], news);
   carriers_.clear();
   for (int k = 0; k < functions(); ++k) {
-    const CutFunction& function = space_.functions()[k];
+    const CutFunction& function = space_->functions()[k];
     carriers_.push_back(function.is_front ? function.group.nodes : std::vector<int>{function.twin.node});
     mark(carriers_.back(), carries);
     if (k >= first_new)
@@ -95,7 +95,7 @@ void CutSystem::add_held(int first_new, const CutSpace::Change& change) {
 // Shares of the held surface whose points the cut hides from one another.
 void CutSystem::part_held_shares() {
   parted_.clear();
-  const topology::Incision* incision = space_.incision();
+  const topology::Incision* incision = space_->incision();
   if (incision == nullptr)
     return;
   for (std::size_t p = 0; p < held_.size(); ++p) {

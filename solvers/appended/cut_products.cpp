@@ -15,13 +15,13 @@ constexpr int most_samples = 16; // of a part
 } // namespace
 
 void CutSystem::evaluate_twin(int function, FunctionData& data) const {
-  const Twin& twin = space_.functions()[function].twin;
+  const Twin& twin = space_->functions()[function].twin;
   for (const PartId part : twin.hidden) {
-    const int samples = data.is_sampled ? static_cast<int>(space_.samples(part).size()) : 1;
+    const int samples = data.is_sampled ? static_cast<int>(space_->samples(part).size()) : 1;
     bool any = false;
     std::array<double, 3 * most_samples> gradients{};
     for (int n = 0; n < samples; ++n)
-      if (ScalarTerm term; space_.term_at(function, part, n, term)) {
+      if (ScalarTerm term; space_->term_at(function, part, n, term)) {
         any = true;
         std::copy_n(term.gradient.data(), 3, gradients.data() + 3 * n);
       }
@@ -33,8 +33,8 @@ void CutSystem::evaluate_twin(int function, FunctionData& data) const {
 }
 
 void CutSystem::evaluate(int first_new) {
-  for (int k = first_new; k < std::ssize(space_.functions()); ++k) {
-    const CutFunction& own = space_.functions()[k];
+  for (int k = first_new; k < std::ssize(space_->functions()); ++k) {
+    const CutFunction& own = space_->functions()[k];
     FunctionData& data = data_.emplace_back();
     data.id = own.id;
     data.is_front = own.is_front;
@@ -42,8 +42,8 @@ void CutSystem::evaluate(int first_new) {
     if (!own.is_front)
       evaluate_twin(k, data);
   }
-  for (const int cell : space_.cells_of_groups(first_new))
-    space_.for_each_front_term(first_new, cell, [&](PartId part, int, const FrontTerm& term) {
+  for (const int cell : space_->cells_of_groups(first_new))
+    space_->for_each_front_term(first_new, cell, [&](PartId part, int, const FrontTerm& term) {
       FunctionData& data = data_[term.function];
       data.parts.push_back(part);
       const std::size_t size = data.gradients.size();
@@ -124,15 +124,15 @@ void CutSystem::list_cell(int cell_index, std::span<const int> fresh, CellProduc
     list->clear();
   work.weights.clear();
   for (int box = cell.first_box; box < cell.first_box + cell.boxes; ++box)
-    for (int k = 0; k < space_.cut().part_count(box); ++k) {
+    for (int k = 0; k < space_->cut().part_count(box); ++k) {
       const PartId part = part_id(box, k);
-      const double volume = space_.cut().part(part).share * boxes.boxes()[box].volume;
-      if (space_.known_samples(part) == 1) {
+      const double volume = space_->cut().part(part).share * boxes.boxes()[box].volume;
+      if (space_->known_samples(part) == 1) {
         work.parts.push_back(part);
         work.weights.push_back(volume);
         continue;
       }
-      for (const PlacedSample& sample : space_.samples(part)) {
+      for (const PlacedSample& sample : space_->samples(part)) {
         work.parts.push_back(part);
         work.weights.push_back(sample.share * volume);
       }

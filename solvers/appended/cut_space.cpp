@@ -205,8 +205,9 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
   if (divided.empty())
     return;
   const bool meets_front = incision_->front_frame(spheres_.centres()[node], spheres_.radii()[node]).has_value();
-  const bool has_step = largest_on_cut(node, divided) >= options_.step_share ||
-                        (options_.steps_by_run && nodes_.spacings[node] <= options_.step_coarser * spacing_on_cut(node));
+  const bool has_step =
+      largest_on_cut(node, divided) >= options_.step_share ||
+      (options_.steps_by_run && nodes_.spacings[node] <= options_.step_coarser * spacing_on_cut(node));
   const bool is_whole = meets_front && hangs_together(node, divided);
   if (is_whole && !has_step)
     return;
@@ -507,7 +508,7 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
   for (const int box : cut_.update(*incision_, region))
     changed[box] = 1;
   const int runs_before = functions_.empty() ? 0 : places_.runs().count();
-  places_.follow(incision_, region, changed);
+  places_.follow(cut_, incision_, region, changed);
   std::vector<char> cell_changed(boxes_.cells().size(), 0);
   for (int box = 0; box < boxes_.size(); ++box)
     if (changed[box] != 0)
@@ -613,7 +614,7 @@ bool CutSpace::term_at(int k, PartId part, int sample, ScalarTerm& term) const {
     term = {k, middle, gradient};
     return true;
   }
-  PlacedSample& placed = places_.of(part)[sample];
+  PlacedSample& placed = places_.of(cut_, part)[sample];
   const FrontPlace* at_front = placed.place ? &*placed.place : nullptr;
   if (twin.run >= 0) {
     if (!std::binary_search(twin.hidden.begin(), twin.hidden.end(), part))

@@ -18,8 +18,8 @@ struct CutSpaceOptions {
   double step_reach = 1;
   double step_turn = 20; // degrees
   /// Where the shape function of a sphere is nowhere on the cut larger than this, it has no step: a large sphere among
-  /// small ones, which open the cut by themselves. A step of its own would change what it does far from the cut. By runs
-  /// that holds for spheres whose node is so much coarser than the one nearest to the cut.
+  /// small ones, which open the cut by themselves. A step of its own would change what it does far from the cut. By
+  /// runs that holds for spheres whose node is so much coarser than the one nearest to the cut.
   double step_share = 0.1;
   double step_coarser = 1.2;
   double shallow = 1.2; // radii of a sphere: a cut that reaches no farther behind its front parts no sphere there
@@ -96,7 +96,7 @@ class CutSpace {
   /// Cells in which a function may differ from zero, ascending.
   [[nodiscard]] std::vector<int> cells_of(const CutFunction& function) const;
   /// Samples of a part for functions that know of the front; the others take the part as one.
-  [[nodiscard]] const PlacedPart& samples(PartId part) const { return places_.of(part); }
+  [[nodiscard]] const PlacedPart& samples(PartId part) const { return places_.of(cut_, part); }
   /// How many samples a part has as far as functions have been asked for there.
   [[nodiscard]] int known_samples(PartId part) const { return places_.known_samples(part); }
   /// Term of a twin at a part of a box, or of a step at one of its samples, with the box's linear shape functions.
@@ -160,12 +160,12 @@ class CutSpace {
     std::array<double, BoxShapes::lanes> middle{};        // at the middles of the boxes
     std::array<double, 3 * BoxShapes::lanes> gradients{}; // 1/m, [lane][axis]
   };
-  mutable std::vector<Blend> blends_; // of one cell
-  mutable std::vector<int> blend_of_; // by function, -1 between calls
-  mutable std::vector<int> local_;    // of a part among those of a sphere, -1 between calls
+  mutable std::vector<Blend> blends_;  // of one cell
+  mutable std::vector<int> blend_of_;  // by function, -1 between calls
+  mutable std::vector<int> local_;     // of a part among those of a sphere, -1 between calls
   std::vector<signed char> connected_; // by node: the boxes in reach hang together without a cut; -1: not known
-  std::vector<char> curved_;          // by segment of the front: its run is curved
-  std::vector<double> carried_;       // m, likewise: nodes so near to it carry functions along the front
+  std::vector<char> curved_;           // by segment of the front: its run is curved
+  std::vector<double> carried_;        // m, likewise: nodes so near to it carry functions along the front
   int next_id_ = 0;
 };
 
@@ -207,7 +207,7 @@ void CutSpace::for_each_front_term(int first, int cell_index, Visit&& visit) con
         if (blend.middle[lane] == 0 && gradient.isZero(0))
           continue;
         if (samples == nullptr)
-          samples = &places_.of(part);
+          samples = &places_.of(cut_, part);
         for (int n = 0; n < std::ssize(*samples); ++n)
           if (PlaceAtRun* const at = places_.at_run((*samples)[n], functions_[blend.function].group.run); at != nullptr)
             visit(part, n,

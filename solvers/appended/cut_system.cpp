@@ -19,11 +19,11 @@ CutFunctional CutSystem::mean_over(const std::vector<QuadraturePoint>& points, F
   ShapeFunctions shape;
   CutTerms terms;
   for (const QuadraturePoint& point : points) {
-    const PartId part = space_.part_at(point.position);
+    const PartId part = space_->part_at(point.position);
     uncut_.boxes().evaluate(box_of(part), point.position, shape);
     if (faint == Faint::left_out)
-      space_.take_out_faint(point.position, part, shape);
-    space_.terms_at(point.position, part, shape, terms);
+      space_->take_out_faint(point.position, part, shape);
+    space_->terms_at(point.position, part, shape, terms);
     for (int k = 0; k < shape.size(); ++k)
       base[shape.nodes[k]] += point.weight * shape.value[k];
     for (const ScalarTerm& term : terms.scalar)
@@ -119,12 +119,12 @@ void CutSystem::add_springs(const std::vector<std::vector<int>>& loose) {
     Vector3 centre = Vector3::Zero();
     double spacing = 0;
     for (const int k : loose[p]) {
-      centre += uncut_.nodes().positions[space_.functions()[k].twin.node] / static_cast<double>(loose[p].size());
-      spacing = std::max(spacing, uncut_.nodes().spacings[space_.functions()[k].twin.node]);
+      centre += uncut_.nodes().positions[space_->functions()[k].twin.node] / static_cast<double>(loose[p].size());
+      spacing = std::max(spacing, uncut_.nodes().spacings[space_->functions()[k].twin.node]);
     }
     MatrixX rigid = MatrixX::Zero(schur_.rows(), 6);
     for (const int k : loose[p]) {
-      const Vector3 x = (uncut_.nodes().positions[space_.functions()[k].twin.node] - centre) / spacing;
+      const Vector3 x = (uncut_.nodes().positions[space_->functions()[k].twin.node] - centre) / spacing;
       rigid.block<3, 3>(3 * static_cast<Eigen::Index>(k), 0).setIdentity();
       rigid.block<3, 3>(3 * static_cast<Eigen::Index>(k), 3) << 0, x.z(), -x.y(), -x.z(), 0, x.x(), x.y(), -x.x(), 0;
     }
@@ -150,7 +150,7 @@ void CutSystem::factor(Eigen::Index unchanged) {
     }
     const VectorX energy = elastic_.diagonal().tail(rest) + penalty_.diagonal().tail(rest);
     if (const int column = factor_lower_semidefinite(corner, energy); column >= 0) {
-      const CutFunction& function = space_.functions()[unchanged + column / 3];
+      const CutFunction& function = space_->functions()[unchanged + column / 3];
       const Vector3 x = function.is_front ? function.group.station.point : uncut_.nodes().positions[function.twin.node];
       throw NumericalError(fmt::format("what the cut appends is not semidefinite (unknown {} of {}, about ({:.4g}, "
                                        "{:.4g}, {:.4g}) m): a severed piece is not held, or a function repeats another",

@@ -34,7 +34,10 @@ struct CutVectors {
 class CutSystem {
  public:
   CutSystem(const UncutBody& uncut, const CutSpace& space)
-      : uncut_(uncut), space_(space), half_(3 * uncut.size(), 0), parted_half_(3 * uncut.size(), 0) {}
+      : uncut_(uncut), space_(&space), half_(3 * uncut.size(), 0), parted_half_(3 * uncut.size(), 0) {}
+
+  /// What `other` is, on a space that is a copy of its own.
+  CutSystem(const CutSystem& other, const CutSpace& space) : CutSystem(other) { space_ = &space; }
 
   /// Follows the space. `loose`: lists of twins, each of those that carry one piece that nothing holds; six soft
   /// springs hold its rigid motions. They stay without load under loads in balance.
@@ -77,6 +80,8 @@ class CutSystem {
   [[nodiscard]] long stored() const { return static_cast<long>(half_.size() + schur_.size()); }
 
  private:
+  CutSystem(const CutSystem&) = default;
+
   /// Of one appended function.
   struct FunctionData {
     int id = -1;
@@ -114,7 +119,7 @@ class CutSystem {
   void distribute(int cell, const CellProducts& work);
 
   const UncutBody& uncut_;
-  const CutSpace& space_;
+  const CutSpace* space_;
   std::vector<FunctionData> data_;
   std::vector<std::vector<int>> in_cell_; // functions by cell, ascending
   std::vector<CutFunctional> held_;

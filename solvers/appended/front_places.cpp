@@ -18,11 +18,11 @@ constexpr double nearest_sample = 0.05; // half diagonals: samples count as this
 
 // What is integrated goes with 1 / r. The octants of a part near the front count one by one, and the place of each
 // stands where r is its harmonic mean over the octant.
-PlacedPart FrontPlaces::sampled(PartId part, const FrontPlace& middle) const {
-  const CutPart whole = cut_.part(part);
-  const SmallBox& box = cut_.boxes().boxes()[box_of(part)];
+PlacedPart FrontPlaces::sampled(const CutBoxes& cut, PartId part, const FrontPlace& middle) const {
+  const CutPart whole = cut.part(part);
+  const SmallBox& box = cut.boxes().boxes()[box_of(part)];
   const double radius = box.half.norm();
-  const bool divided = cut_.part_count(box_of(part)) > 1;
+  const bool divided = cut.part_count(box_of(part)) > 1;
   const Vector3 half = box.half / front_samples_along;
   const Matrix3 across =
       middle.grad_ahead * middle.grad_ahead.transpose() + middle.grad_above * middle.grad_above.transpose();
@@ -71,19 +71,18 @@ PlacedPart FrontPlaces::sampled(PartId part, const FrontPlace& middle) const {
   return samples;
 }
 
-PlacedPart& FrontPlaces::of(PartId part) {
-  std::unique_ptr<PlacedPart>& known = places_[part];
-  if (known == nullptr) {
-    const CutPart at = cut_.part(part);
+PlacedPart& FrontPlaces::of(const CutBoxes& cut, PartId part) {
+  PlacedPart& known = places_[part];
+  if (known.empty()) {
+    const CutPart at = cut.part(part);
     const std::optional<FrontPlace> place = front_place(*incision_, at.centroid, reach_);
-    known = std::make_unique<PlacedPart>();
-    if (place && place->distance < near_front_boxes * cut_.boxes().boxes()[box_of(part)].half.norm())
-      *known = sampled(part, *place);
-    if (known->empty())
-      known->push_back({1, at.centroid, place, {}});
+    if (place && place->distance < near_front_boxes * cut.boxes().boxes()[box_of(part)].half.norm())
+      known = sampled(cut, part, *place);
+    if (known.empty())
+      known.push_back({1, at.centroid, place, {}});
     placed_.push_back(part);
   }
-  return *known;
+  return known;
 }
 
 /// A sample with respect to a run; null: the run is far from it.
@@ -148,10 +147,10 @@ std::vector<int> FrontPlaces::segments_now(const FrontRuns* before) const {
 
 /// Forgets the places of parts whose places of the fronts are others now: changed[box] becomes 2, unless the box itself
 /// is another (1).
-void FrontPlaces::follow(std::shared_ptr<const topology::Incision> incision, const BoundingBox& region,
-                         std::vector<char>& changed) {
+void FrontPlaces::follow(const CutBoxes& cut, std::shared_ptr<const topology::Incision> incision,
+                         const BoundingBox& region, std::vector<char>& changed) {
   incision_ = std::move(incision);
-  const std::unique_ptr<const FrontRuns> before_runs = std::exchange(runs_, std::make_unique<FrontRuns>(incision_));
+  const std::shared_ptr<const FrontRuns> before_runs = std::exchange(runs_, std::make_shared<FrontRuns>(incision_));
   const std::vector<int> segment_now = segments_now(before_runs.get());
   // The nearest place of the front changes where the front did. Far from what has changed it is where it was.
   const auto is_far = [&](const Vector3& x, double radius, const PlacedPart& before) {
@@ -184,14 +183,14 @@ void FrontPlaces::follow(std::shared_ptr<const topology::Incision> incision, con
   std::sort(before_parts.begin(), before_parts.end());
   for (const PartId part : before_parts) {
     const int box = box_of(part);
-    std::unique_ptr<PlacedPart> before = std::move(places_[part]);
-    if (changed[box] == 1 || part % most_parts >= cut_.part_count(box))
+    PlacedPart before = std::exchange(places_[part], {});
+    if (changed[box] == 1 || part % most_parts >= cut.part_count(box))
       continue;
-    if (is_far(cut_.boxes().boxes()[box].centre, cut_.boxes().boxes()[box].half.norm(), *before) &&
-        renumber_runs(*before, segment_now)) {
+    if (is_far(cut.boxes().boxes()[box].centre, cut.boxes().boxes()[box].half.norm(), before) &&
+        renumber_runs(before, segment_now)) {
       places_[part] = std::move(before);
       placed_.push_back(part);
-    } else if (are_others(*before, of(part))) {
+    } else if (are_others(before, of(cut, part))) {
       changed[box] = 2;
     }
   }

@@ -32,22 +32,21 @@ using PlacedPart = std::vector<PlacedSample>;
 /// Places are found as they are asked for, and kept until the fronts about them change.
 class FrontPlaces {
  public:
-  /// Boxes and domain outlive this. `reach`, m: places farther from every front know of none.
+  /// The domain outlives this. `reach`, m: places farther from every front know of none. `cut`, here and below: the
+  /// same boxes, as they are.
   FrontPlaces(const CutBoxes& cut, const topology::Domain& domain, const Material& material, double reach)
-      : cut_(cut), domain_(domain), material_(material), reach_(reach),
+      : domain_(domain), material_(material), reach_(reach),
         places_(most_parts * static_cast<std::size_t>(cut.boxes().size())) {}
 
   /// After the boxes have followed the cut, which changed in `region` alone. `changed`, by box: 1 where its parts are
   /// others now; becomes 2 where they are the same and lie elsewhere with respect to the fronts.
-  void follow(std::shared_ptr<const topology::Incision> incision, const BoundingBox& region,
+  void follow(const CutBoxes& cut, std::shared_ptr<const topology::Incision> incision, const BoundingBox& region,
               std::vector<char>& changed);
 
   [[nodiscard]] const FrontRuns& runs() const { return *runs_; }
-  [[nodiscard]] PlacedPart& of(PartId part);
+  [[nodiscard]] PlacedPart& of(const CutBoxes& cut, PartId part);
   /// How many samples a part has as far as it has been asked for.
-  [[nodiscard]] int known_samples(PartId part) const {
-    return places_[part] == nullptr ? 1 : static_cast<int>(places_[part]->size());
-  }
+  [[nodiscard]] int known_samples(PartId part) const { return std::max(1, static_cast<int>(places_[part].size())); }
   /// A sample with respect to a run; null: the run is far from it. Valid until the next run is asked for.
   [[nodiscard]] PlaceAtRun* at_run(PlacedSample& sample, int run) const;
   /// A place with respect to a run; of no value: the run is far.
@@ -58,18 +57,17 @@ class FrontPlaces {
   [[nodiscard]] std::optional<FrontPlace> nearest(const Vector3& x) const { return front_place(*incision_, x, reach_); }
 
  private:
-  [[nodiscard]] PlacedPart sampled(PartId part, const FrontPlace& middle) const;
+  [[nodiscard]] PlacedPart sampled(const CutBoxes& cut, PartId part, const FrontPlace& middle) const;
   [[nodiscard]] std::vector<int> segments_now(const FrontRuns* before) const;
   bool renumber_runs(PlacedPart& kept, const std::vector<int>& segment_now) const;
 
-  const CutBoxes& cut_;
   const topology::Domain& domain_;
   Material material_;
   double reach_;
   std::shared_ptr<const topology::Incision> incision_;
-  std::unique_ptr<const FrontRuns> runs_;
-  std::vector<std::unique_ptr<PlacedPart>> places_; // by part; null: not asked for yet
-  std::vector<PartId> placed_;                      // those that are there
+  std::shared_ptr<const FrontRuns> runs_;
+  std::vector<PlacedPart> places_; // by part; without samples: not asked for yet
+  std::vector<PartId> placed_;     // those that are there
 };
 
 } // namespace spherecut::solvers

@@ -27,7 +27,7 @@ void KeptPlaces::follow(const Problem& problem, const BoundingBox& region, const
   is_dropped_ = std::move(is_dropped);
   const std::vector<char> before = std::move(carried_now_);
   carried_now_.assign(static_cast<std::size_t>(uncut_.size()), 0);
-  for (const CutFunction& function : space_.functions())
+  for (const CutFunction& function : space_->functions())
     if (function.is_front)
       for (const int node : function.group.nodes)
         carried_now_[node] = 1;
@@ -63,7 +63,7 @@ void KeptPlaces::follow(const Problem& problem, const BoundingBox& region, const
 CutFunctional KeptPlaces::mean_over(std::vector<QuadraturePoint> points) const {
   if (is_dropped_)
     std::erase_if(points, [&](const QuadraturePoint& point) { return is_dropped_(point.position); });
-  return system_.mean_over(points);
+  return system_->mean_over(points);
 }
 
 void KeptPlaces::require(const std::vector<int>& wanted) {
@@ -147,12 +147,12 @@ MatrixX KeptPlaces::base_halves(const std::vector<int>& nodes) {
 }
 
 CutVectors KeptPlaces::unit_halves(const std::vector<int>& nodes) {
-  CutVectors halves = system_.zero(3 * std::ssize(nodes));
+  CutVectors halves = system_->zero(3 * std::ssize(nodes));
   halves.base = base_halves(nodes);
   for (Eigen::Index k = 0; k < std::ssize(nodes); ++k)
     for (const auto& [function, matrix] : contacts_.at(nodes[k]).mean.cut)
       halves.cut.block<3, 3>(3 * static_cast<Eigen::Index>(function), 3 * k) = matrix.transpose();
-  system_.finish_halves(halves);
+  system_->finish_halves(halves);
   return halves;
 }
 

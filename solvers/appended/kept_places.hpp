@@ -22,7 +22,16 @@ class KeptPlaces {
   };
 
   KeptPlaces(const UncutBody& uncut, const CutSpace& space, const CutSystem& system)
-      : uncut_(uncut), space_(space), system_(system) {}
+      : uncut_(uncut), space_(&space), system_(&system) {}
+  /// What `other` knows, with copies of its space, its system and its problem.
+  KeptPlaces(const KeptPlaces& other, const CutSpace& space, const CutSystem& system, const Problem& problem,
+             IsDropped is_dropped)
+      : KeptPlaces(other) {
+    space_ = &space;
+    system_ = &system;
+    problem_ = &problem;
+    is_dropped_ = std::move(is_dropped);
+  }
 
   /// After the space and the system have followed the cut, which changed in `region` alone. `problem` outlives the next
   /// call. Whatever a function reaches that has come or gone is found anew, as are shares near the region.
@@ -41,6 +50,8 @@ class KeptPlaces {
   MatrixX compliance(const std::vector<int>& nodes);
 
  private:
+  KeptPlaces(const KeptPlaces&) = default;
+
   struct Half {
     std::vector<std::pair<int, double>> of; // the base part of the mean that it belongs to
     MatrixX base;                           // three columns, in elimination order
@@ -52,8 +63,8 @@ class KeptPlaces {
   [[nodiscard]] bool is_carried(const CutFunctional& functional) const;
 
   const UncutBody& uncut_;
-  const CutSpace& space_;
-  const CutSystem& system_;
+  const CutSpace* space_;
+  const CutSystem* system_;
   const Problem* problem_ = nullptr;
   IsDropped is_dropped_;
   std::unordered_map<int, Contact> contacts_;

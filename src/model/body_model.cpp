@@ -353,18 +353,21 @@ solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const 
 }
 
 std::string follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
-                       const solvers::SprinkleIncrement& change, BodyModel& before, BodyModel& after) {
-  if (before.body == nullptr)
-    return "the first cut";
-  auto* body = dynamic_cast<solvers::AppendedBody*>(before.body.get());
-  if (body == nullptr)
-    return "the body is made anew behind its cut";
-  if (std::string why_not = body->grow(change, problem_of(scenario, domain, after)); !why_not.empty())
+                       const solvers::SprinkleIncrement& change, std::unique_ptr<solvers::Discretisation> body,
+                       BodyModel& after) {
+  auto* const appended = dynamic_cast<solvers::AppendedBody*>(body.get());
+  if (appended == nullptr)
+    return body == nullptr ? "the first cut" : "the body is made anew behind its cut";
+  if (std::string why_not = appended->grow(change, problem_of(scenario, domain, after)); !why_not.empty())
     return why_not;
   after.pairs = solvers::lip_pairs(after.sprinkling.nodes);
-  after.body = std::move(before.body);
-  after.uncut = before.uncut;
+  after.body = std::move(body);
   return "";
+}
+
+std::unique_ptr<solvers::Discretisation> body_to_grow(const BodyModel& model) {
+  const auto* const appended = dynamic_cast<const solvers::AppendedBody*>(model.body.get());
+  return appended == nullptr ? nullptr : appended->copy();
 }
 
 void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {

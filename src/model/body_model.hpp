@@ -130,11 +130,14 @@ std::string hindrance_to_growth(const Scenario& scenario, const BodyModel& model
 solvers::SprinkleIncrement exchange_nodes(const topology::Domain& domain, const solvers::SprinkleOptions& options,
                                           const BodyModel& before, solvers::Sprinkling& after);
 
-/// The body of `before`, whose cut only appends, follows the cut to the nodes and incision of `after` and goes over to
-/// it. Where it cannot, both models stay as they are. Returns why; empty: it has followed. Throws as
-/// solvers::AppendedBody::grow does, and all stays as it was.
+/// A copy of a body whose cut only appends, for follow_cut() to take; null: the model has none.
+std::unique_ptr<solvers::Discretisation> body_to_grow(const BodyModel& model);
+
+/// Such a copy follows the cut to the nodes and incision of `after` and becomes its body. Where it cannot, `after` has
+/// none. Returns why; empty: it has followed. Throws as solvers::AppendedBody::grow does.
 std::string follow_cut(const Scenario& scenario, const std::shared_ptr<const topology::Domain>& domain,
-                       const solvers::SprinkleIncrement& change, BodyModel& before, BodyModel& after);
+                       const solvers::SprinkleIncrement& change, std::unique_ptr<solvers::Discretisation> body,
+                       BodyModel& after);
 
 /// Condenses the model onto tool candidates; none: the tool is far. Forgets the state. `for_few_presses`: without the
 /// fields of the patch where the method can do without (contact_solver.hpp).

@@ -91,7 +91,6 @@ bool BladeCutting::is_put_off(const StepSample& sample) {
 bool BladeCutting::cut(const StepSample& sample, bool places, CutReport& report) {
   const topology::RestMap to_rest = state_.to_rest_if_moved();
   topology::SweepResult swept;
-  const solvers::Discretisation* const body = state_.model.body.get();
   std::optional<topology::Wound> wound_before;
   if (places)
     blade_.put_down();
@@ -122,7 +121,7 @@ bool BladeCutting::cut(const StepSample& sample, bool places, CutReport& report)
   } catch (const NumericalError& error) {
     refuse_cut(sample.time, error.what(), report, state_.log);
   }
-  updater_.take_back_cut(body);
+  state_.incisions->take_back();
   return false;
 }
 

@@ -233,7 +233,7 @@ bool ResistedBlade::propose(const std::vector<topology::BladePose>& poses, const
       return false;
     BodyModel next = updater_.next();
     state_.rebuild = Rebuild::in_step;
-    updater_.build_cut({.beside = true}, next, report);
+    updater_.build_cut({}, next, report);
     const StageTimer timer(report.seconds.solve);
     contact_.solve(sample, next);
     const double drawn = fronts_.released(state_.model, *next.incision);

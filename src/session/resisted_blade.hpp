@@ -27,8 +27,6 @@ class ResistedBlade {
 
   /// The hand has let go of it: it is nowhere until it is put somewhere.
   void lift();
-  /// It knows nothing of what has been torn since: likewise, the proposal stays.
-  void forget_place() { force_.lift(); }
   /// The proposal is not taken any more, and none that is under way; the cut is that of the body again.
   void drop_proposal();
   [[nodiscard]] bool has_proposal() const { return mark_.has_value(); }

@@ -188,7 +188,6 @@ bool TearPropagation::take(const StepSample& sample, const std::function<void()>
   }
   FineZoneTracker::Mark zone = state_.zone.mark();
   std::optional<Grasp> lost;
-  const solvers::Discretisation* const body = state_.model.body.get();
   try {
     build(sample, lost, update);
     return true;
@@ -200,21 +199,13 @@ bool TearPropagation::take(const StepSample& sample, const std::function<void()>
   state_.zone.go_back(std::move(zone));
   if (lost)
     grasping_.take_back(std::move(*lost));
-  try {
-    if (updater_.take_back_cut(body))
-      contact_.solve(sample, state_.model);
-  } catch (const std::runtime_error&) {
-    if (blade_ != nullptr)
-      blade_->forget_place(); // it knows nothing of what has been torn in this step
-    throw;
-  }
+  state_.incisions->take_back();
   return false;
 }
 
 // The body with what has been torn, solved. `lost`: what a grasper held, should that have come off.
 void TearPropagation::build(const StepSample& sample, std::optional<Grasp>& lost, BodyUpdate& update) {
   BodyModel next = updater_.next();
-  CutGrowth growth;
   if (!grasping_.holds())
     require_clear_of_tool(*next.incision, state_.model, state_.scenario.contact.condition);
   state_.check_pieces(sample.time);
@@ -222,14 +213,14 @@ void TearPropagation::build(const StepSample& sample, std::optional<Grasp>& lost
     const StageTimer timer(update.seconds.level_sets);
     state_.incisions->update_fields();
   }
-  growth.renewed = updater_.lead_zone(*next.incision);
+  std::string renewed = updater_.lead_zone(*next.incision);
   if (grasping_.holds() && grasping_.piece_is_free(state_.incisions->wound())) {
     lost = grasping_.lose();
-    growth.renewed = "the piece in the grasper has come off";
+    renewed = "the piece in the grasper has come off";
     state_.log.warn("grip", fmt::format("t = {:g} s: the piece in the grasper has come off", sample.time));
   }
   background_.drop_following();
-  updater_.build_cut(growth, next, update);
+  updater_.build_cut(renewed, next, update);
   {
     const StageTimer timer(update.seconds.solve);
     contact_.solve(sample, next);

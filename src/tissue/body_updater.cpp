@@ -84,15 +84,15 @@ std::string BodyUpdater::lead_zone(const topology::Incision& incision) {
   return hindrance.empty() ? "nodes go along with the front" : hindrance;
 }
 
-void BodyUpdater::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report) {
+void BodyUpdater::build_cut(const std::string& renewed, BodyModel& next, BodyUpdate& report) {
   if (is_nonlinear(scenario_.law)) {
     build_finite_cut(next, report);
     return;
   }
-  const std::string unfollowed = growth.beside ? "the blade is resisted" : state_.hindrance();
+  const std::string unfollowed = state_.hindrance();
   std::optional<solvers::SprinkleIncrement> exchanged;
   report.update = SystemUpdate::rebuilt;
-  report.update_reason = !unfollowed.empty() ? unfollowed : !spacing_stays() ? spacing_changed : growth.renewed;
+  report.update_reason = !unfollowed.empty() ? unfollowed : !spacing_stays() ? spacing_changed : renewed;
   if (report.update_reason.empty()) {
     const StageTimer timer(report.seconds.sprinkling);
     const StageTimer sprinkle_timer(state_.profile.sprinkle);
@@ -103,20 +103,19 @@ void BodyUpdater::build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate
       report.update_reason = error.what();
     }
   }
+  next.uncut = model_.uncut;
   std::vector<int> near;
   const auto make = [&] {
     near = contact_.candidates_in_reach(next);
     const StageTimer timer(report.seconds.assembly);
     if (exchanged && state_.options.updating) {
       const StageTimer growth_timer(state_.profile.discretise);
-      report.update_reason = follow_cut(scenario_, organ_.domain, *exchanged, model_, next);
+      report.update_reason = follow_cut(scenario_, organ_.domain, *exchanged, body_to_grow(model_), next);
       if (next.body != nullptr)
         report.update = SystemUpdate::updated;
     }
-    if (next.body == nullptr) {
-      next.uncut = model_.uncut;
+    if (next.body == nullptr)
       assemble(next);
-    }
   };
   const double seen = solvers::sight_seconds();
   if (exchanged) {
@@ -156,26 +155,6 @@ void BodyUpdater::build_finite_cut(BodyModel& next, BodyUpdate& report) const {
   report_body(next, 0, report);
 }
 
-bool BodyUpdater::take_back_cut(const solvers::Discretisation* body) {
-  state_.incisions->take_back();
-  if (model_.body.get() == body)
-    return false;
-  try {
-    // It had followed the cut before that was refused. Contact goes on from where it is.
-    app::assemble(scenario_, organ_.domain, model_);
-    std::optional<solvers::CutContactState> state = std::move(model_.state);
-    contact_.condense(std::vector<int>(model_.patch.nodes), model_, true);
-    model_.state = std::move(state);
-    model_.front_rules = {};
-  } catch (const std::runtime_error& error) {
-    model_.body.reset(); // the next step builds it
-    model_.state.reset();
-    throw NumericalError(
-        fmt::format("the body cannot be had again as it was before a cut that was refused: {}", error.what()));
-  }
-  return true;
-}
-
 BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContact& centre) const {
   FineZoneTracker there = state_.zone;
   there.move_to(centre);
@@ -210,6 +189,9 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
   const FineZoneTracker& zone = state_.zone;
   return [&scenario = scenario_, domain = organ_.domain, how = zone.sprinkle_options(incision, grasping_.kept_nodes()),
           incision_before = model_.incision, sprinkling = model_.sprinkling, lineage = model_.lineage, renewed, reason,
+          uncut = model_.uncut,
+          growing = std::make_shared<std::unique_ptr<solvers::Discretisation>>(
+              state_.options.updating ? body_to_grow(model_) : nullptr),
           coarseness = zone.coarseness(), centre = contact_.is_in_reach() ? zone.centre() : std::nullopt,
           reach = zone.zone().candidate_radius, facing = zone.facing()] {
     BackgroundBody made;
@@ -219,10 +201,12 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
     model.coarseness = coarseness;
     model.touched_from = facing;
     model.lineage = lineage;
+    model.uncut = uncut;
     BodyModel before;
     before.incision = incision_before;
     before.sprinkling = sprinkling;
     double sight = 0, condensing = 0; // s, of the attempt that goes
+    solvers::SprinkleIncrement exchanged;
     const auto build = [&](const auto& sprinkle) {
       update.seconds = {};
       condensing = 0;
@@ -237,7 +221,7 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
         near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
         if (is_nonlinear(scenario.law))
           make_finite_apart(scenario, domain, near, model);
-        else
+        else if (*growing == nullptr || !follow_cut(scenario, domain, exchanged, std::move(*growing), model).empty())
           app::assemble(scenario, domain, model);
         sight = solvers::sight_seconds() - seen;
       }
@@ -250,11 +234,12 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
     update.update_reason = renewed;
     if (renewed.empty())
       try {
-        build([&] { exchange_nodes(*domain, how, before, model.sprinkling); });
+        build([&] { exchanged = exchange_nodes(*domain, how, before, model.sprinkling); });
         update.update_reason = reason;
       } catch (const std::runtime_error& error) { // with all nodes made anew it may go
         update.update_reason = error.what();
         model.body.reset();
+        growing->reset();
       }
     if (model.body == nullptr)
       build([&] { model.sprinkling = resprinkle_held(scenario, *domain, how, before.sprinkling.nodes); });

@@ -1,18 +1,12 @@
-// The ways in which the body of a session comes about: built, following its cut by an update, built anew behind it,
-// taken back. A cut that only appends is followed by what it appends; behind any other, a blade's or a tear's, nodes
-// beside what is new are exchanged and the system is built anew. What is made in the background is described here too
+// The ways in which the body of a session comes about: built, following its cut by an update, built anew behind it. A
+// cut that only appends is followed by what it appends; behind any other, a blade's or a tear's, nodes beside what is
+// new are exchanged and the system is built anew. What is made in the background is described here too
 // (BackgroundBodies).
 #pragma once
 
 #include "src/tissue/contact_solver.hpp"
 
 namespace spherecut::app {
-
-/// An increment of the cut, for a body to follow.
-struct CutGrowth {
-  std::string renewed{}; // why all nodes are made anew; empty: those beside it are
-  bool beside = false;   // the body as it is stays
-};
 
 class BodyUpdater {
  public:
@@ -28,16 +22,13 @@ class BodyUpdater {
   /// Assembles it alone.
   void assemble(BodyModel& model);
 
-  /// Nodes and body of `next`, which has the new cut: of what was there, what the cut did not touch stays. Throws
-  /// InputError and NumericalError; take_back_cut() is then to be called.
-  void build_cut(const CutGrowth& growth, BodyModel& next, BodyUpdate& report);
+  /// Nodes and body of `next`, which has the new cut: of what was there, what the cut did not touch stays. The body as
+  /// it is stays, too. `renewed`: why all nodes are made anew; empty: those beside the cut are. Throws InputError and
+  /// NumericalError.
+  void build_cut(const std::string& renewed, BodyModel& next, BodyUpdate& report);
   /// Leads the fine zone along with the fronts of a tear. Returns why all nodes are to be made anew for its increment;
   /// empty: they are not.
   [[nodiscard]] std::string lead_zone(const topology::Incision& incision);
-  /// After a cut that was refused: incision, wound and body as they were. `body`: that of the model before. True: it is
-  /// another, of the same nodes, that has to be solved. Throws NumericalError where it cannot be had again.
-  bool take_back_cut(const solvers::Discretisation* body);
-
   /// What makes a body that has followed the tool: with the fine zone about `centre`.
   [[nodiscard]] BackgroundBodies::Make following_tool(const topology::SurfaceContact& centre) const;
   /// What makes the body with this cut, on the nodes that a step would have made. `reason`: why it is made there.

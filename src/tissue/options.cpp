@@ -30,8 +30,7 @@ CutPolicy cut_policy(const Scenario& scenario, const SessionOptions& options) {
   if (resists(scenario))
     return options.following_in_background && blade_alone && !advance ? CutPolicy::proposed_in_background
                                                                       : CutPolicy::proposed;
-  const bool is_cheap = cut_appends(scenario) && !is_nonlinear(scenario.law); // an increment is found in the step
-  if (options.following_in_background && blade_alone && !is_cheap && advance.value_or(background_advance) > 0)
+  if (options.following_in_background && blade_alone && advance.value_or(background_advance) > 0)
     return CutPolicy::in_background;
   return CutPolicy::in_step;
 }

@@ -251,6 +251,37 @@ std::vector<Interval> without(const std::vector<Interval>& parts, std::vector<In
   return left;
 }
 
+/// Whether the height of a triangle is less than a tenth of its longest edge: it is turned by where its corners happen
+/// to be.
+bool is_flat(const SurfaceMesh& sheet, int triangle) {
+  constexpr double flat = 0.1;
+  const auto& [a, b, c] = sheet.triangles[triangle];
+  const Vector3 &x = sheet.vertices[a], &y = sheet.vertices[b], &z = sheet.vertices[c];
+  const double longest = std::max({(y - x).squaredNorm(), (z - y).squaredNorm(), (x - z).squaredNorm()});
+  return (y - x).cross(z - x).norm() < flat * longest;
+}
+
+/// Unit normal of the sheet at a triangle; at a flat one that of the nearest others, each by its area.
+Vector3 steady_normal(const SurfaceMesh& sheet, const Neighbours& neighbours, int triangle) {
+  constexpr int most_rings = 8;
+  std::vector<int> seen{triangle};
+  std::size_t ring = 0;
+  for (int k = 0; k < most_rings && ring < seen.size(); ++k) {
+    Vector3 sum = Vector3::Zero();
+    const std::size_t end = seen.size();
+    for (std::size_t at = ring; at < end; ++at)
+      if (const auto& [a, b, c] = sheet.triangles[seen[at]]; !is_flat(sheet, seen[at]))
+        sum += (sheet.vertices[b] - sheet.vertices[a]).cross(sheet.vertices[c] - sheet.vertices[a]);
+    if (sum.squaredNorm() > 0)
+      return sum.normalized();
+    for (; ring < end; ++ring)
+      for (const int next : neighbours[seen[ring]])
+        if (next >= 0 && std::find(seen.begin(), seen.end(), next) == seen.end())
+          seen.push_back(next);
+  }
+  return triangle_normal(sheet, triangle);
+}
+
 FrontEnd blend(const FrontEnd& a, const FrontEnd& b, double s) {
   FrontEnd mean;
   mean.normal = ((1 - s) * a.normal + s * b.normal).normalized();
@@ -300,7 +331,7 @@ std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const
       const int count = static_cast<int>(loop.size());
       std::vector<FrontEnd> own(count), joint(count); // of edge i, and where edge i - 1 meets edge i
       for (int i = 0; i < count; ++i) {
-        own[i].normal = triangle_normal(sheet, loop[i].triangle);
+        own[i].normal = steady_normal(sheet, neighbours[s], loop[i].triangle);
         own[i].ahead = (sheet.vertices[loop[i].to] - sheet.vertices[loop[i].from]).cross(own[i].normal).normalized();
       }
       for (int i = 0; i < count; ++i) {

@@ -80,16 +80,16 @@ TEST_CASE("Two precuts nearer than two node distances are told, with distance, p
       found += warning.find("precut[1] and precut[2]") != std::string::npos ? warning : "";
     return found;
   };
-  const std::string fine = node_spacings("0.002", "0.002");
+  const std::string enriched = "[cut]\nsight = \"enriched\"\n", fine = node_spacings("0.002", "0.002") + enriched;
   CHECK_THAT(told("0.013", fine), Catch::Contains("are 3 mm apart at [") && Catch::Contains("= 0.001 m put 3 between"));
   CHECK(told("0.011", fine).empty());
-  CHECK(told("0.013", fine + "[cut]\nsight = \"appended\"\n").empty());
-  CHECK_FALSE(told("0.011", node_spacings("0.002", "0.012")).empty()); // coarser away from the fronts
+  CHECK(told("0.013", node_spacings("0.002", "0.002")).empty());                  // by `appended`, the default
+  CHECK_FALSE(told("0.011", node_spacings("0.002", "0.012") + enriched).empty()); // coarser away from the fronts
   // Sheets that cross are one cut.
   std::string crossing;
   for (const char* normal : {"[1, 0, 0]", "[0, 1, 0]"})
     crossing += rectangle_precut("[0, 0, 0.03]", normal, "[0, 0, 1]", "0.02", "0.03");
-  const Session crossed = session_of(cut_block + crossing);
+  const Session crossed = session_of(cut_block + crossing + enriched);
   for (const std::string& warning : crossed.warnings())
     CHECK(warning.find("precut[2]") == std::string::npos);
 }
