@@ -13,6 +13,7 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <limits>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <umfpack.h>
@@ -240,6 +241,7 @@ class CholeskyFactorisation final : public OrderedCholesky {
     dense.x = const_cast<double*>(right_hand_sides.data());
     dense.xtype = CHOLMOD_REAL;
     dense.dtype = CHOLMOD_DOUBLE;
+    const std::scoped_lock lock(workspace_mutex_); // bodies that are cut share the factor of the uncut one
     cholmod_dense* solution = cholmod_solve(system, factor_, &dense, &workspace_.common);
     if (solution == nullptr)
       throw NumericalError("Cholesky solve ran out of memory");
@@ -250,6 +252,7 @@ class CholeskyFactorisation final : public OrderedCholesky {
   }
 
   mutable CholmodWorkspace workspace_{CHOLMOD_SUPERNODAL};
+  mutable std::mutex workspace_mutex_;
   cholmod_factor* factor_ = nullptr;
   long nonzeros_ = 0;
 };

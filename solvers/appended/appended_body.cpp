@@ -148,7 +148,7 @@ std::unique_ptr<AppendedBody> AppendedBody::copy() const {
 }
 
 std::string AppendedBody::grow(const SprinkleIncrement& change, Problem grown) {
-  if (!change.removed.empty() || base_nodes(grown.nodes) != uncut_->size())
+  if (!change.removed.empty() || !uncut_->fits(grown, base_nodes(grown.nodes)))
     return "nodes have been exchanged";
   double largest = 0;
   for (const SmallBox& box : uncut_->boxes().boxes())

@@ -115,7 +115,8 @@ std::vector<CutPart> CutBoxes::divide(int index, const topology::Incision& incis
 // A sheet in the plane of a face divides no box, and parts the boxes on both sides of it.
 bool CutBoxes::lies_at_sheet(int box, const topology::Incision& incision) const {
   const SmallBox& at = boxes_.boxes()[box];
-  if (!incision.near(at.centre, at.half.norm()))
+  // near() alone depends on how far the cut has grown elsewhere.
+  if (!incision.near(at.centre, at.half.norm()) || !incision.closest(at.centre, at.half.norm()))
     return false;
   const std::span<const int> neighbours = boxes_.neighbours(box);
   return std::any_of(neighbours.begin(), neighbours.end(),

@@ -433,8 +433,10 @@ void CutSpace::find_curved_front() {
   }
 }
 
-/// Nodes whose twins or steps may be others now.
-std::set<int> CutSpace::concerned_nodes(const std::vector<char>& changed, bool comes_with_run) const {
+/// Nodes whose twins or steps may be others now: those of boxes that are others; those by which the cut, and with it
+/// its front, has changed within twice their sphere; those with a step that lies elsewhere with respect to the front.
+/// `all`: a step comes or goes with its run, and so does every one in a divided box.
+std::set<int> CutSpace::concerned_nodes(const std::vector<char>& changed, const BoundingBox& region, bool all) const {
   std::set<int> concerned;
   for (int box = 0; box < boxes_.size(); ++box)
     if (changed[box] == 1) {
@@ -446,7 +448,17 @@ std::set<int> CutSpace::concerned_nodes(const std::vector<char>& changed, bool c
                  at.centre + at.half.cwiseProduct(Vector3(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1))))
           concerned.insert(node);
     }
-  if (comes_with_run) // a step comes or goes with its run
+  for (int node = 0; node < spheres_.size(); ++node) {
+    const Vector3& x = spheres_.centres()[node];
+    if ((x - region.lower.cwiseMax(x.cwiseMin(region.upper))).norm() < 2 * spheres_.radii()[node])
+      concerned.insert(node);
+  }
+  for (const CutFunction& function : functions_)
+    if (!function.is_front && function.twin.is_step &&
+        std::any_of(function.twin.hidden.begin(), function.twin.hidden.end(),
+                    [&](PartId part) { return changed[box_of(part)] != 0; }))
+      concerned.insert(function.twin.node);
+  if (all)
     for (int box = 0; box < boxes_.size(); ++box)
       if (cut_.is_divided(box))
         for (const int node : boxes_.cells()[boxes_.cell_of(box)].nodes)
@@ -474,27 +486,24 @@ bool CutSpace::front_stays(CutFunction& old, const std::vector<char>& cell_chang
   return false;
 }
 
-bool CutSpace::twin_stays(const CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned,
+/// A step by runs stays where its run is there still, which may have another number now.
+bool CutSpace::twin_stays(CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned,
                           Wanted& wanted) {
-  const bool is_concerned = concerned.contains(old.twin.node);
-  if (!is_concerned && !old.twin.is_step)
+  if (!concerned.contains(old.twin.node))
     return true;
-  const bool is_touched = std::any_of(old.twin.hidden.begin(), old.twin.hidden.end(), [&](PartId part) {
-    return changed[box_of(part)] == 1 || (old.twin.is_step && changed[box_of(part)] != 0);
-  });
-  if (!is_concerned) {
-    if (is_touched) { // a step whose front has moved on elsewhere
-      add_twins(old.twin.node, wanted.twins);
-      wanted.twin_taken.resize(wanted.twins.size(), 0);
-    }
-    return !is_touched;
-  }
+  if (std::any_of(old.twin.hidden.begin(), old.twin.hidden.end(), [&](PartId part) {
+        return changed[box_of(part)] == 1 || (old.twin.is_step && changed[box_of(part)] != 0);
+      }))
+    return false;
+  const int run = old.twin.run < 0 ? old.twin.run : places_.run_now(old.twin.run);
+  if (old.twin.run >= 0 && run < 0)
+    return false;
   for (std::size_t w = 0; w < wanted.twins.size(); ++w) {
     const Twin& twin = wanted.twins[w].twin;
     if (wanted.twin_taken[w] == 0 && twin.node == old.twin.node && twin.is_step == old.twin.is_step &&
-        twin.run == old.twin.run && twin.step_at_node == old.twin.step_at_node && twin.hidden == old.twin.hidden &&
-        !is_touched) {
+        twin.run == run && twin.step_at_node == old.twin.step_at_node && twin.hidden == old.twin.hidden) {
       wanted.twin_taken[w] = 1;
+      old.twin.run = run;
       return true;
     }
   }
@@ -524,7 +533,7 @@ CutSpace::Change CutSpace::update(std::shared_ptr<const topology::Incision> inci
     find_curved_front();
     comes_with_run = any(was_curved) || any(curved_);
   }
-  const std::set<int> concerned = concerned_nodes(changed, comes_with_run);
+  const std::set<int> concerned = concerned_nodes(changed, region, comes_with_run);
   Wanted wanted;
   for (const int node : concerned)
     add_twins(node, wanted.twins);

@@ -132,11 +132,11 @@ class CutSpace {
   [[nodiscard]] double largest_on_cut(int node, const std::vector<int>& divided) const;
   [[nodiscard]] double spacing_on_cut(int node) const;
   void find_curved_front();
-  [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, bool comes_with_run) const;
+  [[nodiscard]] std::set<int> concerned_nodes(const std::vector<char>& changed, const BoundingBox& region,
+                                              bool all) const;
   struct Wanted;
   bool front_stays(CutFunction& old, const std::vector<char>& cell_changed, Wanted& wanted) const;
-  bool twin_stays(const CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned,
-                  Wanted& wanted);
+  bool twin_stays(CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned, Wanted& wanted);
   void list_by_node();
   [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlaceAtRun& placed) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;

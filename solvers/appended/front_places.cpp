@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 namespace spherecut::solvers {
@@ -124,25 +125,49 @@ bool FrontPlaces::renumber_runs(PlacedPart& kept, const std::vector<int>& segmen
 std::vector<int> FrontPlaces::segments_now(const FrontRuns* before) const {
   if (before == nullptr)
     return {};
-  const auto key_of = [](const topology::FrontSegment& segment) {
-    return std::array<double, 7>{segment.from.x(),
-                                 segment.from.y(),
-                                 segment.from.z(),
-                                 segment.to.x(),
-                                 segment.to.y(),
-                                 segment.to.z(),
-                                 static_cast<double>(segment.sheet)};
+  // A segment whose frame has turned is another.
+  const auto key_of = [](const topology::Incision& incision, int s) {
+    const topology::FrontSegment& segment = incision.front()[s];
+    std::array<double, 19> key{};
+    double* to = key.data();
+    *to++ = segment.sheet;
+    for (const Vector3& x : {segment.from, segment.to})
+      to = std::copy_n(x.data(), 3, to);
+    for (const double share : {0.0, 1.0}) {
+      const topology::FrontFrame frame = incision.front_frame_at(s, share);
+      to = std::copy_n(frame.ahead.data(), 3, to);
+      to = std::copy_n(frame.normal.data(), 3, to);
+    }
+    return key;
   };
-  std::map<std::array<double, 7>, int> now;
+  std::map<std::array<double, 19>, int> now;
   for (int s = 0; s < std::ssize(incision_->front()); ++s)
-    now[key_of(incision_->front()[s])] = s;
+    now[key_of(*incision_, s)] = s;
   std::vector<int> segments;
   segments.reserve(before->incision().front().size());
-  for (const topology::FrontSegment& segment : before->incision().front()) {
-    const auto found = now.find(key_of(segment));
+  for (int s = 0; s < std::ssize(before->incision().front()); ++s) {
+    const auto found = now.find(key_of(before->incision(), s));
     segments.push_back(found == now.end() ? -1 : found->second);
   }
   return segments;
+}
+
+void FrontPlaces::find_runs_now(const FrontRuns* before, const std::vector<int>& segment_now) {
+  run_now_.assign(before == nullptr ? 0 : static_cast<std::size_t>(before->count()), -1);
+  std::vector<int> joined(static_cast<std::size_t>(runs_->count()), 0);
+  for (int run = 0; run < std::ssize(run_now_); ++run) {
+    std::set<int> now;
+    for (const int segment : before->runs()[run].segments)
+      if (segment_now[segment] >= 0)
+        now.insert(runs_->run_of(segment_now[segment]));
+    for (const int found : now)
+      ++joined[found];
+    if (now.size() == 1)
+      run_now_[run] = *now.begin();
+  }
+  for (int& run : run_now_)
+    if (run >= 0 && joined[run] > 1)
+      run = -1;
 }
 
 /// Forgets the places of parts whose places of the fronts are others now: changed[box] becomes 2, unless the box itself
@@ -152,6 +177,7 @@ void FrontPlaces::follow(const CutBoxes& cut, std::shared_ptr<const topology::In
   incision_ = std::move(incision);
   const std::shared_ptr<const FrontRuns> before_runs = std::exchange(runs_, std::make_shared<FrontRuns>(incision_));
   const std::vector<int> segment_now = segments_now(before_runs.get());
+  find_runs_now(before_runs.get(), segment_now);
   // The nearest place of the front changes where the front did. Far from what has changed it is where it was.
   const auto is_far = [&](const Vector3& x, double radius, const PlacedPart& before) {
     const double away = (x - region.lower.cwiseMax(x.cwiseMin(region.upper))).norm();

@@ -4,6 +4,7 @@
 #include "solvers/appended/cut_boxes.hpp"
 #include "solvers/appended/front_functions.hpp"
 
+#include <algorithm>
 #include <memory>
 
 namespace spherecut::solvers {
@@ -44,6 +45,9 @@ class FrontPlaces {
               std::vector<char>& changed);
 
   [[nodiscard]] const FrontRuns& runs() const { return *runs_; }
+  /// What the last follow() has made of the number of a run: -1 where the run has gone, or is not one run any more that
+  /// no other has joined.
+  [[nodiscard]] int run_now(int before) const { return run_now_[before]; }
   [[nodiscard]] PlacedPart& of(const CutBoxes& cut, PartId part);
   /// How many samples a part has as far as it has been asked for.
   [[nodiscard]] int known_samples(PartId part) const { return std::max(1, static_cast<int>(places_[part].size())); }
@@ -59,6 +63,7 @@ class FrontPlaces {
  private:
   [[nodiscard]] PlacedPart sampled(const CutBoxes& cut, PartId part, const FrontPlace& middle) const;
   [[nodiscard]] std::vector<int> segments_now(const FrontRuns* before) const;
+  void find_runs_now(const FrontRuns* before, const std::vector<int>& segment_now);
   bool renumber_runs(PlacedPart& kept, const std::vector<int>& segment_now) const;
 
   const topology::Domain& domain_;
@@ -68,6 +73,7 @@ class FrontPlaces {
   std::shared_ptr<const FrontRuns> runs_;
   std::vector<PlacedPart> places_; // by part; without samples: not asked for yet
   std::vector<PartId> placed_;     // those that are there
+  std::vector<int> run_now_;       // of every run before
 };
 
 } // namespace spherecut::solvers

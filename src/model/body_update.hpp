@@ -23,6 +23,7 @@ struct RebuildSeconds {
 struct BodyUpdate {
   SystemUpdate update = SystemUpdate::none;
   std::string update_reason;     // why not merely updated
+  bool has_grown = false;        // updated in the step, or taken over as a copy that has grown beside it
   int nodes = 0, kept_nodes = 0; // kept: with the place they had before
   RebuildSeconds seconds;
 };

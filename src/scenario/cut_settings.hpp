@@ -34,7 +34,7 @@ struct PrecutSettings {
 };
 
 struct CutSettings {
-  std::optional<solvers::SightRule> sight; // empty: the method's own
+  std::optional<solvers::SightRule> sight; // empty: as sight_of() has it
   solvers::LipCondition lips = solvers::LipCondition::frictionless;
   solvers::UnheldPieces unheld = solvers::UnheldPieces::hold; // a piece that no fixed region holds
   double front_spacing = 0;                                   // m, 0: derived

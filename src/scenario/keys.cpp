@@ -404,7 +404,8 @@ constexpr std::array keys = {
         "",
         "How a sphere reaches around a cut: it ends where the cut hides its node, it bends around the front, it "
         "bends and the basis gains the field of a crack front, or it stays what it is and the cut appends functions "
-        "(method galerkin). Left out: the last for cuts that do not tear, else the method's own, enriched.",
+        "(method galerkin). Left out: the last with galerkin, but for tears at finite strain; else the method's own, "
+        "enriched.",
         {},
         "visibility, diffraction, enriched, appended"},
     ScenarioKey{"cut.lips",
@@ -452,9 +453,8 @@ constexpr std::array keys = {
         "blade.advance", number, "", "",
         "Fine spacings that the edge goes before wound and body follow its cut; 0: they do in every step. What is "
         "put off is cut by the way that the edge took, at the latest when it leaves the body or the run ends. "
-        "It tells where steps are shorter than that: in real time, or with a small blade.step. Left out: 0 where the "
-        "cut appends, else 0.5 in real time, where the body then follows in the background, and 0 elsewhere. Above 0 "
-        "not with material.toughness, which in real time lets the blade cut in the background as well where this is "
+        "It tells where steps are shorter than that: in real time, or with a small blade.step. Left out: 0.5 in real "
+        "time, where the body then follows in the background, and 0 elsewhere. Above 0 not with material.toughness, which in real time lets the blade cut in the background as well where this is "
         "left out.",
         from(0, 1)},
     ScenarioKey{"blade.path", array_of_tables, "", "required",

@@ -131,8 +131,7 @@ bool BladeCutting::build(const StepSample& sample, std::optional<topology::Wound
   if (!grasping_.holds()) // a grasper remembers what it holds
     require_clear_of_tool(*next.incision, state_.model, state_.scenario.contact.condition);
   state_.check_pieces(sample.time);
-  if (blade_.is_hand_led())
-    state_.zone.follow_fronts(*next.incision);
+  const std::string renewed = blade_.is_hand_led() ? updater_.lead_zone_by_hand(*next.incision) : "";
   {
     const StageTimer timer(report.seconds.level_sets);
     state_.incisions->update_fields();
@@ -141,11 +140,11 @@ bool BladeCutting::build(const StepSample& sample, std::optional<topology::Wound
   if (in_background) {
     const int triangles = std::exchange(report.triangles, 0);
     background_.follow({std::nullopt, sample.time, triangles},
-                       updater_.following_cut(next.incision, "the cut was put off"));
+                       updater_.following_cut(next.incision, "the cut was put off", renewed));
     state_.shown_wound = std::move(wound_before);
   } else {
     state_.rebuild = Rebuild::in_step;
-    updater_.build_cut({}, next, report);
+    updater_.build_cut(renewed, next, report);
     const StageTimer timer(report.seconds.solve);
     contact_.solve(sample, next);
   }

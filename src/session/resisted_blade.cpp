@@ -206,8 +206,7 @@ bool ResistedBlade::sweep(const std::vector<topology::BladePose>& poses, const S
   }
   require_clear_of_tool(*state_.incisions->incision(), state_.model, state_.scenario.contact.condition);
   state_.check_pieces(sample.time);
-  if (blade_.is_hand_led())
-    state_.zone.follow_fronts(*state_.incisions->incision());
+  renewed_ = blade_.is_hand_led() ? updater_.lead_zone_by_hand(*state_.incisions->incision()) : "";
   const StageTimer timer(report.seconds.level_sets);
   state_.incisions->update_fields();
   return true;
@@ -223,6 +222,7 @@ bool ResistedBlade::propose(const std::vector<topology::BladePose>& poses, const
     refuse_cut(sample.time, why, report, state_.log);
     report.update = last.update;
     report.update_reason = last.update_reason;
+    report.has_grown = last.has_grown;
     report.nodes = last.nodes;
     report.kept_nodes = last.kept_nodes;
     state_.incisions->go_back(before);
@@ -233,7 +233,7 @@ bool ResistedBlade::propose(const std::vector<topology::BladePose>& poses, const
       return false;
     BodyModel next = updater_.next();
     state_.rebuild = Rebuild::in_step;
-    updater_.build_cut({}, next, report);
+    updater_.build_cut(renewed_, next, report);
     const StageTimer timer(report.seconds.solve);
     contact_.solve(sample, next);
     const double drawn = fronts_.released(state_.model, *next.incision);
@@ -254,7 +254,7 @@ void ResistedBlade::build_in_background(const std::vector<topology::BladePose>& 
       return;
     const int triangles = std::exchange(report.triangles, 0);
     background_.propose({poses.size(), sample.time, force_.way().left(force_.edge()), triangles},
-                        updater_.following_cut(state_.incisions->incision(), "the blade is resisted"));
+                        updater_.following_cut(state_.incisions->incision(), "the blade is resisted", renewed_));
     return;
   } catch (const InputError& error) {
     refuse_cut(sample.time, error.what(), report, state_.log);

@@ -53,6 +53,7 @@ class ResistedBlade {
   BodyUpdater& updater_;
   const TearFronts& fronts_;
   BladeForce force_;
+  std::string renewed_;                       // why all nodes are made anew for the last cut; empty: they are not
   std::optional<IncisionBuilder::Mark> mark_; // the cut without the proposal; empty: there is none
 };
 

@@ -41,7 +41,7 @@ void StepReport::tell_linear(ResistedBlade* blade, StepResult& result) {
   result.converged = tool.converged;
   result.largest_penetration = penetration ? penetration->deepest : tool.largest_penetration;
   state_.displacements = contact_.displacements(state_.model);
-  if (result.update() == SystemUpdate::updated || !state_.options.force_only)
+  if (result.has_grown() || !state_.options.force_only)
     result.residual = residual(state_.model);
   if (blade != nullptr)
     blade->load_body();

@@ -52,6 +52,11 @@ struct StepResult {
     const SystemUpdate by_blade = cut ? cut->update : SystemUpdate::none;
     return by_blade != SystemUpdate::none || !tear ? by_blade : tear->increments.back().body.update;
   }
+  /// Whether the body that it came to has grown, in the step or beside it.
+  [[nodiscard]] bool has_grown() const {
+    const bool by_blade = cut && cut->update != SystemUpdate::none;
+    return by_blade ? cut->has_grown : tear && tear->increments.back().body.has_grown;
+  }
 };
 
 } // namespace spherecut::app

@@ -84,6 +84,15 @@ std::string BodyUpdater::lead_zone(const topology::Incision& incision) {
   return hindrance.empty() ? "nodes go along with the front" : hindrance;
 }
 
+// A body that appends keeps its nodes until the front leaves those that are fine; beside any other cut they are
+// exchanged at every increment.
+std::string BodyUpdater::lead_zone_by_hand(const topology::Incision& incision) {
+  if (cut_appends(scenario_) && !is_nonlinear(scenario_.law))
+    return state_.zone.lead_by_hand(incision, model_.sprinkling.nodes);
+  state_.zone.follow_fronts(incision);
+  return "";
+}
+
 void BodyUpdater::build_cut(const std::string& renewed, BodyModel& next, BodyUpdate& report) {
   if (is_nonlinear(scenario_.law)) {
     build_finite_cut(next, report);
@@ -92,6 +101,7 @@ void BodyUpdater::build_cut(const std::string& renewed, BodyModel& next, BodyUpd
   const std::string unfollowed = state_.hindrance();
   std::optional<solvers::SprinkleIncrement> exchanged;
   report.update = SystemUpdate::rebuilt;
+  report.has_grown = false;
   report.update_reason = !unfollowed.empty() ? unfollowed : !spacing_stays() ? spacing_changed : renewed;
   if (report.update_reason.empty()) {
     const StageTimer timer(report.seconds.sprinkling);
@@ -111,7 +121,8 @@ void BodyUpdater::build_cut(const std::string& renewed, BodyModel& next, BodyUpd
     if (exchanged && state_.options.updating) {
       const StageTimer growth_timer(state_.profile.discretise);
       report.update_reason = follow_cut(scenario_, organ_.domain, *exchanged, body_to_grow(model_), next);
-      if (next.body != nullptr)
+      report.has_grown = next.body != nullptr;
+      if (report.has_grown)
         report.update = SystemUpdate::updated;
     }
     if (next.body == nullptr)
@@ -182,16 +193,17 @@ BackgroundBodies::Make BodyUpdater::following_tool(const topology::SurfaceContac
 }
 
 BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const topology::Incision>& incision,
-                                                  const char* reason) const {
-  const std::string renewed = is_nonlinear(scenario_.law) ? not_linear
-                              : spacing_stays()           ? state_.hindrance()
-                                                          : spacing_changed;
+                                                  const char* reason, const std::string& by_zone) const {
+  const std::string hindrance = is_nonlinear(scenario_.law) ? not_linear : state_.hindrance(),
+                    renewed = !hindrance.empty() ? hindrance
+                              : spacing_stays()  ? by_zone
+                                                 : spacing_changed;
   const FineZoneTracker& zone = state_.zone;
   return [&scenario = scenario_, domain = organ_.domain, how = zone.sprinkle_options(incision, grasping_.kept_nodes()),
           incision_before = model_.incision, sprinkling = model_.sprinkling, lineage = model_.lineage, renewed, reason,
           uncut = model_.uncut,
           growing = std::make_shared<std::unique_ptr<solvers::Discretisation>>(
-              state_.options.updating ? body_to_grow(model_) : nullptr),
+              renewed.empty() && state_.options.updating ? body_to_grow(model_) : nullptr),
           coarseness = zone.coarseness(), centre = contact_.is_in_reach() ? zone.centre() : std::nullopt,
           reach = zone.zone().candidate_radius, facing = zone.facing()] {
     BackgroundBody made;
@@ -207,6 +219,13 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
     before.sprinkling = sprinkling;
     double sight = 0, condensing = 0; // s, of the attempt that goes
     solvers::SprinkleIncrement exchanged;
+    const auto follow_or_assemble = [&] {
+      update.has_grown = *growing != nullptr;
+      if (update.has_grown)
+        update.has_grown = follow_cut(scenario, domain, exchanged, std::move(*growing), model).empty();
+      if (!update.has_grown)
+        app::assemble(scenario, domain, model);
+    };
     const auto build = [&](const auto& sprinkle) {
       update.seconds = {};
       condensing = 0;
@@ -221,8 +240,8 @@ BackgroundBodies::Make BodyUpdater::following_cut(const std::shared_ptr<const to
         near = centre ? touchable_nodes(scenario, *domain, model.sprinkling.nodes, *centre, reach) : std::vector<int>{};
         if (is_nonlinear(scenario.law))
           make_finite_apart(scenario, domain, near, model);
-        else if (*growing == nullptr || !follow_cut(scenario, domain, exchanged, std::move(*growing), model).empty())
-          app::assemble(scenario, domain, model);
+        else
+          follow_or_assemble();
         sight = solvers::sight_seconds() - seen;
       }
       if (model.finite != nullptr)

@@ -29,11 +29,15 @@ class BodyUpdater {
   /// Leads the fine zone along with the fronts of a tear. Returns why all nodes are to be made anew for its increment;
   /// empty: they are not.
   [[nodiscard]] std::string lead_zone(const topology::Incision& incision);
+  /// The same for the cut of a blade: empty unless a hand leads it.
+  [[nodiscard]] std::string lead_zone_by_hand(const topology::Incision& incision);
+
   /// What makes a body that has followed the tool: with the fine zone about `centre`.
   [[nodiscard]] BackgroundBodies::Make following_tool(const topology::SurfaceContact& centre) const;
-  /// What makes the body with this cut, on the nodes that a step would have made. `reason`: why it is made there.
+  /// What makes the body with this cut, on the nodes that a step would have made. `reason`: why it is made there;
+  /// `renewed`: as of build_cut().
   [[nodiscard]] BackgroundBodies::Make following_cut(const std::shared_ptr<const topology::Incision>& incision,
-                                                     const char* reason) const;
+                                                     const char* reason, const std::string& renewed) const;
 
  private:
   [[nodiscard]] solvers::SprinkleOptions sprinkle_options(const BodyModel& model) const;

@@ -57,6 +57,7 @@ void CutReport::add(const CutReport& later) {
   if (later.update != SystemUpdate::none) {
     update = later.update;
     update_reason = later.update_reason;
+    has_grown = later.has_grown;
     nodes = later.nodes;
     kept_nodes = later.kept_nodes;
   }

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <utility>
 
 namespace spherecut::app {
@@ -19,6 +20,8 @@ namespace {
 constexpr double least_nodes_through = 1; // spacings through a wall, below which nothing is computed
 // In fine spacings:
 constexpr double crowded_by_sheet = 0.3; // nearer to a sheet no node of a contact is put
+constexpr double coarse_for_hand = 1.5;  // a front that a hand leads goes through finer nodes
+constexpr double way_of_hand = 2;        // so far ahead of it they are fine then
 constexpr double zone_ahead = 1;         // so far ahead of a front that may tear nodes are fine beforehand
 constexpr double zone_left = 0.5;        // a front this far off the middle of the fine zone has left it
 
@@ -159,6 +162,34 @@ void FineZoneTracker::follow_fronts_and_way(const topology::Incision& incision) 
   zone_.spacing.segments = fine_segments(incision);
 }
 
+void FineZoneTracker::add_way_ahead(const topology::Incision& incision, double spacings) {
+  for (std::array<Vector3, 2> ends : solvers::front_segments(incision, fine())) {
+    for (Vector3& x : ends)
+      if (const auto front = incision.front_frame(x, fine()))
+        x += spacings * fine() * front->ahead;
+    zone_.spacing.segments.push_back(ends);
+  }
+}
+
+std::string FineZoneTracker::lead_by_hand(const topology::Incision& incision, const solvers::NodeCloud& nodes) {
+  const auto is_coarse = [&](const Vector3& x) {
+    double nearest = std::numeric_limits<double>::infinity(), spacing = 0;
+    for (int i = 0; i < nodes.size(); ++i)
+      if (const double distance = (nodes.positions[i] - x).squaredNorm(); distance < nearest) {
+        nearest = distance;
+        spacing = nodes.spacings[i];
+      }
+    return spacing > coarse_for_hand * fine();
+  };
+  const std::vector<topology::FrontSegment>& front = incision.front();
+  if (std::none_of(front.begin(), front.end(),
+                   [&](const topology::FrontSegment& segment) { return is_coarse(segment.to); }))
+    return "";
+  follow_fronts(incision);
+  add_way_ahead(incision, way_of_hand);
+  return "the front has left the fine nodes";
+}
+
 // The way ahead is in the fine zone too, so that the zone lasts for some increments.
 std::string FineZoneTracker::lead_ahead(const topology::Incision& incision) {
   const bool leads = !led_segments_.empty() && zone_.spacing.segments == led_segments_;
@@ -169,12 +200,7 @@ std::string FineZoneTracker::lead_ahead(const topology::Incision& incision) {
   if (holds)
     return "";
   zone_.spacing.segments = fine_segments(incision);
-  for (std::array<Vector3, 2> ends : solvers::front_segments(incision, fine())) {
-    for (Vector3& x : ends)
-      if (const auto front = incision.front_frame(x, fine()))
-        x += zone_ahead * fine() * front->ahead;
-    zone_.spacing.segments.push_back(ends);
-  }
+  add_way_ahead(incision, zone_ahead);
   led_segments_ = zone_.spacing.segments;
   return leads ? "the front has left the fine zone" : "the fine zone had nothing of the way ahead";
 }

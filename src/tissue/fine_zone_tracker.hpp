@@ -58,6 +58,8 @@ class FineZoneTracker {
   /// Leads the zone ahead of the fronts, so that it lasts for some increments. Returns why nodes have to be made anew;
   /// empty: the zone still holds all fronts.
   std::string lead_ahead(const topology::Incision& incision);
+  /// The same for a cut that a hand leads where it likes, as long as it goes through nodes that are fine.
+  std::string lead_by_hand(const topology::Incision& incision, const solvers::NodeCloud& nodes);
 
   /// Segments along which it is fine, to go back to.
   struct Mark {
@@ -72,6 +74,7 @@ class FineZoneTracker {
                                                           const std::vector<solvers::SeedNode>* kept) const;
 
  private:
+  void add_way_ahead(const topology::Incision& incision, double spacings);
   [[nodiscard]] std::vector<std::array<Vector3, 2>> fine_segments(const topology::Incision& incision) const;
 
   const Scenario& scenario_;

@@ -324,6 +324,7 @@ std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const
                                    const Domain& domain) {
   const double size = body_size(domain), surface_tolerance = 1e-9 * size;
   const double cos_corner = std::cos(40 * M_PI / 180);
+  constexpr double most_along = 0.5; // of a unit normal, along the border
   std::vector<FrontPiece> front;
   for (int s = 0; s < std::ssize(sheets); ++s) {
     const SurfaceMesh& sheet = sheets[s];
@@ -331,8 +332,12 @@ std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const
       const int count = static_cast<int>(loop.size());
       std::vector<FrontEnd> own(count), joint(count); // of edge i, and where edge i - 1 meets edge i
       for (int i = 0; i < count; ++i) {
+        const Vector3 along = (sheet.vertices[loop[i].to] - sheet.vertices[loop[i].from]).normalized();
         own[i].normal = steady_normal(sheet, neighbours[s], loop[i].triangle);
-        own[i].ahead = (sheet.vertices[loop[i].to] - sheet.vertices[loop[i].from]).cross(own[i].normal).normalized();
+        if (std::abs(along.dot(own[i].normal)) > most_along) // the sheet is folded there
+          own[i].normal = triangle_normal(sheet, loop[i].triangle);
+        own[i].normal = (own[i].normal - own[i].normal.dot(along) * along).normalized();
+        own[i].ahead = along.cross(own[i].normal);
       }
       for (int i = 0; i < count; ++i) {
         const FrontEnd &before = own[(i + count - 1) % count], &after = own[i];

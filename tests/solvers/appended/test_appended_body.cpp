@@ -256,6 +256,56 @@ TEST_CASE("A body whose cut has grown by appending equals one that was cut at on
   }
 }
 
+TEST_CASE("In graded nodes, too, a body that has grown by small increments equals one that was cut at once") {
+  AppendingScene scene;
+  scene.sprinkling.spacing = {.fine = 0.004, .coarse = 0.02, .slope = 0.5, .radius = 0.004, .centres = {{-0.02, 0, 0}}};
+  scene.nodes = sprinkle(*scene.domain, scene.sprinkling).nodes;
+  DiscretisationOptions options = appending();
+  options.tip_functions = false;
+  AppendedBody body(scene.problem(), options);
+  for (int increment = 0; increment < 10; ++increment) {
+    const SprinkleIncrement change = scene.grow();
+    REQUIRE(body.grow(change, scene.problem()).empty());
+    const AppendedBody at_once(scene.problem(), options, body.uncut());
+    CHECK(body.space().functions().size() == at_once.space().functions().size());
+    const VectorX grown = body.nodal_displacements(body.solve()), fresh = at_once.nodal_displacements(at_once.solve());
+    CHECK((grown - fresh).norm() < 1e-8 * fresh.norm());
+  }
+}
+
+TEST_CASE("Steps go with their fronts where another front goes and runs get other numbers") {
+  const AppendingScene scene;
+  const auto cut_to = [&](double through, double depth) { // the first sheet severs the block where it goes through it
+    const Vector3 normal = Vector3::UnitX(), up = Vector3::UnitZ();
+    const std::vector<topology::SurfaceMesh> sheets{
+        topology::make_rectangle_sheet({-0.0203, 0.5 * (through - 0.021), -0.015}, normal, up, through + 0.021, 0.033,
+                                       0.004),
+        topology::make_rectangle_sheet({0.0013, 0, 0.0005 - 0.5 * depth}, normal, up, 0.042, depth + 0.001, 0.004),
+        topology::make_rectangle_sheet({0.0087, 0, -0.0055}, normal, up, 0.042, 0.013, 0.004)};
+    return std::make_shared<const topology::Incision>(sheets, scene.domain);
+  };
+  SprinkleOptions uncut = scene.sprinkling;
+  uncut.incision = nullptr;
+  Problem problem = scene.problem();
+  problem.nodes = sprinkle(*scene.domain, uncut).nodes;
+  problem.prescribed.clear();
+  for (int i = 0; i < problem.nodes.size(); ++i)
+    if (problem.nodes.kinds[i] != NodeKind::interior && problem.nodes.positions[i].z() < -0.03 + 1e-9)
+      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  problem.incision = cut_to(0, 0.012);
+  DiscretisationOptions options = appending();
+  options.tip_functions = false;
+  AppendedBody body(problem, options);
+  for (const auto& [through, depth] : {std::pair(0.021, 0.012), std::pair(0.021, 0.0125), std::pair(0.021, 0.016)}) {
+    problem.incision = cut_to(through, depth);
+    REQUIRE(body.grow({}, problem).empty());
+    const AppendedBody at_once(problem, options, body.uncut());
+    CHECK(body.space().functions().size() == at_once.space().functions().size());
+    const VectorX grown = body.nodal_displacements(body.solve()), fresh = at_once.nodal_displacements(at_once.solve());
+    CHECK((grown - fresh).norm() < 1e-8 * fresh.norm());
+  }
+}
+
 TEST_CASE("A copy of a body whose cut appends grows, or fails to, while the body stays as it was") {
   AppendingScene scene;
   const std::optional<Vector3> facing = GENERATE(std::optional<Vector3>{}, std::optional<Vector3>{{0, 0, 1}});

@@ -83,10 +83,16 @@ double area_when_solved(const Scenario& scenario, bool in_background, const std:
 } // namespace
 
 TEST_CASE("A body made in the background is the one that a step would have made, and gives the same force") {
-  const auto [method, is_pressed] =
-      GENERATE(std::pair("galerkin", true), std::pair("galerkin", false), std::pair("collocation", true));
-  const Scenario scenario =
-      scenario_of((is_pressed ? pressed_and_cut : in_and_out) + "[method]\nname = \"" + std::string(method) + "\"\n");
+  struct Case {
+    std::string method;
+    bool is_pressed, appends;
+  };
+  const auto [method, is_pressed, appends] =
+      GENERATE(Case{"galerkin", true, false}, Case{"galerkin", false, false}, Case{"galerkin", true, true},
+               Case{"galerkin", false, true}, Case{"collocation", true, false});
+  const Scenario scenario = scenario_of(
+      replaced(is_pressed ? pressed_and_cut : in_and_out, by_rebuilding, appends ? by_appending : by_rebuilding) +
+      "[method]\nname = \"" + method + "\"\n");
   Session waits(scenario), goes_on(scenario);
   goes_on.set_options({.following_in_background = true});
   int followed = 0, nodes_here = 0, nodes_there = 0;
@@ -123,6 +129,7 @@ TEST_CASE("A body made in the background is the one that a step would have made,
     CHECK((is_same || (is_pressed && followed > 1)));
     CHECK(there.cut->triangles > 0);
     CHECK(there.cut->update == SystemUpdate::taken_over);
+    CHECK(there.cut->has_grown == appends);
     CHECK(there.cut->nodes == there.nodes);
     CHECK(there.cut->area >= area);
     CHECK(there.cut->area == Approx(here.cut->area).epsilon(is_pressed ? 1e-4 : 1e-12));
@@ -137,7 +144,8 @@ TEST_CASE("A body made in the background is the one that a step would have made,
 }
 
 TEST_CASE("A blade that is too far ahead waits for its body, and when a thread runs does not change a bit") {
-  const Scenario scenario = scenario_of(pressed_and_cut);
+  const Scenario scenario =
+      scenario_of(replaced(pressed_and_cut, by_rebuilding, GENERATE(by_rebuilding, by_appending)));
   const auto run = [&](std::chrono::milliseconds pause, int& followed, double& area) {
     Session session(scenario);
     session.set_options({.following_in_background = true});

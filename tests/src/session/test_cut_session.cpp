@@ -152,6 +152,35 @@ TEST_CASE("A wound stays as it is while the blade goes back through it, and goes
   CHECK(last.cut->opening_volume == Approx(expected.opening_volume).epsilon(0.01));
 }
 
+TEST_CASE("Where a hand leads the blade off the way that was foreseen nodes at the front are fine all the same") {
+  const bool appends = GENERATE(true, false);
+  Session session = session_of(cut_block + (appends ? by_appending : by_rebuilding) +
+                               "[blade]\nedge = [[0, -0.009, 0], [0, 0.009, 0.001]]\nstep = 0.05\n"
+                               "[[blade.path]]\ntime = 0\nposition = [-0.02, 0, 0.034]\n"
+                               "[[blade.path]]\ntime = 1\nposition = [-0.02, 0, 0.02]\n");
+  session.lift_blade();
+  StepSample sample = session.steps().front();
+  int updated = 0, renewed = 0;
+  for (int k = 0; k < 16; ++k) {
+    sample.time += 0.01;
+    sample.blade->time = sample.time;
+    sample.blade->position = {0.018 + 0.0002 * k, 0.001, 0.034 - 0.0012 * k};
+    const StepResult result = session.step(sample);
+    CHECK_FALSE(result.cut->refused);
+    if (result.cut->triangles == 0)
+      continue;
+    updated += result.cut->update == SystemUpdate::updated ? 1 : 0;
+    renewed += result.cut->update_reason == "the front has left the fine nodes" ? 1 : 0;
+    const solvers::NodeCloud& nodes = session.model().sprinkling.nodes;
+    for (const topology::FrontSegment& segment : session.model().incision->front()) {
+      const int nearest = session.model().nearest_seen(segment.to);
+      CHECK(nodes.spacings[nearest] < 1.6 * session.zone().spacing.fine);
+    }
+  }
+  CHECK((updated >= 4) == appends);
+  CHECK((renewed >= 1) == appends);
+}
+
 TEST_CASE("A box cut out of a block: lip nodes keep off the folds of its sheet, and it opens under pressure") {
   const TemporaryFolder folder;
   topology::SurfaceMesh box{{},
