@@ -454,7 +454,8 @@ constexpr std::array keys = {
         "Fine spacings that the edge goes before wound and body follow its cut; 0: they do in every step. What is "
         "put off is cut by the way that the edge took, at the latest when it leaves the body or the run ends. "
         "It tells where steps are shorter than that: in real time, or with a small blade.step. Left out: 0.5 in real "
-        "time, where the body then follows in the background, and 0 elsewhere. Above 0 not with material.toughness, which in real time lets the blade cut in the background as well where this is "
+        "time, where the body then follows in the background, and 0 elsewhere. Above 0 not with material.toughness, "
+        "which in real time lets the blade cut in the background as well where this is "
         "left out.",
         from(0, 1)},
     ScenarioKey{"blade.path", array_of_tables, "", "required",
