@@ -251,10 +251,11 @@ std::vector<Interval> without(const std::vector<Interval>& parts, std::vector<In
   return left;
 }
 
-/// Whether the height of a triangle is less than a tenth of its longest edge: it is turned by where its corners happen
-/// to be.
+/// Whether the height of a triangle is so small a part of its longest edge that it is turned by where its corners
+/// happen to be: those of a blade's way are known to a thousandth of the spacing. An increment of a tear is a tenth of
+/// it wide at least.
 bool is_flat(const SurfaceMesh& sheet, int triangle) {
-  constexpr double flat = 0.1;
+  constexpr double flat = 0.02;
   const auto& [a, b, c] = sheet.triangles[triangle];
   const Vector3 &x = sheet.vertices[a], &y = sheet.vertices[b], &z = sheet.vertices[c];
   const double longest = std::max({(y - x).squaredNorm(), (z - y).squaredNorm(), (x - z).squaredNorm()});
