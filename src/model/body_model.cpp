@@ -357,7 +357,7 @@ std::string follow_cut(const Scenario& scenario, const std::shared_ptr<const top
                        BodyModel& after) {
   auto* const appended = dynamic_cast<solvers::AppendedBody*>(body.get());
   if (appended == nullptr)
-    return body == nullptr ? "the first cut" : "the body is made anew behind its cut";
+    return "the body is made anew behind its cut";
   if (std::string why_not = appended->grow(change, problem_of(scenario, domain, after)); !why_not.empty())
     return why_not;
   after.pairs = solvers::lip_pairs(after.sprinkling.nodes);

@@ -120,7 +120,9 @@ void BodyUpdater::build_cut(const std::string& renewed, BodyModel& next, BodyUpd
     const StageTimer timer(report.seconds.assembly);
     if (exchanged && state_.options.updating) {
       const StageTimer growth_timer(state_.profile.discretise);
-      report.update_reason = follow_cut(scenario_, organ_.domain, *exchanged, body_to_grow(model_), next);
+      report.update_reason = model_.body == nullptr
+                                 ? "the first cut"
+                                 : follow_cut(scenario_, organ_.domain, *exchanged, body_to_grow(model_), next);
       report.has_grown = next.body != nullptr;
       if (report.has_grown)
         report.update = SystemUpdate::updated;

@@ -10,6 +10,7 @@
 #include "topology/base/errors.hpp"
 #include "topology/files/surface_io.hpp"
 #include "topology/organ/organs.hpp"
+#include "topology/search/point_tree.hpp"
 #include "topology/wound/piece_audit.hpp"
 #include "topology/wound/splinters.hpp"
 
@@ -172,10 +173,9 @@ TEST_CASE("Where a hand leads the blade off the way that was foreseen nodes at t
     updated += result.cut->update == SystemUpdate::updated ? 1 : 0;
     renewed += result.cut->update_reason == "the front has left the fine nodes" ? 1 : 0;
     const solvers::NodeCloud& nodes = session.model().sprinkling.nodes;
-    for (const topology::FrontSegment& segment : session.model().incision->front()) {
-      const int nearest = session.model().nearest_seen(segment.to);
-      CHECK(nodes.spacings[nearest] < 1.6 * session.zone().spacing.fine);
-    }
+    const topology::PointTree tree(nodes.positions);
+    for (const topology::FrontSegment& segment : session.model().incision->front())
+      CHECK(nodes.spacings[tree.nearest(segment.to).index] < 1.6 * session.zone().spacing.fine);
   }
   CHECK((updated >= 4) == appends);
   CHECK((renewed >= 1) == appends);
