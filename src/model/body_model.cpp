@@ -127,9 +127,8 @@ solvers::Problem problem_of(const Scenario& scenario, const std::shared_ptr<cons
 
 // At finite strain release rates ask for nodes on the faces behind a front.
 solvers::SightRule sight_of(const Scenario& scenario) {
-  const bool is_cut = scenario.blade || !scenario.precuts.empty() || scenario.tearing.enabled;
-  const bool can_append = is_nonlinear(scenario.law) || scenario.method.method == solvers::Method::galerkin;
-  const bool appends = is_cut && can_append && !(is_nonlinear(scenario.law) && scenario.tearing.enabled);
+  const bool is_cut = scenario.blade || !scenario.precuts.empty();
+  const bool appends = is_nonlinear(scenario.law) && is_cut && !scenario.tearing.enabled;
   return scenario.cut.sight.value_or(appends ? solvers::SightRule::appended : scenario.method.sight);
 }
 

@@ -26,8 +26,8 @@ inline constexpr double near_banks = 0.25;
 
 class FiniteModel; // src/model/finite_model.hpp
 
-/// How spheres reach around a cut: cut.sight, or where it is left out `appended` with method galerkin, but for tears at
-/// finite strain, and the method's own elsewhere.
+/// How spheres reach around a cut: cut.sight, or where it is left out `appended` for cuts at finite strain that do not
+/// tear, and the method's own elsewhere.
 solvers::SightRule sight_of(const Scenario& scenario);
 
 /// Whether a cut of this scenario's body only appends unknowns (sight rule `appended`).

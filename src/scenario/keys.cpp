@@ -404,8 +404,7 @@ constexpr std::array keys = {
         "",
         "How a sphere reaches around a cut: it ends where the cut hides its node, it bends around the front, it "
         "bends and the basis gains the field of a crack front, or it stays what it is and the cut appends functions "
-        "(method galerkin). Left out: the last with galerkin, but for tears at finite strain; else the method's own, "
-        "enriched.",
+        "(method galerkin). Left out: the last for cuts at finite strain that do not tear, else the method's own.",
         {},
         "visibility, diffraction, enriched, appended"},
     ScenarioKey{"cut.lips",

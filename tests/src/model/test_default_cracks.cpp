@@ -83,7 +83,7 @@ TEST_CASE("Two precuts nearer than two node distances are told, with distance, p
   const std::string enriched = "[cut]\nsight = \"enriched\"\n", fine = node_spacings("0.002", "0.002") + enriched;
   CHECK_THAT(told("0.013", fine), Catch::Contains("are 3 mm apart at [") && Catch::Contains("= 0.001 m put 3 between"));
   CHECK(told("0.011", fine).empty());
-  CHECK(told("0.013", node_spacings("0.002", "0.002")).empty());                  // by `appended`, the default
+  CHECK(told("0.013", node_spacings("0.002", "0.002") + by_appending).empty());
   CHECK_FALSE(told("0.011", node_spacings("0.002", "0.012") + enriched).empty()); // coarser away from the fronts
   // Sheets that cross are one cut.
   std::string crossing;
