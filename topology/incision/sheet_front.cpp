@@ -251,38 +251,6 @@ std::vector<Interval> without(const std::vector<Interval>& parts, std::vector<In
   return left;
 }
 
-/// Whether the height of a triangle is so small a part of its longest edge that it is turned by where its corners
-/// happen to be: those of a blade's way are known to a thousandth of the spacing. An increment of a tear is a tenth of
-/// it wide at least.
-bool is_flat(const SurfaceMesh& sheet, int triangle) {
-  constexpr double flat = 0.02;
-  const auto& [a, b, c] = sheet.triangles[triangle];
-  const Vector3 &x = sheet.vertices[a], &y = sheet.vertices[b], &z = sheet.vertices[c];
-  const double longest = std::max({(y - x).squaredNorm(), (z - y).squaredNorm(), (x - z).squaredNorm()});
-  return (y - x).cross(z - x).norm() < flat * longest;
-}
-
-/// Unit normal of the sheet at a triangle; at a flat one that of the nearest others, each by its area.
-Vector3 steady_normal(const SurfaceMesh& sheet, const Neighbours& neighbours, int triangle) {
-  constexpr int most_rings = 8;
-  std::vector<int> seen{triangle};
-  std::size_t ring = 0;
-  for (int k = 0; k < most_rings && ring < seen.size(); ++k) {
-    Vector3 sum = Vector3::Zero();
-    const std::size_t end = seen.size();
-    for (std::size_t at = ring; at < end; ++at)
-      if (const auto& [a, b, c] = sheet.triangles[seen[at]]; !is_flat(sheet, seen[at]))
-        sum += (sheet.vertices[b] - sheet.vertices[a]).cross(sheet.vertices[c] - sheet.vertices[a]);
-    if (sum.squaredNorm() > 0)
-      return sum.normalized();
-    for (; ring < end; ++ring)
-      for (const int next : neighbours[seen[ring]])
-        if (next >= 0 && std::find(seen.begin(), seen.end(), next) == seen.end())
-          seen.push_back(next);
-  }
-  return triangle_normal(sheet, triangle);
-}
-
 FrontEnd blend(const FrontEnd& a, const FrontEnd& b, double s) {
   FrontEnd mean;
   mean.normal = ((1 - s) * a.normal + s * b.normal).normalized();
@@ -325,7 +293,6 @@ std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const
                                    const Domain& domain) {
   const double size = body_size(domain), surface_tolerance = 1e-9 * size;
   const double cos_corner = std::cos(40 * M_PI / 180);
-  constexpr double most_along = 0.5; // of a unit normal, along the border
   std::vector<FrontPiece> front;
   for (int s = 0; s < std::ssize(sheets); ++s) {
     const SurfaceMesh& sheet = sheets[s];
@@ -333,12 +300,8 @@ std::vector<FrontPiece> find_front(const std::vector<SurfaceMesh>& sheets, const
       const int count = static_cast<int>(loop.size());
       std::vector<FrontEnd> own(count), joint(count); // of edge i, and where edge i - 1 meets edge i
       for (int i = 0; i < count; ++i) {
-        const Vector3 along = (sheet.vertices[loop[i].to] - sheet.vertices[loop[i].from]).normalized();
-        own[i].normal = steady_normal(sheet, neighbours[s], loop[i].triangle);
-        if (std::abs(along.dot(own[i].normal)) > most_along) // the sheet is folded there
-          own[i].normal = triangle_normal(sheet, loop[i].triangle);
-        own[i].normal = (own[i].normal - own[i].normal.dot(along) * along).normalized();
-        own[i].ahead = along.cross(own[i].normal);
+        own[i].normal = triangle_normal(sheet, loop[i].triangle);
+        own[i].ahead = (sheet.vertices[loop[i].to] - sheet.vertices[loop[i].from]).cross(own[i].normal).normalized();
       }
       for (int i = 0; i < count; ++i) {
         const FrontEnd &before = own[(i + count - 1) % count], &after = own[i];

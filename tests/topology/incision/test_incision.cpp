@@ -336,35 +336,6 @@ TEST_CASE("The front of an edge cut ends at the surface of the body", "[incision
   CHECK(large.area() == Approx(0.5).epsilon(1e-3));
 }
 
-TEST_CASE("Flat triangles at the front do not turn its frame", "[incision]") {
-  // A blade that is drawn back over its front leaves a strip as wide as where it ends is uncertain.
-  SurfaceMesh sheet = rectangle(Vector3(-0.2, -0.3, 0.5), Vector3(0.65, 0, 0), Vector3(0, 1.6, 0), 3, 8);
-  const int count = static_cast<int>(sheet.vertices.size());
-  std::vector<int> border; // from the lower end to the upper one
-  for (int v = 0; v < count; ++v)
-    if (std::abs(sheet.vertices[v].x() - 0.45) < 1e-9)
-      border.push_back(v);
-  std::sort(border.begin(), border.end(), [&](int a, int b) { return sheet.vertices[a].y() < sheet.vertices[b].y(); });
-  const auto grown = [&](double width, double off) {
-    SurfaceMesh wider = sheet;
-    for (std::size_t k = 0; k < border.size(); ++k)
-      wider.vertices.push_back(sheet.vertices[border[k]] + Vector3(width, 0, k % 2 == 0 ? off : -off));
-    for (int k = 0; k + 1 < std::ssize(border); ++k) {
-      wider.triangles.push_back({border[k], count + k, border[k + 1]});
-      wider.triangles.push_back({count + k, count + k + 1, border[k + 1]});
-    }
-    return Incision({wider}, unit_box());
-  };
-  for (const auto& [x, y] : {std::pair(0.5, 0.3), std::pair(0.4, 0.62), std::pair(0.47, 0.77)}) {
-    const auto frame = grown(1e-3, 5e-4).front_frame(Vector3(x, y, 0.53), 1);
-    REQUIRE(frame);
-    CHECK(frame->normal.dot(Vector3::UnitZ()) > 1 - 1e-6);
-    CHECK(frame->ahead.dot(Vector3::UnitX()) > 1 - 1e-4);
-  }
-  // A strip that is no flatter is the sheet.
-  CHECK(grown(0.1, 0.05).front_frame(Vector3(0.6, 0.3, 0.53), 1)->normal.dot(Vector3::UnitZ()) < 0.97);
-}
-
 TEST_CASE("A through cut, a closed cut and a border on the surface have no front", "[incision]") {
   const Incision through({rectangle(Vector3(-0.1, -0.1, 0.4), Vector3(1.2, 0, 0.1), Vector3(0, 1.2, 0.1), 4, 4)},
                          unit_box());
