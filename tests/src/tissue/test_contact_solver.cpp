@@ -50,7 +50,7 @@ TEST_CASE("A blade cuts what its edge sweeps, and its body follows with a front 
 }
 
 TEST_CASE("A cut that is refused leaves the body that was there") {
-  TissueParts parts(cut_block + blade({"[0.02, 0, 0.04]", "[0.02, 0, 0.02]"}, 0.04, "0.5"));
+  TissueParts parts(cut_block + by_appending + blade({"[0.02, 0, 0.04]", "[0.02, 0, 0.02]"}, 0.04, "0.5"));
   const StepSample& last = parts.state.steps.back();
   parts.updater.build(parts.state.model);
   parts.contact.solve({last.time, std::nullopt, std::nullopt}, parts.state.model);
