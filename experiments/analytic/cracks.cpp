@@ -24,6 +24,10 @@ CutFrame tilted_frame(const Vector3& origin, const Vector3& tilt) {
   return {origin, turn.col(0), turn.col(2), turn.col(1)};
 }
 
+CutFrame placed_frame(Placement placement, const Vector3& origin, const Vector3& tilt) {
+  return placement == Placement::tilted ? tilted_frame(origin, tilt) : CutFrame{};
+}
+
 Vector3 straight_crack_displacement(const solvers::Material& material, const CutFrame& frame,
                                     const solvers::Intensities& k, const Vector3& x) {
   const Vector3 at = frame.local(x);

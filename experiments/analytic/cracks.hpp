@@ -20,6 +20,14 @@ struct CutFrame {
 /// moved.
 CutFrame tilted_frame(const Vector3& origin, const Vector3& tilt);
 
+/// How a cut lies to the axes, and with them to the faces of its body and to the background cells.
+enum class Placement {
+  tilted, // aligned with nothing
+  aligned // in a plane of the axes, through 0
+};
+/// tilted_frame(), or the axes about 0.
+CutFrame placed_frame(Placement placement, const Vector3& origin, const Vector3& tilt);
+
 /// Field of a half-plane crack behind the straight front of `frame` (mode I, II, III) [Williams 1957], m.
 Vector3 straight_crack_displacement(const solvers::Material& material, const CutFrame& frame,
                                     const solvers::Intensities& k, const Vector3& x);

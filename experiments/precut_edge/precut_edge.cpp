@@ -1,6 +1,6 @@
 // Problem:   a strip 1 m wide and 3 m long, 0.4 m thick between sliding sides (plane strain), cut in from one side over
-//            0.4 of its width, and pulled at its ends by the stress s. It stands askew between the axes. The same with
-//            free sides and nu = 0, which is plane strain too, turned about all three axes.
+//            0.4 of its width, and pulled at its ends by the stress s. It stands askew between the axes, and along
+//            them. The same with free sides and nu = 0, which is plane strain too, turned about all three axes.
 // Reference: K_I of the single-edge-notched strip, to 0.5 % [Tada, Paris and Irwin].
 // Command:   spherecut experiment run precut_edge --out DIR
 #include "experiments/registered.hpp"
@@ -23,13 +23,16 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
   // The strip lies along `ahead`: its length is the way of the cut, its height the direction of the pull.
   const double wanted = edge_notched_strip_intensity(tension, depth, width);
   std::vector<Check> checks;
-  app::Table table(
-      {"method", "sight", "sides", "nodes", "seed", "spacing", "k_correlation", "k_interaction", "k_exact"});
+  app::Table table({"placement", "method", "sight", "sides", "nodes", "seed", "spacing", "k_correlation",
+                    "k_interaction", "k_exact"});
   app::Figure figure{"Edge-notched strip: intensity over Tada's", "nodes", "K_I / exact", false, false, {}};
   struct Run {
     PrecutMethod method;
     StripSides sides;
-    [[nodiscard]] std::string name() const { return method.name() + (sides == StripSides::free ? "_free_sides" : ""); }
+    Placement placement = Placement::tilted;
+    [[nodiscard]] std::string name() const {
+      return method.name() + (sides == StripSides::free ? "_free_sides" : "") + suffix(placement);
+    }
   };
   std::vector<Run> runs;
   for (const PrecutMethod& method : precut_methods(context.quick)) {
@@ -37,12 +40,16 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
     if (method.judged)
       runs.push_back({method, StripSides::free});
   }
+  if (!context.quick)
+    for (const PrecutMethod& method : precut_methods(true))
+      for (const StripSides sides : {StripSides::sliding, StripSides::free})
+        runs.push_back({method, sides, Placement::aligned});
   for (const Run& run : runs) {
     const PrecutMethod& method = run.method;
-    const TiltedStrip strip = tilted_strip(width, 3, 0.4, 0.2, run.sides);
+    const TiltedStrip strip = tilted_strip(width, 3, 0.4, 0.2, run.sides, run.placement);
     const CutFrame& frame = strip.frame;
     app::Series points{run.name(), {}, {}, app::SeriesStyle::points};
-    for (int size : sizes) {
+    for (int size : run.placement == Placement::tilted ? sizes : std::vector<int>{sizes.back()}) {
       ErrorSeries errors;
       for (int seed = 1; seed <= (method.judged ? seeds : std::min(seeds, 3)); ++seed) {
         CutBodyCase cut{strip.domain, {cut_from_end(strip, depth, 0.07, 0.1)}, 4, 0.35,
@@ -64,7 +71,8 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
         const double by_integral = solvers::interaction_integral(*discretisation, field, *front)[0];
         errors.add("k_correlation", std::abs(by_jump / wanted - 1));
         errors.add("k_interaction", std::abs(by_integral / wanted - 1));
-        table.add({std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
+        table.add({run.placement == Placement::aligned ? "aligned" : "tilted",
+                   std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
                    run.sides == StripSides::free ? "free" : "sliding", fmt::format("{}", body.problem.nodes.size()),
                    fmt::format("{}", seed), fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", by_jump),
                    fmt::format("{:.5f}", by_integral), fmt::format("{:.5f}", wanted)});

@@ -1,9 +1,8 @@
-// Problem:   a disc-shaped cut of radius a = 1 m in a cube of 4 m, tilted and shifted against it. Its faces carry a
-//            pressure p, or what remote tension s along a direction tilted by 35 degrees from the normal leaves on
-//            them. The exact displacement is prescribed on the surface of the cube.
+// Problem:   a disc-shaped cut of radius a = 1 m in a cube of 4 m, tilted and shifted against it, and
+//            along its axes. Its faces carry a pressure p, or what remote tension s along a direction tilted by 35
+//            degrees from the normal leaves on them. The exact displacement is prescribed on the surface of the cube.
 // Reference: Sneddon's field [1946]: opening volume 16 (1 - nu^2) p a^3 / (3 E), K_I = 2 p sqrt(a / pi), displacement
-// at
-//            the nodes. For the tilted tension K_I, K_II, K_III along the front; errors over the largest of them.
+//            at the nodes. For the tilted tension K_I, K_II, K_III along the front; errors over the largest of them.
 // Command:   spherecut experiment run precut_penny --out DIR
 #include "experiments/registered.hpp"
 #include "experiments/support/penny_body.hpp"
@@ -21,7 +20,6 @@ namespace spherecut::experiments {
 namespace {
 
 constexpr double pi = std::numbers::pi, radius = penny_radius, tilt = 35 * pi / 180;
-const CutFrame& crack = penny_frame();
 
 struct PennyErrors {
   double volume = 0, displacement = 0, k_correlation = 0, k_interaction = 0; // relative
@@ -32,7 +30,8 @@ std::vector<topology::FrontFrame> places(const CutBody& body) {
   return solvers::front_samples(*body.problem.incision, 2 * pi * radius / 8.01);
 }
 
-double opening_volume(const CutBody& body, const solvers::Discretisation& discretisation, const solvers::Field& field) {
+double opening_volume(const CutFrame& crack, const CutBody& body, const solvers::Discretisation& discretisation,
+                      const solvers::Field& field) {
   constexpr int rings = 30, sectors = 12;
   double volume = 0;
   for (int a = 0; a < rings; ++a)
@@ -45,16 +44,16 @@ double opening_volume(const CutBody& body, const solvers::Discretisation& discre
   return volume;
 }
 
-PennyErrors under_pressure(CutBody body, const solvers::DiscretisationOptions& options) {
+PennyErrors under_pressure(const CutFrame& crack, CutBody body, const solvers::DiscretisationOptions& options) {
   const solvers::Material material = body.problem.material;
-  const auto exact = [material](const Vector3& x) { return penny_displacement(material, crack, radius, 1, x); };
+  const auto exact = [crack, material](const Vector3& x) { return penny_displacement(material, crack, radius, 1, x); };
   hold_whole_surface(body.problem, exact);
   body.problem.loads.lip_traction = [](const Vector3&, const Vector3& n) -> Vector3 { return -n; };
   const auto discretisation = solvers::discretise(body.problem, options);
   const solvers::Field field = discretisation->solve();
   PennyErrors errors;
   errors.volume =
-      std::abs(opening_volume(body, *discretisation, field) / penny_opening_volume(material, radius, 1) - 1);
+      std::abs(opening_volume(crack, body, *discretisation, field) / penny_opening_volume(material, radius, 1) - 1);
   const VectorX u = discretisation->nodal_displacements(field);
   double error = 0, size = 0;
   const solvers::NodeCloud& nodes = body.problem.nodes;
@@ -82,11 +81,11 @@ struct TiltedRun {
   std::vector<solvers::Intensities> found, wanted; // over the largest
 };
 
-TiltedRun under_tilted_tension(CutBody body, const solvers::DiscretisationOptions& options) {
+TiltedRun under_tilted_tension(const CutFrame& crack, CutBody body, const solvers::DiscretisationOptions& options) {
   const solvers::Material material = body.problem.material;
   const Vector3 pull = std::cos(tilt) * crack.normal + std::sin(tilt) * crack.ahead;
   const Matrix3 stress = pull * pull.transpose();
-  hold_whole_surface(body.problem, [material, stress](const Vector3& x) {
+  hold_whole_surface(body.problem, [crack, material, stress](const Vector3& x) {
     return loaded_penny_displacement(material, crack, radius, stress, x);
   });
   body.problem.loads.lip_traction = [stress](const Vector3&, const Vector3& n) -> Vector3 { return -stress * n; };
@@ -153,7 +152,7 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
   const std::vector<int> sizes = context.quick ? std::vector<int>{2000} : std::vector<int>{800, 1400, 2400};
   const std::vector<double> ratios = context.quick ? std::vector<double>{0.3} : std::vector<double>{0.3, 0.49};
   std::vector<Check> checks;
-  app::Table table({"load", "method", "sight", "poisson_ratio", "seed", "nodes", "spacing", "volume_error",
+  app::Table table({"placement", "load", "method", "sight", "poisson_ratio", "seed", "nodes", "spacing", "volume_error",
                     "displacement_error", "k_correlation_error", "k_interaction_error"});
   app::Figure figure{"Pressurised penny: displacement error against spacing, median of seeds",
                      "spacing at the front / m",
@@ -161,28 +160,42 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
                      true,
                      true,
                      {}};
-  const auto record = [&](const char* load, const PrecutMethod& method, double nu, int seed, const CutBody& body,
-                          const PennyErrors& e) {
-    table.add({load, std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
+  const auto record = [&](Placement placement, const char* load, const PrecutMethod& method, double nu, int seed,
+                          const CutBody& body, const PennyErrors& e) {
+    table.add({placement == Placement::aligned ? "aligned" : "tilted", load,
+               std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
                fmt::format("{}", nu), fmt::format("{}", seed), fmt::format("{}", body.problem.nodes.size()),
                fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", e.volume), fmt::format("{:.5f}", e.displacement),
                fmt::format("{:.5f}", e.k_correlation), fmt::format("{:.5f}", e.k_interaction)});
   };
   const std::vector<PrecutMethod> methods = precut_methods(context.quick, true);
-  for (const PrecutMethod& method : methods) {
+  struct Run {
+    PrecutMethod method;
+    Placement placement;
+    [[nodiscard]] std::string name() const { return method.name() + suffix(placement); }
+  };
+  std::vector<Run> runs;
+  for (const Placement placement : precut_placements(context.quick))
+    for (const PrecutMethod& method : methods)
+      if (method.judged || placement == Placement::tilted)
+        runs.push_back({method, placement});
+  for (const Run& run : runs) {
+    const PrecutMethod& method = run.method;
+    const CutFrame crack = penny_frame(run.placement);
+    const std::vector<int> run_sizes = run.placement == Placement::tilted ? sizes : std::vector<int>{sizes.back()};
     for (double nu : method.judged ? ratios : std::vector<double>{0.3}) {
-      app::Series series{fmt::format("{}, nu = {}", method.name(), nu), {}, {}};
+      app::Series series{fmt::format("{}, nu = {}", run.name(), nu), {}, {}};
       ErrorSeries errors;
-      for (int size : sizes) {
+      for (int size : run_sizes) {
         errors = {};
         double spacing = 0;
         for (int seed = 1; seed <= (!method.judged         ? std::min(seeds, 3)
                                     : size == sizes.back() ? seeds
                                                            : std::min(seeds, 5));
              ++seed) {
-          const CutBody body = penny_body(size, static_cast<std::uint64_t>(seed), nu, method);
-          const PennyErrors e = under_pressure(body, method.options());
-          record("pressure", method, nu, seed, body, e);
+          const CutBody body = penny_body(size, static_cast<std::uint64_t>(seed), nu, method, run.placement);
+          const PennyErrors e = under_pressure(crack, body, method.options());
+          record(run.placement, "pressure", method, nu, seed, body, e);
           spacing = body.fine;
           errors.add("volume", e.volume);
           errors.add("displacement", e.displacement);
@@ -191,11 +204,12 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
         }
         series.x.push_back(spacing);
         series.y.push_back(median(errors["displacement"]));
-        context.say(fmt::format("pressure, {}, nu = {}, {} nodes, medians (worst): {}", method.name(), nu, size,
-                                errors.text()));
+        context.say(
+            fmt::format("pressure, {}, nu = {}, {} nodes, medians (worst): {}", run.name(), nu, size, errors.text()));
       }
-      figure.series.push_back(series);
-      const std::string name = fmt::format("precut_penny_{}_nu{:02.0f}", method.name(), 100 * nu);
+      if (run.placement == Placement::tilted)
+        figure.series.push_back(series);
+      const std::string name = fmt::format("precut_penny_{}_nu{:02.0f}", run.name(), 100 * nu);
       if (!method.judged) {
         checks.push_back({name + "_volume_reported", median(errors["volume"]), ">=", 0});
         continue;
@@ -205,26 +219,28 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
       errors.check(name, "displacement", method.bound(0.045, 0.08), checks);
       errors.check(name, "k_correlation", method.bound(0.06, 0.10), checks);
       errors.check(name, "k_interaction", method.bound(0.06, 0.10), checks);
-      if (sizes.size() > 1)
+      if (run_sizes.size() > 1)
         checks.push_back({name + "_slope", log_log_slope(series.x, series.y), ">=", 0.8});
     }
   }
-  for (const PrecutMethod& method : methods) {
+  for (const Run& run : runs) {
+    const PrecutMethod& method = run.method;
     if (!method.judged)
       continue;
+    const CutFrame crack = penny_frame(run.placement);
     ErrorSeries tilted;
     for (int seed = 1; seed <= seeds; ++seed) {
-      const CutBody body = penny_body(sizes.back(), static_cast<std::uint64_t>(seed), 0.3, method);
-      const TiltedRun run = under_tilted_tension(body, method.options());
-      record("tilted tension", method, 0.3, seed, body, run.errors);
-      tilted.add("k_correlation", run.errors.k_correlation);
-      tilted.add("k_interaction", run.errors.k_interaction);
-      if (seed == 1)
-        app::write_png(intensities_figure(run),
+      const CutBody body = penny_body(sizes.back(), static_cast<std::uint64_t>(seed), 0.3, method, run.placement);
+      const TiltedRun tension = under_tilted_tension(crack, body, method.options());
+      record(run.placement, "tilted tension", method, 0.3, seed, body, tension.errors);
+      tilted.add("k_correlation", tension.errors.k_correlation);
+      tilted.add("k_interaction", tension.errors.k_interaction);
+      if (seed == 1 && run.placement == Placement::tilted)
+        app::write_png(intensities_figure(tension),
                        context.out / fmt::format("intensities_{}.png", solvers::to_string(method.method)));
     }
-    context.say(fmt::format("tilted tension, {}, medians (worst): {}", method.name(), tilted.text()));
-    const std::string name = fmt::format("precut_penny_{}_tilted", method.name());
+    context.say(fmt::format("tilted tension, {}, medians (worst): {}", run.name(), tilted.text()));
+    const std::string name = fmt::format("precut_penny_{}_tilted", run.name());
     tilted.check(name, "k_correlation", method.bound(0.06, 0.10), checks);
     tilted.check(name, "k_interaction", method.bound(0.06, 0.10), checks);
   }

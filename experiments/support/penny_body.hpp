@@ -10,9 +10,10 @@ namespace spherecut::experiments {
 constexpr double penny_radius = 1; // m
 
 /// Frame of the cut: its centre and normal, and a direction in its plane. The cube of 4 m is about the origin.
-const CutFrame& penny_frame();
+CutFrame penny_frame(Placement placement = Placement::tilted);
 
 /// About `nodes` nodes, E = 1 Pa; supports and loads are the caller's.
-CutBody penny_body(int nodes, std::uint64_t seed, double nu, const PrecutMethod& method);
+CutBody penny_body(int nodes, std::uint64_t seed, double nu, const PrecutMethod& method,
+                   Placement placement = Placement::tilted);
 
 } // namespace spherecut::experiments

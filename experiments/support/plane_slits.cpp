@@ -132,8 +132,9 @@ struct SlitRun {
 
 constexpr std::array<double, 3> across_thickness{-0.25, 0, 0.25}; // of it
 
-SlitRun run_slits(const PlaneSlits& plate, const PrecutMethod& method, double fine, int seed) {
-  const TiltedStrip strip = tilted_strip(plate_width, plate_width, plate_thickness, 0.2, StripSides::sliding);
+SlitRun run_slits(const PlaneSlits& plate, const PrecutMethod& method, Placement placement, double fine, int seed) {
+  const TiltedStrip strip =
+      tilted_strip(plate_width, plate_width, plate_thickness, 0.2, StripSides::sliding, placement);
   const CutFrame& frame = strip.frame;
   CutBodyCase cut;
   cut.domain = strip.domain;
@@ -210,16 +211,26 @@ std::vector<Check> run_plane_slits(const ExperimentContext& context, const std::
   for (const PlaneSlits::Place& place : plate.places)
     largest[place.slit] = std::max(largest[place.slit], place.opening.norm());
   std::vector<Check> checks;
-  app::Table table({"method", "spacing", "seed", "nodes", "slit", "part", "share", "z", "opening_across",
+  app::Table table({"placement", "method", "spacing", "seed", "nodes", "slit", "part", "share", "z", "opening_across",
                     "opening_along", "reference_across", "reference_along"});
-  bool is_default = true; // the first method is
-  for (const PrecutMethod& method : precut_methods(true, true)) {
+  struct Run {
+    PrecutMethod method;
+    Placement placement;
+    bool is_default; // the first method is
+  };
+  std::vector<Run> runs;
+  for (const Placement placement : precut_placements(context.quick))
+    for (const PrecutMethod& method : precut_methods(true, true))
+      runs.push_back({method, placement, method.name() == precut_methods(true, true).front().name()});
+  for (const auto& [method, placement, is_default] : runs) {
     const bool is_judged = is_default || (!context.quick && method.sight == solvers::SightRule::appended);
-    for (const double fine : spacings) {
+    if (placement == Placement::aligned && !is_judged)
+      continue;
+    for (const double fine : placement == Placement::tilted ? spacings : std::vector<double>{spacings.back()}) {
       ErrorSeries errors;
       int nodes = 0;
       for (int seed = 1; seed <= seeds; ++seed) {
-        const SlitRun run = run_slits(plate, method, fine, seed);
+        const SlitRun run = run_slits(plate, method, placement, fine, seed);
         nodes = run.nodes;
         std::vector<double> worst(plate.slits.size(), 0);
         for (std::size_t k = 0; k < plate.places.size(); ++k) {
@@ -228,28 +239,28 @@ std::vector<Check> run_plane_slits(const ExperimentContext& context, const std::
           for (std::size_t z = 0; z < across_thickness.size(); ++z) {
             const Vector2d& opening = run.openings[k][z];
             worst[place.slit] = std::max(worst[place.slit], (opening - place.opening).norm() / largest[place.slit]);
-            table.add({method.name(), fmt::format("{:g}", fine), fmt::format("{}", seed), fmt::format("{}", nodes),
-                       fmt::format("{}", place.slit + 1), fmt::format("{}", place.part + 1),
-                       fmt::format("{:g}", place.share), fmt::format("{:g}", across_thickness[z] * plate_thickness),
+            table.add({placement == Placement::aligned ? "aligned" : "tilted", method.name(), fmt::format("{:g}", fine),
+                       fmt::format("{}", seed), fmt::format("{}", nodes), fmt::format("{}", place.slit + 1),
+                       fmt::format("{}", place.part + 1), fmt::format("{:g}", place.share),
+                       fmt::format("{:g}", across_thickness[z] * plate_thickness),
                        fmt::format("{:.6g}", opening.dot(left)), fmt::format("{:.6g}", opening.dot(way)),
                        fmt::format("{:.6g}", place.opening.dot(left)), fmt::format("{:.6g}", place.opening.dot(way))});
           }
         }
         for (std::size_t slit = 0; slit < plate.slits.size(); ++slit)
           errors.add(opening_key(plate, slit), worst[slit]);
-        if (is_default && seed == 1 && fine == spacings.back())
+        if (is_default && seed == 1 && fine == spacings.back() && placement == Placement::tilted)
           app::write_png(opening_figure(plate, run, title), context.out / "openings.png");
       }
-      context.say(fmt::format("{}, {} m apart, about {} nodes, medians (worst): {}", method.name(), fine, nodes,
-                              errors.text()));
-      const std::string prefix = fmt::format("{}_{}_{:g}_mm", name, method.name(), 1000 * fine);
+      context.say(fmt::format("{}{}, {} m apart, about {} nodes, medians (worst): {}", method.name(), suffix(placement),
+                              fine, nodes, errors.text()));
+      const std::string prefix = fmt::format("{}_{}{}_{:g}_mm", name, method.name(), suffix(placement), 1000 * fine);
       for (std::size_t slit = 0; slit < plate.slits.size(); ++slit)
         if (const std::string key = opening_key(plate, slit); is_judged)
           errors.check(prefix, key, bound, checks);
         else
           checks.push_back({fmt::format("{}_{}_reported", prefix, key), median(errors[key]), ">=", 0});
     }
-    is_default = false;
   }
   // The reference is to be known better than what is asked of the method.
   checks.push_back({name + "_reference_meshes", plate.mesh_change, "<=", 0.005});

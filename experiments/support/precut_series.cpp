@@ -52,4 +52,12 @@ std::vector<PrecutMethod> precut_methods(bool quick, bool with_appended) {
   return methods;
 }
 
+std::vector<Placement> precut_placements(bool quick) {
+  return quick ? std::vector{Placement::tilted} : std::vector{Placement::tilted, Placement::aligned};
+}
+
+std::string suffix(Placement placement) {
+  return placement == Placement::aligned ? "_aligned" : "";
+}
+
 } // namespace spherecut::experiments

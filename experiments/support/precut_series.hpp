@@ -1,6 +1,7 @@
 // Errors of one configuration over its seeds, and the checks on their median and worst.
 #pragma once
 
+#include "experiments/analytic/cracks.hpp"
 #include "experiments/experiment.hpp"
 
 #include "solvers/body/discretisation.hpp"
@@ -40,5 +41,11 @@ struct PrecutMethod {
 /// The two methods with the enriched basis, which are judged; in a full run also their other sight rules and
 /// `published`, which are reported. `with_appended`: a cut that only appends, too, which is judged.
 std::vector<PrecutMethod> precut_methods(bool quick, bool with_appended = false);
+
+/// In a full run both, in a quick one tilted alone. Aligned cuts are run on the finest nodes by the judged methods, and
+/// held to the same bounds.
+std::vector<Placement> precut_placements(bool quick);
+/// "_aligned", or nothing: at the end of what is told of a placement.
+std::string suffix(Placement placement);
 
 } // namespace spherecut::experiments

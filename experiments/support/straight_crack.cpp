@@ -4,13 +4,13 @@
 
 namespace spherecut::experiments {
 
-const CutFrame& straight_crack_frame() {
-  static const CutFrame frame = tilted_frame({0.03, 0.01, 0.04}, {0.12, -0.17, 0.1});
-  return frame;
+CutFrame straight_crack_frame(Placement placement) {
+  return placed_frame(placement, {0.03, 0.01, 0.04}, {0.12, -0.17, 0.1});
 }
 
-CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method method, solvers::SightRule sight) {
-  const CutFrame& crack = straight_crack_frame();
+CutBody straight_crack_body(std::uint64_t seed, double edge, solvers::Method method, solvers::SightRule sight,
+                            Placement placement) {
+  const CutFrame crack = straight_crack_frame(placement);
   CutBodyCase cut;
   cut.domain = topology::make_box_domain({-1, -0.5, -1}, {1, 0.5, 1}, 0.25);
   cut.sheets = {

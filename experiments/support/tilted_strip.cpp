@@ -8,9 +8,11 @@
 
 namespace spherecut::experiments {
 
-TiltedStrip tilted_strip(double length, double height, double thickness, double edge, StripSides sides) {
-  const CutFrame frame = sides == StripSides::sliding ? tilted_frame({0.031, 0, -0.017}, {0, 0.23, 0})
-                                                      : tilted_frame({0.031, 0.023, -0.017}, {0.19, 0.23, -0.14});
+TiltedStrip tilted_strip(double length, double height, double thickness, double edge, StripSides sides,
+                         Placement placement) {
+  const CutFrame frame = sides == StripSides::sliding
+                             ? placed_frame(placement, {0.031, 0, -0.017}, {0, 0.23, 0})
+                             : placed_frame(placement, {0.031, 0.023, -0.017}, {0.19, 0.23, -0.14});
   TiltedStrip strip{nullptr, frame, sides, length, height, thickness};
   const Vector3 half = 0.5 * Vector3(length, thickness, height);
   Matrix3 axes;

@@ -18,7 +18,8 @@ struct TiltedStrip {
   double length = 0, height = 0, thickness = 0; // m
 };
 
-TiltedStrip tilted_strip(double length, double height, double thickness, double edge, StripSides sides);
+TiltedStrip tilted_strip(double length, double height, double thickness, double edge, StripSides sides,
+                         Placement placement = Placement::tilted);
 
 /// A cut across the whole thickness, from beyond the end `-ahead` to the distance `depth` m inside it, at `above` m
 /// over the middle.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <map>
 #include <utility>
 
 namespace spherecut::solvers {
@@ -384,6 +385,71 @@ void AppendedBody::shape_at(const Vector3& x, ShapeFunctions& shape) const {
   }
   for (const FrontTerm& term : terms.front)
     shape.vectors.push_back({uncut_->size() + term.function, term.value, term.gradient});
+}
+
+/// Base functions are linear in a box, as its products take them. A part that some function knows by its samples has a
+/// point at each of them.
+void AppendedBody::visit_weak_points(const BoundingBox& region, const std::function<bool(const Vector3& x)>& is_wanted,
+                                     const PointVisitor& visit) const {
+  const SmallBoxes& boxes = uncut_->boxes();
+  std::vector<int> found;
+  boxes.within(region, found);
+  ShapeFunctions shape;
+  std::map<std::pair<PartId, int>, std::vector<FrontTerm>> front; // of one cell
+  int front_of = -1;
+  for (const int box : found) {
+    const int cell_index = boxes.cell_of(box), lane = boxes.lane_of(box);
+    const BoxShapes& cell = boxes.cells()[cell_index];
+    if (std::exchange(front_of, cell_index) != cell_index) {
+      front.clear();
+      space_->for_each_front_term(0, cell_index, [&](PartId part, int sample, const FrontTerm& term) {
+        front[{part, sample}].push_back(term);
+      });
+    }
+    for (int k = 0; k < space_->cut().part_count(box); ++k) {
+      const PartId part = part_id(box, k);
+      if (is_dropped(part))
+        continue;
+      const CutPart of_part = space_->cut().part(part);
+      const double volume = of_part.share * boxes.boxes()[box].volume;
+      const int samples = space_->known_samples(part);
+      for (int n = 0; n < samples; ++n) {
+        const PlacedSample* const sample = samples > 1 ? &space_->samples(part)[n] : nullptr;
+        const Vector3& at = sample != nullptr ? sample->at : of_part.centroid;
+        if (!region.contains(at) || !is_wanted(at))
+          continue;
+        shape_in_part(cell, part, lane, n, at, shape);
+        if (const auto terms = front.find({part, n}); terms != front.end())
+          for (const FrontTerm& term : terms->second)
+            shape.vectors.push_back({uncut_->size() + term.function, term.value, term.gradient});
+        visit({at, volume * (sample != nullptr ? sample->share : 1)}, shape);
+      }
+    }
+  }
+}
+
+/// Functions of nodes, and twins and steps, at a sample of a part.
+void AppendedBody::shape_in_part(const BoxShapes& cell, PartId part, int lane, int sample, const Vector3& x,
+                                 ShapeFunctions& shape) const {
+  for (auto* list : {&shape.value, &shape.dx, &shape.dy, &shape.dz})
+    list->clear();
+  shape.nodes.clear();
+  shape.vectors.clear();
+  const auto add = [&](int node, double value, const Vector3& gradient) {
+    shape.nodes.push_back(node);
+    shape.value.push_back(value);
+    shape.dx.push_back(gradient.x());
+    shape.dy.push_back(gradient.y());
+    shape.dz.push_back(gradient.z());
+  };
+  const Vector3 off = x - uncut_->boxes().boxes()[box_of(part)].middle;
+  for (std::size_t n = 0; n < cell.nodes.size(); ++n)
+    if (const Vector3 gradient = cell.gradient_at(n, lane); cell.value_at(n, lane) != 0 || !gradient.isZero(0))
+      add(cell.nodes[n], cell.value_at(n, lane) + gradient.dot(off), gradient);
+  for (const int node : cell.nodes)
+    for (const int k : space_->twins_of(node))
+      if (ScalarTerm term; space_->term_at(k, part, sample, term))
+        add(uncut_->size() + k, term.value, term.gradient);
 }
 
 PointState AppendedBody::at(const Vector3& x, const Field& field) const {

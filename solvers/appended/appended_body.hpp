@@ -60,6 +60,8 @@ class AppendedBody final : public Discretisation {
   [[nodiscard]] VectorX nodal_displacements(const Field& field) const override;
   [[nodiscard]] PointState at(const Vector3& x, const Field& field) const override;
   void shape_at(const Vector3& x, ShapeFunctions& shape) const override;
+  void visit_weak_points(const BoundingBox& region, const std::function<bool(const Vector3& x)>& is_wanted,
+                         const PointVisitor& visit) const override;
   [[nodiscard]] double sphere_radius(int node) const override;
   [[nodiscard]] std::vector<Vector3> constraint_forces(const Field& field) const override;
   [[nodiscard]] double residual(const Field& field, const std::vector<int>& loaded_nodes,
@@ -75,6 +77,8 @@ class AppendedBody final : public Discretisation {
   void follow(const BoundingBox& region);
   void find_pieces();
   void add_force(const Vector3& x, const Vector3& force);
+  void shape_in_part(const BoxShapes& cell, PartId part, int lane, int sample, const Vector3& x,
+                     ShapeFunctions& shape) const;
   [[nodiscard]] VectorX volume_loads_of_uncut() const;
   void add_volume_loads_of_cut();
   [[nodiscard]] Vector3 twin_load(int k, const Matrix3& initial) const;

@@ -99,6 +99,8 @@ class CutSpace {
   [[nodiscard]] const PlacedPart& samples(PartId part) const { return places_.of(cut_, part); }
   /// How many samples a part has as far as functions have been asked for there.
   [[nodiscard]] int known_samples(PartId part) const { return places_.known_samples(part); }
+  /// Twins and steps of a node, by their places among the functions.
+  [[nodiscard]] const std::vector<int>& twins_of(int node) const { return twins_of_[node]; }
   /// Term of a twin at a part of a box, or of a step at one of its samples, with the box's linear shape functions.
   /// False: it vanishes there.
   bool term_at(int k, PartId part, int sample, ScalarTerm& term) const;

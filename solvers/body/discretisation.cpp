@@ -110,6 +110,9 @@ void Discretisation::shape_at(const Vector3&, ShapeFunctions&) const {
   throw InputError(fmt::format("method {} has no spheres here", to_string(method())));
 }
 
+void Discretisation::visit_weak_points(const BoundingBox&, const std::function<bool(const Vector3&)>&,
+                                       const PointVisitor&) const {}
+
 double Discretisation::sphere_radius(int) const {
   throw InputError(fmt::format("method {} has no spheres here", to_string(method())));
 }

@@ -156,7 +156,10 @@ struct CaseResponses {
   std::vector<Field> fields; // under every case; none where the method knows the rest without them
 };
 
-struct ShapeFunctions; // solvers/shapes/functions.hpp
+struct ShapeFunctions;  // solvers/shapes/functions.hpp
+struct QuadraturePoint; // solvers/quadrature/background_cells.hpp
+/// Takes a point of the weak form, with the shape functions that the method has there.
+using PointVisitor = std::function<void(const QuadraturePoint& point, const ShapeFunctions& shape)>;
 
 /// Every function of it throws InputError for a node that the body does not have and for a field or forces of another
 /// size than it asks for. An object is for one thread at a time; different objects are independent of each other.
@@ -227,6 +230,11 @@ class Discretisation {
   /// times coefficient_j of a field, and of the vector terms. Throws InputError when no support covers x, or where the
   /// method has no spheres.
   virtual void shape_at(const Vector3& x, ShapeFunctions& shape) const;
+  /// Calls visit for the points in a region, of those that is_wanted(x) takes, at which the method integrates its weak
+  /// form; none where it has no weak form. Near incompressibility the weak form keeps the change of volume small at
+  /// these points, and at no others.
+  virtual void visit_weak_points(const BoundingBox& region, const std::function<bool(const Vector3& x)>& is_wanted,
+                                 const PointVisitor& visit) const;
   /// Radius of a node's sphere, m.
   [[nodiscard]] virtual double sphere_radius(int node) const;
 

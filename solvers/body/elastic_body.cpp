@@ -113,7 +113,7 @@ Sight sight_about_cut(const Problem& problem, Method method, SightRule rule) {
     sight.enriched_growth = 2;
     sight.radius_factor = tuning.collocation_front_radius;
   }
-  if (problem.material.poisson_ratio >= 0.45)
+  if (problem.material.is_nearly_incompressible())
     sight.reach = tuning.front_reach_soft;
   sight.regions = problem.regions;
   return sight;

@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 #include <numbers>
+#include <optional>
 
 namespace spherecut::solvers {
 namespace {
@@ -197,32 +198,37 @@ struct ConstantAtFault {
   double* value;
 };
 
-ConstantAtFault constant_at_fault(LawSpec& spec) {
-  if (auto* yeoh = std::get_if<YeohLaw>(&spec.law)) {
-    if (yeoh->c2 < 0)
-      return {"c2", &yeoh->c2};
-    return {"c3", &yeoh->c3};
+/// What takes the ellipticity of a law away; nothing of those that are polyconvex for all constants that get here.
+struct AtFault {
+  using Found = std::optional<ConstantAtFault>;
+  Found operator()(LinearLaw& /*law*/) const { return std::nullopt; }
+  Found operator()(NeoHookeanLaw& /*law*/) const { return std::nullopt; }
+  Found operator()(YeohLaw& law) const {
+    return law.c2 < 0 ? ConstantAtFault{"c2", &law.c2} : ConstantAtFault{"c3", &law.c3};
   }
-  // Of Ogden's terms the one that takes most from the shear modulus, else that of the least exponent.
-  std::vector<OgdenLaw::Term>& terms = std::get<OgdenLaw>(spec.law).terms;
-  std::size_t worst = 0;
-  for (std::size_t p = 1; p < terms.size(); ++p) {
-    const double here = terms[p].modulus * terms[p].exponent, there = terms[worst].modulus * terms[worst].exponent;
-    if (std::min(here, there) < 0 ? here < there : std::abs(terms[p].exponent) < std::abs(terms[worst].exponent))
-      worst = p;
+  /// Of the terms the one that takes most from the shear modulus, else that of the least exponent.
+  Found operator()(OgdenLaw& law) const {
+    std::vector<OgdenLaw::Term>& terms = law.terms;
+    std::size_t worst = 0;
+    for (std::size_t p = 1; p < terms.size(); ++p) {
+      const double here = terms[p].modulus * terms[p].exponent, there = terms[worst].modulus * terms[worst].exponent;
+      if (std::min(here, there) < 0 ? here < there : std::abs(terms[p].exponent) < std::abs(terms[worst].exponent))
+        worst = p;
+    }
+    return ConstantAtFault{fmt::format("the modulus of term {}", worst + 1), &terms[worst].modulus};
   }
-  return {fmt::format("the modulus of term {}", worst + 1), &terms[worst].modulus};
-}
+  Found operator()(HolzapfelLaw& /*law*/) const { return std::nullopt; }
+};
 
 void check_ellipticity(const LawSpec& spec) {
-  if (!std::holds_alternative<YeohLaw>(spec.law) && !std::holds_alternative<OgdenLaw>(spec.law))
-    return; // the others are polyconvex for all constants that get here
+  LawSpec tried = spec;
+  const AtFault::Found at_fault = std::visit(AtFault{}, tried.law);
+  if (!at_fault)
+    return;
   const std::optional<EllipticityLoss> loss = find_loss(spec, reach_of_check);
   if (!loss)
     return;
-  LawSpec tried = spec;
-  const auto [name, value] = constant_at_fault(tried);
-  double& constant = *value;
+  double& constant = *at_fault->value;
   const double given = constant;
   std::string limit;
   constant = 0;
@@ -238,7 +244,7 @@ void check_ellipticity(const LawSpec& spec) {
   refuse(spec,
          fmt::format("{} is {} Pa: strong ellipticity is lost in {} at a strain of {:.3g} %; it must hold between "
                      "stretches of {} and {}{}",
-                     name, given, loss->path, 100 * loss->strain, 1 / reach_of_check, reach_of_check, limit));
+                     at_fault->name, given, loss->path, 100 * loss->strain, 1 / reach_of_check, reach_of_check, limit));
 }
 
 } // namespace

@@ -11,6 +11,8 @@ struct Material {
   [[nodiscard]] double lame_lambda() const {
     return young_modulus * poisson_ratio / ((1 + poisson_ratio) * (1 - 2 * poisson_ratio));
   }
+  /// Whether supports and integrals have to keep the volume: nu >= 0.45.
+  [[nodiscard]] bool is_nearly_incompressible() const { return poisson_ratio >= 0.45; }
   /// Throws InputError when E <= 0 or nu is outside [0, 0.5).
   void check() const;
 };

@@ -4,11 +4,13 @@
 #include "solvers/fracture/inset_integral.hpp"
 #include "solvers/fracture/local_values.hpp"
 #include "solvers/fracture/virtual_shift.hpp"
+#include "solvers/quadrature/background_cells.hpp"
 #include "solvers/shapes/functions.hpp"
 #include "topology/base/errors.hpp"
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <complex>
 #include <fmt/format.h>
 #include <numbers>
 
@@ -130,6 +132,22 @@ Intensities displacement_correlation(const Problem& problem, const FrontFrame& f
 
 namespace {
 
+/// An integral of v_a over z, v the displacement of tip_field() and z the distance from the plane of the cut, and its
+/// derivative along the way ahead. v_a goes with real and imaginary parts of Z^(1/2), Z = ahead + i above.
+struct AcrossPlane {
+  double integral, slope; // m2, m
+};
+AcrossPlane across_plane(const Material& material, const Intensities& k, double ahead, double above) {
+  const double kappa = 3 - 4 * material.poisson_ratio,
+               size = 1 / (2 * material.shear_modulus() * std::sqrt(2 * std::numbers::pi));
+  const std::complex<double> root = std::sqrt(std::complex<double>(ahead, above)), cubed = root * root * root,
+                             inverse = 1.0 / root;
+  return {size * (k[0] * ((kappa - 3) * 2 / 3 * cubed.imag() + 2 * above * root.real()) +
+                  k[1] * (-(kappa - 1) * 2 / 3 * cubed.real() + 2 * above * root.imag())),
+          size * (k[0] * ((kappa - 3) * root.imag() + above * inverse.real()) +
+                  k[1] * (-(kappa - 1) * root.real() + above * inverse.imag()))};
+}
+
 /// Coordinates about a front that is locally an arc in the plane of the cut: X ahead, Z above, s along.
 class Tube {
  public:
@@ -154,11 +172,35 @@ class Tube {
     place.stretch = 1 + curvature_ * ahead;
     return place;
   }
+  /// (ahead, above, along) of a place.
+  [[nodiscard]] Vector3 coordinates(const Vector3& x) const {
+    const Vector3 d = x - front_.point;
+    const double p = d.dot(front_.ahead), q = d.dot(front_.tangent), above = d.dot(front_.normal);
+    if (curvature_ == 0)
+      return {p, above, q};
+    // hypot(out, q) - radius without cancellation: nearly straight fronts have their centre far away.
+    const double side = std::copysign(1.0, curvature_), radius = 1 / std::abs(curvature_), out = side * p + radius;
+    const double ahead = (p * p + 2 * side * p * radius + q * q) / (std::hypot(out, q) + radius);
+    return {side * ahead, above, radius * std::atan2(q, out)};
+  }
   /// Gradient, in the axes of the place, of a field of vectors given in them that does not change along the front.
   [[nodiscard]] Matrix3 curved_gradient(const TipField& field, double ahead) const {
     Matrix3 gradient = field.gradient;
     const double c = curvature_ / (1 + curvature_ * ahead);
     gradient.col(2) = c * Vector3(-field.displacement[2], 0, field.displacement[0]);
+    return gradient;
+  }
+  /// The same of the field of intensities k and of a displacement -c int v_a dz along the normal, c the curvature of
+  /// the front out there, z from the plane of the cut. By itself the turning stretches the field along the front by c
+  /// v_a: a change of volume that lambda multiplies. The displacement, of order r^(3/2), takes that back.
+  [[nodiscard]] Matrix3 isochoric_gradient(const Material& material, const Intensities& k, double ahead,
+                                           double above) const {
+    const TipField field = tip_field(material, k, ahead, above);
+    Matrix3 gradient = curved_gradient(field, ahead);
+    const double c = curvature_ / (1 + curvature_ * ahead);
+    const AcrossPlane across = across_plane(material, k, ahead, above);
+    gradient(1, 0) += c * (c * across.integral - across.slope);
+    gradient(1, 1) -= c * field.displacement[0];
     return gradient;
   }
   /// Divergence of a symmetric tensor field given in the axes of the place, by central differences.
@@ -181,6 +223,8 @@ class Tube {
 constexpr double longest_arc = 0.35;  // of the same: half the tube's length, where that is above the shortest
 constexpr double shortest_half = 1;   // of the tube's length, in spacings, down to which it is shortened
 constexpr double shortened_by = 0.25; // spacings, at a time
+// Of a tube, in spacings, that enough points of a weak form lie in: half its length, and how far the shift fades.
+constexpr double least_weak_half = 1.5, least_weak_fade = 1.5;
 
 struct GaussRule {
   std::array<double, 2> place{-0.5773502691896257, 0.5773502691896257};
@@ -192,6 +236,7 @@ struct Sample {
   Vector3 position;
   std::array<Matrix3, 3> stress, gradient;
   Vector3 load;
+  const ShapeFunctions* shape = nullptr; // of the body at a point of its weak form; null: to be found at the position
 };
 
 // With xi = q e the virtual shift of the front (e ahead, q = 1 at the front and 0 on the outside of the tube),
@@ -201,11 +246,15 @@ struct Sample {
 // u, sigma the field, v, tau = C grad v the auxiliary one, b the body force, t the traction on the faces, n out of the
 // material. v keeps its components in axes that turn with the front: tau is not quite in equilibrium then.
 // Within `inset_spacings` of the surface of the body xi fades to nothing (0: it does not, and the tube must not leave).
+//
+// Near incompressibility v keeps the volume where the front turns, since lambda multiplies what it does not keep. And
+// the change of volume of u is right at the points of the weak form alone: the integral over the volume is the sum over
+// these points, with their weights. Where too few of them lie in the tube, and else, the tube has a rule of its own.
 class InteractionRule {
  public:
   InteractionRule(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
                   double inset_spacings)
-      : incision_(incision_of(body.problem())), problem_(body.problem()), front_(front), options_(options),
+      : body_(body), incision_(incision_of(body.problem())), problem_(body.problem()), front_(front), options_(options),
         h_(spacing_at(body.problem().nodes, front.point)), tube_(front, front_curvature(incision_, front, h_)),
         inset_(inset_spacings * h_) {
     size_tube();
@@ -219,13 +268,14 @@ class InteractionRule {
   /// Calls visit(sample) for every point.
   template <class Visitor>
   void each_sample(const Visitor& visit) const {
+    const bool is_summed = sum_weak_points(visit);
     for (const auto& [s, ds] : along_front())
       for (int b = 0; b < cells_radial(); ++b)
         for (const double gb : gauss_.place) {
           // r = outer t^2: the singular products of the two fields are smooth in t.
           const double t = (b + 0.5 + 0.5 * gb) / cells_radial();
           const Section section{s, ds, outer_ * t * t, outer_ * t / cells_radial()};
-          for (int c = 0; c < 2 * cells_around(); ++c)
+          for (int c = 0; c < 2 * cells_around() && !is_summed; ++c)
             if (const auto sample = around(section, c))
               visit(*sample);
           for (const double side : {1.0, -1.0})
@@ -283,9 +333,44 @@ class InteractionRule {
     return (x - face->point).dot(face->normal) >= 0 ? 1.0 : -1.0;
   }
 
+  /// A place in the tube: ahead, above, along the front, m, and the volume that it stands for, m3.
+  struct Point {
+    double ahead, above, s, volume;
+  };
+  /// False: the integral is not over the points of the weak form, or there are none.
+  template <class Visitor>
+  bool sum_weak_points(const Visitor& visit) const {
+    if (!is_weak_)
+      return false;
+    const double farthest = outer_ + half_length_ * (1 + outer_ * std::abs(tube_.curvature()));
+    const Vector3& x = front_.point;
+    bool any = false;
+    body_.visit_weak_points(
+        {x.array() - farthest, x.array() + farthest},
+        [&](const Vector3& at) { return is_inside(tube_.coordinates(at)); },
+        [&](const QuadraturePoint& point, const ShapeFunctions& shape) {
+          const Vector3 at = tube_.coordinates(point.position);
+          any = true;
+          if (auto sample = sample_at({at[0], at[1], at[2], point.weight})) {
+            sample->shape = &shape;
+            visit(*sample);
+          }
+        });
+    return any;
+  }
+  [[nodiscard]] bool is_inside(const Vector3& at) const {
+    const double r = std::hypot(at[0], at[1]);
+    return r > 0 && r < outer_ && std::abs(at[2]) < half_length_;
+  }
+  [[nodiscard]] Matrix3 auxiliary_gradient(int mode, double ahead, double above) const {
+    return keeps_volume_ ? tube_.isochoric_gradient(problem_.material, modes_[mode], ahead, above)
+                         : tube_.curved_gradient(tip_field(problem_.material, modes_[mode], ahead, above), ahead);
+  }
+  [[nodiscard]] std::optional<Sample> sample_at(const Point& point) const;
   [[nodiscard]] std::optional<Sample> around(const Section& section, int c) const;
   [[nodiscard]] std::optional<Sample> on_face(const Section& section, double side) const;
 
+  const Discretisation& body_;
   const topology::Incision& incision_;
   const Problem& problem_;
   const FrontFrame& front_;
@@ -297,6 +382,8 @@ class InteractionRule {
   std::array<Intensities, 3> modes_{Vector3::UnitX(), Vector3::UnitY(), Vector3::UnitZ()};
   double inner_ = 0, outer_ = 0, half_length_ = 0; // m, of the tube
   double total_ = 0;                               // m, of the bump, by the same rule
+  bool keeps_volume_ = false;                      // near incompressibility
+  bool is_weak_ = false;                           // over the points of the weak form
 };
 
 /// Sections meet at the centre of curvature. Behind a front that turns round it the tube is narrowed, for they would
@@ -323,19 +410,25 @@ void InteractionRule::size_tube() {
     throw InputError(fmt::format("stress intensity: the tube of radius {:.3g} m and length {:.3g} m around the front "
                                  "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
                                  outer_, 2 * half_length_, at.x(), at.y(), at.z()));
+  keeps_volume_ = problem_.material.is_nearly_incompressible();
+  is_weak_ =
+      keeps_volume_ && inset_ == 0 && half_length_ >= least_weak_half * h_ && outer_ - inner_ >= least_weak_fade * h_;
 }
 
 /// The c-th point of a ring.
 std::optional<Sample> InteractionRule::around(const Section& section, int c) const {
-  const Material& material = problem_.material;
-  const double r = section.r;
+  const double theta = std::numbers::pi * ((2 * (c / 2) + 1 + gauss_.place[c % 2]) / cells_around() - 1);
+  const double ahead = section.r * std::cos(theta), above = section.r * std::sin(theta);
+  const double area = section.r * (std::numbers::pi / cells_around()) * section.dr;
+  return sample_at({ahead, above, section.s, area * section.ds * tube_.at(ahead, above, section.s).stretch});
+}
+
+std::optional<Sample> InteractionRule::sample_at(const Point& point) const {
+  const double ahead = point.ahead, r = std::hypot(ahead, point.above);
   const auto [fade_r, dq_r] = fade(r);
-  const auto [q_s, dq_s] = bump(section.s);
-  const int cell = c / 2;
-  const double theta = std::numbers::pi * ((2 * cell + 1 + gauss_.place[c % 2]) / cells_around() - 1);
-  const double ahead = r * std::cos(theta);
-  double above = r * std::sin(theta);
-  const Tube::Place place = tube_.at(ahead, above, section.s);
+  const auto [q_s, dq_s] = bump(point.s);
+  const Tube::Place place = tube_.at(ahead, point.above, point.s);
+  double above = point.above;
   if (ahead < 0 && std::abs(above) < -ahead)
     if (const double side = side_of(place.position, r, above); side * above < 0)
       above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
@@ -343,38 +436,35 @@ std::optional<Sample> InteractionRule::around(const Section& section, int c) con
   if (left.share == 0)
     return std::nullopt;
   const double q_r = fade_r * left.share;
-  const double weight = r * (std::numbers::pi / cells_around()) * section.ds * section.dr * place.stretch;
   Sample sample;
   sample.position = place.position;
   // Gradient of xi = q e in the axes of the place; e turns along the front.
   Matrix3 shift = Matrix3::Zero();
   shift.row(0) =
-      left.share * Vector3(dq_r * q_s * std::cos(theta), dq_r * q_s * std::sin(theta), fade_r * dq_s / place.stretch) +
+      left.share * Vector3(dq_r * q_s * ahead / r, dq_r * q_s * point.above / r, fade_r * dq_s / place.stretch) +
       fade_r * q_s * place.axes.transpose() * left.gradient;
   shift(2, 2) = q_r * q_s * tube_.curvature() / place.stretch;
   for (int m = 0; m < 3; ++m) {
-    const TipField local = tip_field(material, modes_[m], ahead, above);
-    const Matrix3 v = tube_.curved_gradient(local, ahead);
+    const Matrix3 v = auxiliary_gradient(m, ahead, above);
     const auto tau_at = [&](double x, double z) {
-      return stress_from_gradient(material, tube_.curved_gradient(tip_field(material, modes_[m], x, z), x));
+      return stress_from_gradient(problem_.material, auxiliary_gradient(m, x, z));
     };
-    const Matrix3 tau = stress_from_gradient(material, v);
-    sample.stress[m] = weight * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
+    const Matrix3 tau = stress_from_gradient(problem_.material, v);
+    sample.stress[m] = point.volume * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
     Matrix3 by_gradient = tau * shift.transpose();
     if (tube_.curvature() != 0)
       by_gradient.col(0) += q_r * q_s * tube_.divergence(tau_at, ahead, above, 1e-4 * r);
-    sample.gradient[m] = weight * place.axes * by_gradient * place.axes.transpose();
+    sample.gradient[m] = point.volume * place.axes * by_gradient * place.axes.transpose();
     sample.load[m] = 0;
     if (problem_.loads.body_force)
-      sample.load[m] =
-          -weight * q_r * q_s * (place.axes.transpose() * problem_.loads.body_force(place.position)).dot(v.col(0));
+      sample.load[m] = -point.volume * q_r * q_s *
+                       (place.axes.transpose() * problem_.loads.body_force(place.position)).dot(v.col(0));
   }
   return sample;
 }
 
 /// The point of a ring on one face.
 std::optional<Sample> InteractionRule::on_face(const Section& section, double side) const {
-  const Material& material = problem_.material;
   const double r = section.r, q_s = bump(section.s).value;
   const double off = std::min(lip_offset * h_, 1e-3 * r);
   Tube::Place place = tube_.at(-r, side * off, section.s);
@@ -393,8 +483,8 @@ std::optional<Sample> InteractionRule::on_face(const Section& section, double si
   sample.position = place.position;
   const double weight = q_r * q_s * section.ds * section.dr * place.stretch;
   for (int m = 0; m < 3; ++m) {
-    const Matrix3 v = tube_.curved_gradient(tip_field(material, modes_[m], -r, side * 1e-12 * r), -r);
-    const Vector3 pull = -side * stress_from_gradient(material, v).col(1);
+    const Matrix3 v = auxiliary_gradient(m, -r, side * 1e-12 * r);
+    const Vector3 pull = -side * stress_from_gradient(problem_.material, v).col(1);
     sample.stress[m].setZero();
     sample.gradient[m] = -weight * place.axes * pull * place.axes.col(0).transpose();
     sample.load[m] = -weight * traction.dot(v.col(0));
@@ -415,7 +505,9 @@ Intensities integral_over(const Discretisation& body, const Field& field, const 
                           const InteractionOptions& options, double inset) {
   Vector3 integral = Vector3::Zero();
   const Vector3 factors = each_sample(body, front, options, inset, [&](const Sample& sample) {
-    const PointState state = body.at(sample.position, field);
+    const PointState state = sample.shape != nullptr
+                                 ? state_from(body.problem(), body.problem().material, *sample.shape, field)
+                                 : body.at(sample.position, field);
     for (int m = 0; m < 3; ++m)
       integral[m] += sample.stress[m].cwiseProduct(state.stress).sum() +
                      sample.gradient[m].cwiseProduct(state.gradient).sum() + field.load_factor * sample.load[m];
@@ -442,9 +534,11 @@ IntensityRule rule_over(const Discretisation& body, bool with_pressure, const Fr
   std::vector<Vector3> pressures(with_pressure ? count : 0, Vector3::Zero());
   std::vector<char> known(count, 0);
   IntensityRule rule;
-  ShapeFunctions shape;
+  ShapeFunctions found;
   const Vector3 factors = each_sample(body, front, options, inset, [&](const Sample& sample) {
-    body.shape_at(sample.position, shape);
+    if (sample.shape == nullptr)
+      body.shape_at(sample.position, found);
+    const ShapeFunctions& shape = sample.shape != nullptr ? *sample.shape : found;
     std::array<Matrix3, 3> by_gradient;
     Vector3 traces;
     for (int m = 0; m < 3; ++m) {

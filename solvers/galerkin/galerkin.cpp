@@ -151,6 +151,8 @@ class Galerkin final : public ElasticBody {
   std::vector<Vector3> constraint_forces(const Field& field) const override;
   double residual(const Field& field, const std::vector<int>& loaded_nodes,
                   const std::vector<Vector3>& nodal_forces) const override;
+  void visit_weak_points(const BoundingBox& region, const std::function<bool(const Vector3& x)>& is_wanted,
+                         const PointVisitor& visit) const override;
 
  private:
   void find_materials();
@@ -499,6 +501,16 @@ double Galerkin::residual(const Field& field, const std::vector<int>& loaded_nod
   return largest > 0 ? unbalanced / largest : 0;
 }
 
+void Galerkin::visit_weak_points(const BoundingBox& region, const std::function<bool(const Vector3& x)>& is_wanted,
+                                 const PointVisitor& visit) const {
+  ShapeFunctions shape;
+  for (const QuadraturePoint& point : cells_.points)
+    if (region.contains(point.position) && is_wanted(point.position)) {
+      require_support(spheres_, point.position, shape);
+      visit(point, shape);
+    }
+}
+
 } // namespace
 
 OrderedStiffness stiffness_of(const Discretisation& body) {
@@ -508,28 +520,20 @@ OrderedStiffness stiffness_of(const Discretisation& body) {
   return galerkin->stiffness();
 }
 
-namespace {
-
-/// Larger supports carry more volume-preserving modes: they cure locking. At nu = 0.45 the smooth field's error with
-/// spheres as for less would be what it is at 0.3, but the energies of a tear add up worse: those of
-/// docs/experiments/flap.md to 12 % with radii of 2.2 reaches and of 2.0 spacings, to 7.5 % with 2.2 spacings.
-bool is_nearly_incompressible(const Material& material) {
-  return material.poisson_ratio >= 0.45;
-}
-
-} // namespace
-
+// Larger supports carry more volume-preserving modes: they cure locking. At nu = 0.45 the smooth field's error with
+// spheres as for less would be what it is at 0.3, but the energies of a tear add up worse: those of
+// docs/experiments/flap.md to 12 % with radii of 2.2 reaches and of 2.0 spacings, to 7.5 % with 2.2 spacings.
 double galerkin_support_radius(const Problem& problem, const DiscretisationOptions& options) {
   if (options.support_radius > 0)
     return options.support_radius;
-  if (is_nearly_incompressible(least_compressible(problem)))
+  if (least_compressible(problem).is_nearly_incompressible())
     return problem.tuning.sphere_radius_soft;
   return problem.hiding() != nullptr || options.cut_ahead ? problem.tuning.sphere_radius_cut
                                                           : problem.tuning.sphere_radius;
 }
 
 std::vector<double> NodeCloud::*galerkin_lengths(const Material& material) {
-  return is_nearly_incompressible(material) ? &NodeCloud::spacings : &NodeCloud::reaches;
+  return material.is_nearly_incompressible() ? &NodeCloud::spacings : &NodeCloud::reaches;
 }
 
 double constraint_stiffness(const Problem& problem, int node) {

@@ -6,8 +6,8 @@ cmake_minimum_required(VERSION 3.25)
 set(floors topology solvers src experiments)
 set(known ${floors} python tests) # other folders are made by the build
 set(rooms_topology base search surface files organ domain tool incision cells blade wound)
-set(rooms_solvers algebra elasticity nodes quadrature shapes points body galerkin collocation published contact fracture cut appended
-    finite release)
+set(rooms_solvers algebra elasticity nodes quadrature shapes points body galerkin collocation published contact fracture appended finite
+    release)
 set(rooms_src base scenario model blade tissue session output run haptics devices live viewer apps)
 set(most_headers 16)
 set(offences "")

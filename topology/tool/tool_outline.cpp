@@ -1,6 +1,7 @@
 #include "topology/tool/tool_outline.hpp"
 
 #include "topology/base/errors.hpp"
+#include "topology/base/overloaded.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,18 @@
 
 namespace spherecut::topology {
 
+namespace {
+
+/// m, of the middle of the tip behind the reference point.
+double middle_of_tip(const ToolShape& tool) {
+  return std::visit(Overloaded{[](const FlatPunch& punch) { return 0.5 * std::min(punch.radius, punch.length); },
+                               [](const SphereTip& tip) { return tip.radius; },
+                               [](const Laparoscope& scope) { return scope.tip_radius; }},
+                    tool);
+}
+
+} // namespace
+
 // The section is star-shaped about the place in the plane nearest to the middle of the tip: rays from there leave it
 // once.
 std::vector<std::array<double, 2>> tool_outline(const ToolShape& tool, const ToolPose& pose, const Vector3& origin,
@@ -16,9 +29,7 @@ std::vector<std::array<double, 2>> tool_outline(const ToolShape& tool, const Too
   if (!std::isfinite(reach) || reach <= 0)
     throw InputError(fmt::format("tool: reach of the outline is {} m, it must be greater than 0 and finite", reach));
   constexpr int rays = 2880, halvings = 60;
-  const auto* punch = std::get_if<FlatPunch>(&tool);
-  const double inset = punch != nullptr ? 0.5 * std::min(punch->radius, punch->length) : tip_radius(tool);
-  const Vector3 offset = pose.point + inset * pose.axis - origin;
+  const Vector3 offset = pose.point + middle_of_tip(tool) * pose.axis - origin;
   const Vector3 middle = origin + offset.dot(e1) * e1 + offset.dot(e2) * e2;
   std::vector<std::array<double, 2>> outline;
   if (tool_distance(tool, pose, middle) >= 0)

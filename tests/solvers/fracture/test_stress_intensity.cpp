@@ -5,6 +5,9 @@
 #include "topology/base/errors.hpp"
 
 #include "experiments/analytic/cracks.hpp"
+#include "experiments/support/straight_crack.hpp"
+#include "solvers/quadrature/background_cells.hpp"
+#include "solvers/shapes/functions.hpp"
 #include "tests/support/cut_block.hpp"
 #include "topology/incision/cut_sheets.hpp"
 
@@ -146,6 +149,43 @@ TEST_CASE("Both extractions find the intensities of an exact field in mixed mode
   fine.radial = 40;
   fine.around = 64;
   CHECK((interaction_integral(body, {}, *front, fine) - k).norm() < 1e-3);
+}
+
+TEST_CASE("The points of a weak form fill a cut body, and linear fields are reproduced at each of them",
+          "[stress_intensity]") {
+  const SightRule sight = GENERATE(SightRule::enriched, SightRule::appended);
+  experiments::CutBody body = experiments::straight_crack_body(1, 0.3, Method::galerkin, sight);
+  experiments::hold_whole_surface(body.problem, [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
+  DiscretisationOptions options;
+  options.sight = sight;
+  options.estimate_condition = false;
+  const auto cut = discretise(body.problem, options);
+  double volume = 0, upper = 0, worst = 0;
+  const auto everywhere = [](const Vector3&) { return true; };
+  const auto add = [&](const QuadraturePoint& point, const ShapeFunctions& shape) {
+    volume += point.weight;
+    Vector3 place = -point.position;
+    Matrix3 gradient = -Matrix3::Identity();
+    for (int k = 0; k < shape.size(); ++k)
+      if (shape.nodes[k] < cut->sphere_count()) { // what a cut has appended has no part in a linear field
+        const Vector3& x = body.problem.nodes.positions[shape.nodes[k]];
+        place += shape.value[k] * x;
+        gradient += x * shape.gradient(k).transpose();
+      }
+    worst = std::max({worst, place.norm(), gradient.norm()});
+  };
+  cut->visit_weak_points(body.problem.domain->bounds(), everywhere, add);
+  CHECK(volume == Approx(4).epsilon(1e-9)); // m3, of the block
+  CHECK(worst < 1e-8);
+  const auto is_upper = [](const Vector3& x) { return x.z() > 0.3; };
+  cut->visit_weak_points(body.problem.domain->bounds(), is_upper,
+                         [&](const QuadraturePoint& point, const ShapeFunctions&) {
+                           CHECK(point.position.z() > 0.3);
+                           upper += point.weight;
+                         });
+  CHECK(upper == Approx(1.4).epsilon(0.1));
+  cut->visit_weak_points({{2, 2, 2}, {3, 3, 3}}, everywhere,
+                         [](const QuadraturePoint&, const ShapeFunctions&) { FAIL("outside of the region"); });
 }
 
 TEST_CASE("At a curved front the integral of the third mode tells twist from intensity", "[stress_intensity]") {

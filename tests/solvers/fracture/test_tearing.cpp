@@ -142,8 +142,8 @@ TEST_CASE("A front on a rough sheet goes on where its field opens it, not where 
 }
 
 TEST_CASE("The integral as a rule for all fields on a body gives what it gives for each", "[tearing]") {
-  const auto [method, poisson_ratio] = GENERATE(
-      table<Method, double>({{Method::galerkin, 0.3}, {Method::collocation, 0.3}, {Method::collocation, 0.45}}));
+  const auto [method, poisson_ratio] = GENERATE(table<Method, double>(
+      {{Method::galerkin, 0.3}, {Method::galerkin, 0.49}, {Method::collocation, 0.3}, {Method::collocation, 0.45}}));
   const tests::CutBlock block = tests::cut_block(8, false, 2);
   const tests::CutFrame& cut = block.frame;
   Problem problem = tests::problem_of(block, {1000, poisson_ratio, 0});
@@ -159,7 +159,7 @@ TEST_CASE("The integral as a rule for all fields on a body gives what it gives f
   const auto body = discretise(problem, options);
   Field field = body->solve();
   const bool with_pressure = field.pressure.size() > 0;
-  CHECK(with_pressure == (poisson_ratio > 0.4));
+  CHECK(with_pressure == (method == Method::collocation && poisson_ratio > 0.4));
   int places = 0;
   for (const topology::FrontFrame& frame : front_samples(*problem.incision, 0.2, 0.35)) {
     std::optional<IntensityRule> rule;
