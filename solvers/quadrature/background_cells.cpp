@@ -19,6 +19,8 @@ namespace {
 
 /// Parts of cells this near to a front, in half diagonals, have their points placed for what is singular there.
 constexpr double front_reach = 2;
+/// A sheet that lies in a face of a box counts as passing it: its front is as singular on either side of the face.
+constexpr double touching = 1 + 1e-9;
 /// Samples of a part count as this far from the front at least, in half edges of the part.
 constexpr double nearest = 0.02;
 /// A node within a cell may want smaller ones by this much before the cell is divided for it.
@@ -253,7 +255,7 @@ class BoxFiller {
     if (!incision_->near(centre, radius))
       return false;
     const auto sheet = incision_->closest(centre, radius);
-    return sheet && std::abs(sheet->normal.dot(centre - sheet->point)) < sheet->normal.cwiseAbs().dot(half);
+    return sheet && std::abs(sheet->normal.dot(centre - sheet->point)) <= touching * sheet->normal.cwiseAbs().dot(half);
   }
 
   /// The points of a cell that see one another.
