@@ -333,9 +333,12 @@ class InteractionRule {
     return (x - face->point).dot(face->normal) >= 0 ? 1.0 : -1.0;
   }
 
-  /// A place in the tube: ahead, above, along the front, m, and the volume that it stands for, m3.
+  /// A place in the tube: its distance from the front, m, with the cosine and sine of the angle from the way ahead, and
+  /// its place along the front.
   struct Point {
-    double ahead, above, s, volume;
+    double r, cosine, sine, s;
+    [[nodiscard]] double ahead() const { return r * cosine; }
+    [[nodiscard]] double above() const { return r * sine; }
   };
   /// False: the integral is not over the points of the weak form, or there are none.
   template <class Visitor>
@@ -350,8 +353,10 @@ class InteractionRule {
         [&](const Vector3& at) { return is_inside(tube_.coordinates(at)); },
         [&](const QuadraturePoint& point, const ShapeFunctions& shape) {
           const Vector3 at = tube_.coordinates(point.position);
+          const double r = std::hypot(at[0], at[1]);
+          const Point here{r, at[0] / r, at[1] / r, at[2]};
           any = true;
-          if (auto sample = sample_at({at[0], at[1], at[2], point.weight})) {
+          if (auto sample = sample_at(here, tube_.at(at[0], at[1], at[2]), point.weight)) {
             sample->shape = &shape;
             visit(*sample);
           }
@@ -366,7 +371,8 @@ class InteractionRule {
     return keeps_volume_ ? tube_.isochoric_gradient(problem_.material, modes_[mode], ahead, above)
                          : tube_.curved_gradient(tip_field(problem_.material, modes_[mode], ahead, above), ahead);
   }
-  [[nodiscard]] std::optional<Sample> sample_at(const Point& point) const;
+  /// `volume`, m3: what the point stands for.
+  [[nodiscard]] std::optional<Sample> sample_at(const Point& point, const Tube::Place& place, double volume) const;
   [[nodiscard]] std::optional<Sample> around(const Section& section, int c) const;
   [[nodiscard]] std::optional<Sample> on_face(const Section& section, double side) const;
 
@@ -418,17 +424,17 @@ void InteractionRule::size_tube() {
 /// The c-th point of a ring.
 std::optional<Sample> InteractionRule::around(const Section& section, int c) const {
   const double theta = std::numbers::pi * ((2 * (c / 2) + 1 + gauss_.place[c % 2]) / cells_around() - 1);
-  const double ahead = section.r * std::cos(theta), above = section.r * std::sin(theta);
-  const double area = section.r * (std::numbers::pi / cells_around()) * section.dr;
-  return sample_at({ahead, above, section.s, area * section.ds * tube_.at(ahead, above, section.s).stretch});
+  const Point point{section.r, std::cos(theta), std::sin(theta), section.s};
+  const Tube::Place place = tube_.at(point.ahead(), point.above(), point.s);
+  return sample_at(point, place,
+                   section.r * (std::numbers::pi / cells_around()) * section.ds * section.dr * place.stretch);
 }
 
-std::optional<Sample> InteractionRule::sample_at(const Point& point) const {
-  const double ahead = point.ahead, r = std::hypot(ahead, point.above);
+std::optional<Sample> InteractionRule::sample_at(const Point& point, const Tube::Place& place, double volume) const {
+  const double r = point.r, ahead = point.ahead();
   const auto [fade_r, dq_r] = fade(r);
   const auto [q_s, dq_s] = bump(point.s);
-  const Tube::Place place = tube_.at(ahead, point.above, point.s);
-  double above = point.above;
+  double above = point.above();
   if (ahead < 0 && std::abs(above) < -ahead)
     if (const double side = side_of(place.position, r, above); side * above < 0)
       above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
@@ -441,7 +447,7 @@ std::optional<Sample> InteractionRule::sample_at(const Point& point) const {
   // Gradient of xi = q e in the axes of the place; e turns along the front.
   Matrix3 shift = Matrix3::Zero();
   shift.row(0) =
-      left.share * Vector3(dq_r * q_s * ahead / r, dq_r * q_s * point.above / r, fade_r * dq_s / place.stretch) +
+      left.share * Vector3(dq_r * q_s * point.cosine, dq_r * q_s * point.sine, fade_r * dq_s / place.stretch) +
       fade_r * q_s * place.axes.transpose() * left.gradient;
   shift(2, 2) = q_r * q_s * tube_.curvature() / place.stretch;
   for (int m = 0; m < 3; ++m) {
@@ -450,15 +456,15 @@ std::optional<Sample> InteractionRule::sample_at(const Point& point) const {
       return stress_from_gradient(problem_.material, auxiliary_gradient(m, x, z));
     };
     const Matrix3 tau = stress_from_gradient(problem_.material, v);
-    sample.stress[m] = point.volume * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
+    sample.stress[m] = volume * place.axes * (v * shift - shift.trace() * v) * place.axes.transpose();
     Matrix3 by_gradient = tau * shift.transpose();
     if (tube_.curvature() != 0)
       by_gradient.col(0) += q_r * q_s * tube_.divergence(tau_at, ahead, above, 1e-4 * r);
-    sample.gradient[m] = point.volume * place.axes * by_gradient * place.axes.transpose();
+    sample.gradient[m] = volume * place.axes * by_gradient * place.axes.transpose();
     sample.load[m] = 0;
     if (problem_.loads.body_force)
-      sample.load[m] = -point.volume * q_r * q_s *
-                       (place.axes.transpose() * problem_.loads.body_force(place.position)).dot(v.col(0));
+      sample.load[m] =
+          -volume * q_r * q_s * (place.axes.transpose() * problem_.loads.body_force(place.position)).dot(v.col(0));
   }
   return sample;
 }
