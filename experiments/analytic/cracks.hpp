@@ -23,7 +23,7 @@ CutFrame tilted_frame(const Vector3& origin, const Vector3& tilt);
 /// How a cut lies to the axes, and with them to the faces of its body and to the background cells.
 enum class Placement {
   tilted, // aligned with nothing
-  aligned // in a plane of the axes, through 0
+  aligned // its frame is the axes about 0
 };
 /// tilted_frame(), or the axes about 0.
 CutFrame placed_frame(Placement placement, const Vector3& origin, const Vector3& tilt);

@@ -1,6 +1,6 @@
 // Problem:   a slit that turns by 45 degrees before the last 0.35 of its 0.95 m, in a plate 2 m wide that is pulled
 //            across its first part; plane strain, nu = 0.3. The plate is 0.3 m thick between sliding sides and stands
-//            askew between the axes.
+//            askew between the axes, and along them.
 // Reference: CalculiX and GetFEM, two meshes each (reference.csv, made by experiments/reference/slits.py). Errors are
 //            the largest along a slit, at 7 places of every straight part and three across the thickness, over the
 //            largest opening of that slit: of the whole vector, across and along the slit.

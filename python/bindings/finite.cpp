@@ -146,8 +146,9 @@ void bind_law_body(py::module_& module) {
            "quadrature"_a = 2, "pointwise_modulus"_a = 2.5,
            "held: list of Held. body_force: N per m3 of the body at rest, (3,) or a function of x. traction: Pa on the "
            "surface at rest, (3,) or a function of x and normal; lip_traction: the same on the faces of the cut. Loads "
-           "keep their direction. sight: 'visibility', 'diffraction', 'enriched' or 'appended'. support_radius, cell_size: in "
-           "spacings. quadrature: rule of a cell, 1 to 3. pointwise_modulus: of the part of the pressure that is taken "
+           "keep their direction. sight: 'visibility', 'diffraction', 'enriched' or 'appended'. support_radius, "
+           "cell_size: in spacings. quadrature: rule of a cell, 1 to 3. pointwise_modulus: of the part of the pressure "
+           "that is taken "
            "point by point, over the shear modulus. Raises InputError and NumericalError as Body.")
       .def(
           "evaluate",

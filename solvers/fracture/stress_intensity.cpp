@@ -132,8 +132,9 @@ Intensities displacement_correlation(const Problem& problem, const FrontFrame& f
 
 namespace {
 
-/// An integral of v_a over z, v the displacement of tip_field() and z the distance from the plane of the cut, and its
-/// derivative along the way ahead. v_a goes with real and imaginary parts of Z^(1/2), Z = ahead + i above.
+/// Of v_a, v the displacement of tip_field(): the integral over z, the distance from the plane of the cut, that is
+/// analytic off the cut (it is zero on no face), and its derivative along the way ahead. v_a goes with real and
+/// imaginary parts of Z^(1/2), Z = ahead + i above.
 struct AcrossPlane {
   double integral, slope; // m2, m
 };
@@ -249,7 +250,8 @@ struct Sample {
 //
 // Near incompressibility v keeps the volume where the front turns, since lambda multiplies what it does not keep. And
 // the change of volume of u is right at the points of the weak form alone: the integral over the volume is the sum over
-// these points, with their weights. Where too few of them lie in the tube, and else, the tube has a rule of its own.
+// these points, with their weights. Where too few of them lie in the tube, or along the way on which the shift fades
+// near the surface, and with more compressible tissue, the tube has a rule of its own.
 class InteractionRule {
  public:
   InteractionRule(const Discretisation& body, const FrontFrame& front, const InteractionOptions& options,
@@ -417,8 +419,9 @@ void InteractionRule::size_tube() {
                                  "at ({:.6g}, {:.6g}, {:.6g}) m leaves the body",
                                  outer_, 2 * half_length_, at.x(), at.y(), at.z()));
   keeps_volume_ = problem_.material.is_nearly_incompressible();
-  is_weak_ =
-      keeps_volume_ && inset_ == 0 && half_length_ >= least_weak_half * h_ && outer_ - inner_ >= least_weak_fade * h_;
+  constexpr double rounding = 1e-6; // spacings
+  is_weak_ = keeps_volume_ && inset_ == 0 && half_length_ >= (least_weak_half - rounding) * h_ &&
+             outer_ - inner_ >= (least_weak_fade - rounding) * h_;
 }
 
 /// The c-th point of a ring.
@@ -436,8 +439,8 @@ std::optional<Sample> InteractionRule::sample_at(const Point& point, const Tube:
   const auto [q_s, dq_s] = bump(point.s);
   double above = point.above();
   if (ahead < 0 && std::abs(above) < -ahead)
-    if (const double side = side_of(place.position, r, above); side * above < 0)
-      above = side * 1e-3 * r; // beyond the cut of the auxiliary field: taken next to it
+    if (const double side = side_of(place.position, r, above), least = 1e-3 * r; side * above < least)
+      above = side * least; // at the cut of the auxiliary field, or beyond it: taken next to it
   const Cover left = covered(place.position);
   if (left.share == 0)
     return std::nullopt;

@@ -51,7 +51,7 @@ struct InteractionOptions {
   double inner = 0.5, outer = 3; // radii between which the virtual shift fades, in units of the spacing at the front
   double half_length = 2; // of the tube along the front, in the same units; down to 1 where it would leave the body or
                           // the front turns by much along it
-  int radial = 16, around = 24, along = 6; // points
+  int radial = 16, around = 24, along = 6; // points; over the points of a weak form those of the faces alone
 };
 /// Throws InputError when the tube leaves the body.
 Intensities interaction_integral(const Discretisation& body, const Field& field, const topology::FrontFrame& front,

@@ -135,6 +135,42 @@ class TwistedPenny final : public ExactBody {
   double twist_, shear_;
 };
 
+// A penny crack of radius 1 m across the z axis in a wide block, under a pressure of 1 Pa on its faces.
+class PressedPenny final : public ExactBody {
+ public:
+  explicit PressedPenny(double poisson_ratio) : ExactBody(penny(poisson_ratio)) {}
+
+  PointState at(const Vector3& x, const Field&) const override {
+    // Differences along steps that neither reach the front nor cross the plane of the crack.
+    const double away = std::hypot(std::hypot(x.x(), x.y()) - 1, x.z());
+    const auto displacement = [this](const Vector3& place) {
+      return experiments::penny_displacement(problem().material, experiments::CutFrame{}, 1, 1, place);
+    };
+    Matrix3 gradient;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double step = axis < 2 ? 1e-3 * away : std::min(1e-3 * away, 0.3 * std::abs(x.z()));
+      const Vector3 way = step * Vector3::Unit(axis);
+      gradient.col(axis) = (8 * (displacement(x + way) - displacement(x - way)) -
+                            (displacement(x + 2 * way) - displacement(x - 2 * way))) /
+                           (12 * step);
+    }
+    return state_of(displacement(x), gradient);
+  }
+
+ private:
+  static Problem penny(double poisson_ratio) {
+    Problem problem;
+    problem.domain = topology::make_box_domain(Vector3::Constant(-3), Vector3::Constant(3), 0.2);
+    problem.incision = std::make_shared<topology::Incision>(
+        std::vector<topology::SurfaceMesh>{topology::make_disc_sheet(Vector3::Zero(), Vector3::UnitZ(), 1, 0.04)},
+        problem.domain);
+    problem.nodes.add(Vector3::UnitX(), 0.15, NodeKind::interior, Vector3::Zero());
+    problem.material = {2, poisson_ratio, 0};
+    problem.loads.lip_traction = [](const Vector3&, const Vector3& normal) -> Vector3 { return -normal; };
+    return problem;
+  }
+};
+
 } // namespace
 
 TEST_CASE("Both extractions find the intensities of an exact field in mixed mode", "[stress_intensity]") {
@@ -188,6 +224,36 @@ TEST_CASE("The points of a weak form fill a cut body, and linear fields are repr
                          [](const QuadraturePoint&, const ShapeFunctions&) { FAIL("outside of the region"); });
 }
 
+TEST_CASE("The energy at the points of the weak form is the work of what loads the body", "[stress_intensity]") {
+  const SightRule sight = GENERATE(SightRule::enriched, SightRule::appended);
+  experiments::CutBody body = experiments::straight_crack_body(1, 0.3, Method::galerkin, sight);
+  experiments::hold_surface(
+      body.problem, [](const Vector3&, const Vector3& n) { return n.z() < -0.9; },
+      [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
+  DiscretisationOptions options;
+  options.sight = sight;
+  options.estimate_condition = false;
+  const auto cut = discretise(body.problem, options);
+  const NodeCloud& nodes = cut->problem().nodes;
+  int pulled = -1; // above the cut, which it opens
+  for (int i = 0; i < nodes.size(); ++i)
+    if (nodes.kinds[i] == NodeKind::surface && nodes.positions[i].z() > 1 - 1e-9 &&
+        (pulled < 0 ||
+         (nodes.positions[i] - Vector3(-0.7, 0, 1)).norm() < (nodes.positions[pulled] - Vector3(-0.7, 0, 1)).norm()))
+      pulled = i;
+  REQUIRE(pulled >= 0);
+  const Field field = cut->force_response({pulled}, {Vector3::UnitZ()});
+  double energy = 0;
+  cut->visit_weak_points(
+      body.problem.domain->bounds(), [](const Vector3&) { return true; },
+      [&](const QuadraturePoint& point, const ShapeFunctions& shape) {
+        const PointState state = state_from(cut->problem(), cut->problem().material, shape, field);
+        energy += point.weight * state.stress.cwiseProduct(state.gradient).sum();
+      });
+  // The penalties of what is held take the rest.
+  CHECK(energy == Approx(cut->contact_displacement(pulled, field).z()).epsilon(2e-3));
+}
+
 TEST_CASE("At a curved front the integral of the third mode tells twist from intensity", "[stress_intensity]") {
   const double shear = 0.9; // Pa at the front
   const double mu = Material{2, 0.3, 0}.shear_modulus();
@@ -214,6 +280,21 @@ TEST_CASE("At a curved front the integral of the third mode tells twist from int
     CHECK(std::abs(of_crack[2] - exact) < 2e-3 * exact);
     CHECK(of_crack.head<2>().norm() < 1e-3 * exact);
     CHECK(of_twist.norm() < 1e-3 * exact);
+  }
+}
+
+TEST_CASE("At a curved front the integral is exact near incompressibility, too", "[stress_intensity]") {
+  const double poisson_ratio = GENERATE(0.3, 0.49, 0.499);
+  const PressedPenny crack(poisson_ratio);
+  Field loaded;
+  loaded.load_factor = 1;
+  const Intensities exact(2 / std::sqrt(std::numbers::pi), 0, 0);
+  for (const double w : {0.3, 2.0, 4.4}) {
+    const auto front = crack.problem().incision->front_frame({std::cos(w), std::sin(w), 0}, 0.1);
+    REQUIRE(front);
+    const Intensities found = interaction_integral(crack, loaded, *front);
+    INFO("nu " << poisson_ratio << " at " << w << ": " << found.transpose() << " for " << exact.transpose());
+    CHECK((found - exact).norm() < 0.01 * exact.norm());
   }
 }
 
