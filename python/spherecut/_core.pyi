@@ -616,9 +616,9 @@ class FiniteBody:
     def __init__(self, domain: Domain, nodes: Nodes, law: Law, held: Sequence[Held], *, body_force: Any = None, traction: Any = None, lip_traction: Any = None, incision: Optional[Incision] = None, sight: str = 'enriched', support_radius: float = 1.75, cell_size: float = 0.75, quadrature: int = 2, pointwise_modulus: float = 2.5) -> None:
         """held: list of Held. body_force: N per m3 of the body at rest, (3,) or a function of x. traction: Pa on the
         surface at rest, (3,) or a function of x and normal; lip_traction: the same on the faces of the cut. Loads
-        keep their direction. sight: 'visibility', 'diffraction' or 'enriched'. support_radius, cell_size: in
-        spacings. quadrature: rule of a cell, 1 to 3. pointwise_modulus: of the part of the pressure that is taken
-        point by point, over the shear modulus. Raises InputError and NumericalError as Body.
+        keep their direction. sight: 'visibility', 'diffraction', 'enriched' or 'appended'. support_radius,
+        cell_size: in spacings. quadrature: rule of a cell, 1 to 3. pointwise_modulus: of the part of the pressure
+        that is taken point by point, over the shear modulus. Raises InputError and NumericalError as Body.
         """
     def evaluate(self, coefficients: npt.ArrayLike) -> tuple[float, npt.NDArray[Any]]:
         """Strain energy, J, and internal forces, (n, 3), N, its slope by the coefficients; inf and zero where the law
