@@ -426,7 +426,8 @@ void InteractionRule::size_tube() {
 
 /// The c-th point of a ring.
 std::optional<Sample> InteractionRule::around(const Section& section, int c) const {
-  const double theta = std::numbers::pi * ((2 * (c / 2) + 1 + gauss_.place[c % 2]) / cells_around() - 1);
+  const int cell = c / 2;
+  const double theta = std::numbers::pi * ((2 * cell + 1 + gauss_.place[c % 2]) / cells_around() - 1);
   const Point point{section.r, std::cos(theta), std::sin(theta), section.s};
   const Tube::Place place = tube_.at(point.ahead(), point.above(), point.s);
   return sample_at(point, place,
