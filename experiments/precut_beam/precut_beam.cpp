@@ -28,20 +28,11 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
   app::Table table({"placement", "method", "sight", "nodes", "seed", "spacing", "opening", "beam"});
   app::Figure figure{
       "Double cantilever: opening over that of root-corrected beams", "nodes", "opening / beam", false, false, {}};
-  struct Run {
-    PrecutMethod method;
-    Placement placement;
-  };
-  std::vector<Run> runs;
-  for (const Placement placement : precut_placements(context.quick))
-    for (const PrecutMethod& method : precut_methods(context.quick))
-      if (method.judged || placement == Placement::tilted)
-        runs.push_back({method, placement});
-  for (const auto& [method, placement] : runs) {
+  for (const PrecutRun& run : precut_runs(context.quick)) {
+    const auto& [method, placement] = run;
     const TiltedStrip strip = tilted_strip(length, 2 * arm, thickness, 0.4, StripSides::free, placement);
     const CutFrame& frame = strip.frame;
-    const std::string run_name = method.name() + suffix(placement);
-    app::Series points{run_name, {}, {}, app::SeriesStyle::points};
+    app::Series points{run.name(), {}, {}, app::SeriesStyle::points};
     for (int size : placement == Placement::tilted ? sizes : std::vector<int>{sizes.back()}) {
       ErrorSeries errors;
       for (int seed = 1; seed <= (method.judged ? seeds : std::min(seeds, 3)); ++seed) {
@@ -65,11 +56,11 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
           if (method.method != solvers::Method::published)
             throw;
           // Its collocated traction rows can leave a slender body nearly singular: the record says so.
-          context.say(fmt::format("{}, {} nodes, seed {}: {}", run_name, size, seed, error.what()));
-          table.add({placement == Placement::aligned ? "aligned" : "tilted",
-                     std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
-                     fmt::format("{}", body.problem.nodes.size()), fmt::format("{}", seed),
-                     fmt::format("{:.4f}", body.fine), "not solved", fmt::format("{:.5g}", wanted)});
+          context.say(fmt::format("{}, {} nodes, seed {}: {}", run.name(), size, seed, error.what()));
+          table.add({to_string(placement), std::string(solvers::to_string(method.method)),
+                     std::string(solvers::to_string(method.sight)), fmt::format("{}", body.problem.nodes.size()),
+                     fmt::format("{}", seed), fmt::format("{:.4f}", body.fine), "not solved",
+                     fmt::format("{:.5g}", wanted)});
           continue;
         }
         // Mean over the ends of the arms.
@@ -84,22 +75,22 @@ std::vector<Check> run_precut_beam(const ExperimentContext& context) {
               opening += side * discretisation->at(x, field).displacement.dot(frame.normal) / (rows * columns);
             }
         errors.add("compliance", std::abs(opening / wanted - 1));
-        table.add({placement == Placement::aligned ? "aligned" : "tilted",
-                   std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
-                   fmt::format("{}", body.problem.nodes.size()), fmt::format("{}", seed),
-                   fmt::format("{:.4f}", body.fine), fmt::format("{:.5g}", opening), fmt::format("{:.5g}", wanted)});
+        table.add({to_string(placement), std::string(solvers::to_string(method.method)),
+                   std::string(solvers::to_string(method.sight)), fmt::format("{}", body.problem.nodes.size()),
+                   fmt::format("{}", seed), fmt::format("{:.4f}", body.fine), fmt::format("{:.5g}", opening),
+                   fmt::format("{:.5g}", wanted)});
         points.x.push_back(body.problem.nodes.size());
         points.y.push_back(opening / wanted);
       }
       if (errors.empty()) { // never solved: said above
         if (size == sizes.back())
-          checks.push_back({"precut_beam_" + run_name + "_solved_reported", 0, ">=", 0});
+          checks.push_back({"precut_beam_" + run.name() + "_solved_reported", 0, ">=", 0});
         continue;
       }
-      context.say(fmt::format("{}, {} nodes, median (worst): {}", run_name, size, errors.text()));
+      context.say(fmt::format("{}, {} nodes, median (worst): {}", run.name(), size, errors.text()));
       if (size != sizes.back())
         continue;
-      const std::string name = "precut_beam_" + run_name;
+      const std::string name = "precut_beam_" + run.name();
       if (method.judged)
         errors.check(name, "compliance", method.bound(0.05, 0.08), checks);
       else

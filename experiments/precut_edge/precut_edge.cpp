@@ -71,11 +71,11 @@ std::vector<Check> run_precut_edge(const ExperimentContext& context) {
         const double by_integral = solvers::interaction_integral(*discretisation, field, *front)[0];
         errors.add("k_correlation", std::abs(by_jump / wanted - 1));
         errors.add("k_interaction", std::abs(by_integral / wanted - 1));
-        table.add({run.placement == Placement::aligned ? "aligned" : "tilted",
-                   std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
-                   run.sides == StripSides::free ? "free" : "sliding", fmt::format("{}", body.problem.nodes.size()),
-                   fmt::format("{}", seed), fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", by_jump),
-                   fmt::format("{:.5f}", by_integral), fmt::format("{:.5f}", wanted)});
+        table.add({to_string(run.placement), std::string(solvers::to_string(method.method)),
+                   std::string(solvers::to_string(method.sight)), run.sides == StripSides::free ? "free" : "sliding",
+                   fmt::format("{}", body.problem.nodes.size()), fmt::format("{}", seed),
+                   fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", by_jump), fmt::format("{:.5f}", by_integral),
+                   fmt::format("{:.5f}", wanted)});
         points.x.push_back(body.problem.nodes.size());
         points.y.push_back(by_integral / wanted);
       }

@@ -162,24 +162,14 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
                      {}};
   const auto record = [&](Placement placement, const char* load, const PrecutMethod& method, double nu, int seed,
                           const CutBody& body, const PennyErrors& e) {
-    table.add({placement == Placement::aligned ? "aligned" : "tilted", load,
-               std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
-               fmt::format("{}", nu), fmt::format("{}", seed), fmt::format("{}", body.problem.nodes.size()),
-               fmt::format("{:.4f}", body.fine), fmt::format("{:.5f}", e.volume), fmt::format("{:.5f}", e.displacement),
+    table.add({to_string(placement), load, std::string(solvers::to_string(method.method)),
+               std::string(solvers::to_string(method.sight)), fmt::format("{}", nu), fmt::format("{}", seed),
+               fmt::format("{}", body.problem.nodes.size()), fmt::format("{:.4f}", body.fine),
+               fmt::format("{:.5f}", e.volume), fmt::format("{:.5f}", e.displacement),
                fmt::format("{:.5f}", e.k_correlation), fmt::format("{:.5f}", e.k_interaction)});
   };
-  const std::vector<PrecutMethod> methods = precut_methods(context.quick, true);
-  struct Run {
-    PrecutMethod method;
-    Placement placement;
-    [[nodiscard]] std::string name() const { return method.name() + suffix(placement); }
-  };
-  std::vector<Run> runs;
-  for (const Placement placement : precut_placements(context.quick))
-    for (const PrecutMethod& method : methods)
-      if (method.judged || placement == Placement::tilted)
-        runs.push_back({method, placement});
-  for (const Run& run : runs) {
+  const std::vector<PrecutRun> runs = precut_runs(context.quick, true);
+  for (const PrecutRun& run : runs) {
     const PrecutMethod& method = run.method;
     const CutFrame crack = penny_frame(run.placement);
     const std::vector<int> run_sizes = run.placement == Placement::tilted ? sizes : std::vector<int>{sizes.back()};
@@ -223,7 +213,7 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
         checks.push_back({name + "_slope", log_log_slope(series.x, series.y), ">=", 0.8});
     }
   }
-  for (const Run& run : runs) {
+  for (const PrecutRun& run : runs) {
     const PrecutMethod& method = run.method;
     if (!method.judged)
       continue;

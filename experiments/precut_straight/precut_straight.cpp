@@ -66,18 +66,9 @@ std::vector<Check> run_precut_straight(const ExperimentContext& context) {
                      false,
                      false,
                      {}};
-  struct Run {
-    PrecutMethod method;
-    Placement placement;
-  };
-  std::vector<Run> runs;
-  for (const Placement placement : precut_placements(context.quick))
-    for (const PrecutMethod& method : precut_methods(context.quick, true))
-      if (method.judged || placement == Placement::tilted)
-        runs.push_back({method, placement});
-  for (const auto& [method, placement] : runs) {
+  for (const PrecutRun& run : precut_runs(context.quick, true)) {
+    const auto& [method, placement] = run;
     const CutFrame crack = straight_crack_frame(placement);
-    const std::string run_name = method.name() + suffix(placement);
     std::array<ErrorSeries, 3> errors;
     for (int seed = 1; seed <= seeds; ++seed) {
       CutBody body = straight_crack_body(static_cast<std::uint64_t>(seed), 0.3, method.method, method.sight, placement);
@@ -103,12 +94,11 @@ std::vector<Check> run_precut_straight(const ExperimentContext& context) {
         errors[mode].add("opening", opening.error);
         errors[mode].add("k_correlation", std::abs(correlation[mode] - 1));
         errors[mode].add("k_interaction", std::abs(interaction[mode] - 1));
-        table.add({placement == Placement::aligned ? "aligned" : "tilted",
-                   std::string(solvers::to_string(method.method)), std::string(solvers::to_string(method.sight)),
-                   fmt::format("{}", seed), fmt::format("{}", body.problem.nodes.size()),
-                   fmt::format("{:.4f}", body.fine), mode_names[mode], fmt::format("{:.5f}", opening.error),
-                   fmt::format("{:.5f}", correlation[mode]), fmt::format("{:.5f}", interaction[mode]),
-                   fmt::format("{:.5f}", others)});
+        table.add({to_string(placement), std::string(solvers::to_string(method.method)),
+                   std::string(solvers::to_string(method.sight)), fmt::format("{}", seed),
+                   fmt::format("{}", body.problem.nodes.size()), fmt::format("{:.4f}", body.fine), mode_names[mode],
+                   fmt::format("{:.5f}", opening.error), fmt::format("{:.5f}", correlation[mode]),
+                   fmt::format("{:.5f}", interaction[mode]), fmt::format("{:.5f}", others)});
         if (mode == 0 && seed == 1 && placement == Placement::tilted) {
           if (figure.series.empty()) {
             app::Series exact{"exact", opening.behind, {}, app::SeriesStyle::lines};
@@ -121,8 +111,8 @@ std::vector<Check> run_precut_straight(const ExperimentContext& context) {
       }
     }
     for (int mode = 0; mode < 3; ++mode) {
-      context.say(fmt::format("{}, mode {}, medians (worst): {}", run_name, mode_names[mode], errors[mode].text()));
-      const std::string name = fmt::format("precut_straight_{}_mode_{}", run_name, mode_names[mode]);
+      context.say(fmt::format("{}, mode {}, medians (worst): {}", run.name(), mode_names[mode], errors[mode].text()));
+      const std::string name = fmt::format("precut_straight_{}_mode_{}", run.name(), mode_names[mode]);
       if (method.judged) {
         errors[mode].check(name, "opening", method.bound(0.015, 0.06), checks);
         errors[mode].check(name, "k_correlation", method.bound(0.02, 0.05), checks);

@@ -111,12 +111,7 @@ void run_placed(const ExperimentContext& context, Placement placement, app::Tabl
 } // namespace
 
 std::vector<Check> run_precut_torsion(const ExperimentContext& context) {
-  std::vector<Check> checks;
-  app::Table table = front_table();
-  for (const Placement placement : precut_placements(context.quick))
-    run_placed(context, placement, table, checks);
-  table.write(context.out / "fronts.csv");
-  return checks;
+  return run_placements(context, run_placed);
 }
 
 } // namespace spherecut::experiments

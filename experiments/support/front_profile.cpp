@@ -89,4 +89,13 @@ void add_to_table(app::Table& table, const std::string& name, int seed, int node
   }
 }
 
+std::vector<Check> run_placements(const ExperimentContext& context, const PlacedRun& run) {
+  std::vector<Check> checks;
+  app::Table table = front_table();
+  for (const Placement placement : precut_placements(context.quick))
+    run(context, placement, table, checks);
+  table.write(context.out / "fronts.csv");
+  return checks;
+}
+
 } // namespace spherecut::experiments

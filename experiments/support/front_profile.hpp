@@ -42,4 +42,9 @@ app::Table front_table();
 void add_to_table(app::Table& table, const std::string& name, int seed, int nodes, double spacing,
                   const FrontProfile& profile);
 
+/// Runs an experiment at every placement, and writes its table as fronts.csv.
+using PlacedRun = std::function<void(const ExperimentContext& context, Placement placement, app::Table& table,
+                                     std::vector<Check>& checks)>;
+std::vector<Check> run_placements(const ExperimentContext& context, const PlacedRun& run);
+
 } // namespace spherecut::experiments

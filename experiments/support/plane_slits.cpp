@@ -239,10 +239,9 @@ std::vector<Check> run_plane_slits(const ExperimentContext& context, const std::
           for (std::size_t z = 0; z < across_thickness.size(); ++z) {
             const Vector2d& opening = run.openings[k][z];
             worst[place.slit] = std::max(worst[place.slit], (opening - place.opening).norm() / largest[place.slit]);
-            table.add({placement == Placement::aligned ? "aligned" : "tilted", method.name(), fmt::format("{:g}", fine),
-                       fmt::format("{}", seed), fmt::format("{}", nodes), fmt::format("{}", place.slit + 1),
-                       fmt::format("{}", place.part + 1), fmt::format("{:g}", place.share),
-                       fmt::format("{:g}", across_thickness[z] * plate_thickness),
+            table.add({to_string(placement), method.name(), fmt::format("{:g}", fine), fmt::format("{}", seed),
+                       fmt::format("{}", nodes), fmt::format("{}", place.slit + 1), fmt::format("{}", place.part + 1),
+                       fmt::format("{:g}", place.share), fmt::format("{:g}", across_thickness[z] * plate_thickness),
                        fmt::format("{:.6g}", opening.dot(left)), fmt::format("{:.6g}", opening.dot(way)),
                        fmt::format("{:.6g}", place.opening.dot(left)), fmt::format("{:.6g}", place.opening.dot(way))});
           }

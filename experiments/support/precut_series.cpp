@@ -60,4 +60,17 @@ std::string suffix(Placement placement) {
   return placement == Placement::aligned ? "_aligned" : "";
 }
 
+std::string to_string(Placement placement) {
+  return placement == Placement::aligned ? "aligned" : "tilted";
+}
+
+std::vector<PrecutRun> precut_runs(bool quick, bool with_appended) {
+  std::vector<PrecutRun> runs;
+  for (const Placement placement : precut_placements(quick))
+    for (const PrecutMethod& method : precut_methods(quick, with_appended))
+      if (method.judged || placement == Placement::tilted)
+        runs.push_back({method, placement});
+  return runs;
+}
+
 } // namespace spherecut::experiments

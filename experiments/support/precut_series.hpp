@@ -47,5 +47,16 @@ std::vector<PrecutMethod> precut_methods(bool quick, bool with_appended = false)
 std::vector<Placement> precut_placements(bool quick);
 /// "_aligned", or nothing: at the end of what is told of a placement.
 std::string suffix(Placement placement);
+/// "tilted" or "aligned", as tables have it.
+std::string to_string(Placement placement);
+
+/// A method at a placement.
+struct PrecutRun {
+  PrecutMethod method;
+  Placement placement;
+  [[nodiscard]] std::string name() const { return method.name() + suffix(placement); }
+};
+/// Every method at every placement at which it is run.
+std::vector<PrecutRun> precut_runs(bool quick, bool with_appended = false);
 
 } // namespace spherecut::experiments

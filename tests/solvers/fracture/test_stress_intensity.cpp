@@ -78,6 +78,18 @@ class StraightFront final : public ExactBody {
   Intensities k_;
 };
 
+/// A disc-shaped cut of radius 1 m across the z axis in a wide block, free and without loads.
+Problem disc_in_block(double poisson_ratio) {
+  Problem problem;
+  problem.domain = topology::make_box_domain(Vector3::Constant(-3), Vector3::Constant(3), 0.2);
+  problem.incision = std::make_shared<topology::Incision>(
+      std::vector<topology::SurfaceMesh>{topology::make_disc_sheet(Vector3::Zero(), Vector3::UnitZ(), 1, 0.04)},
+      problem.domain);
+  problem.nodes.add(Vector3::UnitX(), 0.15, NodeKind::interior, Vector3::Zero());
+  problem.material = {2, poisson_ratio, 0};
+  return problem;
+}
+
 // A penny crack of radius 1 m across the z axis in a wide block. The displacement is u_theta(r, z) about the axis: that
 // of a twist by `twist` rad/m and that of a crack whose faces carry -`shear` r / radius.
 class TwistedPenny final : public ExactBody {
@@ -106,13 +118,7 @@ class TwistedPenny final : public ExactBody {
 
  private:
   static Problem penny(double twist, double shear) {
-    Problem problem;
-    problem.domain = topology::make_box_domain(Vector3::Constant(-3), Vector3::Constant(3), 0.2);
-    problem.incision = std::make_shared<topology::Incision>(
-        std::vector<topology::SurfaceMesh>{topology::make_disc_sheet(Vector3::Zero(), Vector3::UnitZ(), 1, 0.04)},
-        problem.domain);
-    problem.nodes.add(Vector3::UnitX(), 0.15, NodeKind::interior, Vector3::Zero());
-    problem.material = {2, 0.3, 0};
+    Problem problem = disc_in_block(0.3);
     const double on_faces = problem.material.shear_modulus() * twist - shear; // Pa/m
     if (on_faces != 0)
       problem.loads.lip_traction = [on_faces](const Vector3& x, const Vector3& normal) -> Vector3 {
@@ -159,13 +165,7 @@ class PressedPenny final : public ExactBody {
 
  private:
   static Problem penny(double poisson_ratio) {
-    Problem problem;
-    problem.domain = topology::make_box_domain(Vector3::Constant(-3), Vector3::Constant(3), 0.2);
-    problem.incision = std::make_shared<topology::Incision>(
-        std::vector<topology::SurfaceMesh>{topology::make_disc_sheet(Vector3::Zero(), Vector3::UnitZ(), 1, 0.04)},
-        problem.domain);
-    problem.nodes.add(Vector3::UnitX(), 0.15, NodeKind::interior, Vector3::Zero());
-    problem.material = {2, poisson_ratio, 0};
+    Problem problem = disc_in_block(poisson_ratio);
     problem.loads.lip_traction = [](const Vector3&, const Vector3& normal) -> Vector3 { return -normal; };
     return problem;
   }
