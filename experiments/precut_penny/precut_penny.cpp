@@ -1,6 +1,6 @@
-// Problem:   a disc-shaped cut of radius a = 1 m in a cube of 4 m, tilted and shifted against it, and
-//            along its axes. Its faces carry a pressure p, or what remote tension s along a direction tilted by 35
-//            degrees from the normal leaves on them. The exact displacement is prescribed on the surface of the cube.
+// Problem:   a disc-shaped cut of radius a = 1 m in a cube of 4 m, tilted and shifted against it, and along its axes.
+//            Its faces carry a pressure p, or what remote tension s along a direction tilted by 35 degrees from the
+//            normal leaves on them. The exact displacement is prescribed on the surface of the cube.
 // Reference: Sneddon's field [1946]: opening volume 16 (1 - nu^2) p a^3 / (3 E), K_I = 2 p sqrt(a / pi), displacement
 //            at the nodes. For the tilted tension K_I, K_II, K_III along the front; errors over the largest of them.
 // Command:   spherecut experiment run precut_penny --out DIR
@@ -226,8 +226,7 @@ std::vector<Check> run_precut_penny(const ExperimentContext& context) {
       tilted.add("k_correlation", tension.errors.k_correlation);
       tilted.add("k_interaction", tension.errors.k_interaction);
       if (seed == 1 && run.placement == Placement::tilted)
-        app::write_png(intensities_figure(tension),
-                       context.out / fmt::format("intensities_{}.png", solvers::to_string(method.method)));
+        app::write_png(intensities_figure(tension), context.out / fmt::format("intensities_{}.png", run.name()));
     }
     context.say(fmt::format("tilted tension, {}, medians (worst): {}", run.name(), tilted.text()));
     const std::string name = fmt::format("precut_penny_{}_tilted", run.name());

@@ -1,11 +1,9 @@
-// Problem:   a disc-shaped cut of radius a = 1 m in a cube of 4 m, tilted and shifted against it, and
-//            along its axes. Its faces carry what
-//            remote torsion about its axis, or remote shear along one direction in its plane, leaves on them. The exact
-//            displacement is prescribed on the surface of the cube.
+// Problem:   a disc-shaped cut of radius a = 1 m in a cube of 4 m, tilted and shifted against it, and along its axes.
+//            Its faces carry what remote torsion about its axis, or remote shear along one direction in its plane,
+//            leaves on them. The exact displacement is prescribed on the surface of the cube.
 // Reference: K_III = 4 tau sqrt(a / pi) / 3 in torsion [Tada, Paris and Irwin]; K_II = 4 tau cos w sqrt(a / pi) / (2 -
-// nu)
-//            and K_III = -4 (1 - nu) tau sin w sqrt(a / pi) / (2 - nu) in shear [Kassir and Sih 1966]. Errors are the
-//            largest of any mode along the front, over the largest intensity.
+//            nu) and K_III = -4 (1 - nu) tau sin w sqrt(a / pi) / (2 - nu) in shear [Kassir and Sih 1966]. Errors are
+//            the largest of any mode along the front, over the largest intensity.
 // Command:   spherecut experiment run precut_torsion --out DIR
 #include "experiments/registered.hpp"
 #include "experiments/support/cut_body.hpp"
