@@ -506,7 +506,7 @@ export class Page {
     const { canvas } = this.view;
     const gl = canvas.getContext('webgl2');
     if (!gl) return;
-    savePicture(gl, this.view.drape.canvas, canvas.width / Math.max(canvas.clientWidth, 1), `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);
+    savePicture(gl, this.view, canvas.width / Math.max(canvas.clientWidth, 1), `Spherecut · ${session?.title ?? ''} · ${force}${(frame?.time ?? 0).toFixed(2)} s`);
   }
 
   togglePanels(): void {

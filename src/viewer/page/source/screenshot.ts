@@ -1,10 +1,11 @@
 import { drawnPixels } from './pixels';
+import type { View } from './view';
 
 /**
- * Saves what has just been drawn with `gl` over `drape` as a PNG with a line of text below; `ratio`: its pixels per pixel of
+ * Saves what has just been drawn with `gl` over the drape as a PNG with a line of text below; `ratio`: its pixels per pixel of
  * the page.
  */
-export function savePicture(gl: WebGL2RenderingContext, drape: HTMLCanvasElement, ratio: number, caption: string): void {
+export function savePicture(gl: WebGL2RenderingContext, view: View, ratio: number, caption: string): void {
   const picture = drawnPixels(gl);
   const foot = Math.round(26 * ratio);
   const canvas = document.createElement('canvas');
@@ -17,7 +18,7 @@ export function savePicture(gl: WebGL2RenderingContext, drape: HTMLCanvasElement
   const drawn = document.createElement('canvas');
   [drawn.width, drawn.height] = [picture.width, picture.height];
   drawn.getContext('2d')?.putImageData(picture, 0, 0);
-  context.drawImage(drape, 0, 0, picture.width, picture.height);
+  view.drape.paint(context, view.orbit.camera, picture.width, picture.height);
   context.drawImage(drawn, 0, 0);
   context.fillStyle = '#dbe4ea';
   context.font = `${13 * ratio}px system-ui, 'DejaVu Sans', sans-serif`;

@@ -67,7 +67,7 @@ export class View {
   constructor(readonly canvas: HTMLCanvasElement) {
     this.software = drawsInSoftware();
     // The drape, and what is kept of a picture, lie below the canvas and are seen through it.
-    this.drape = new Drape(canvas, () => this.change());
+    this.drape = new Drape(canvas);
     this.renderer = new WebGLRenderer({ canvas, alpha: true, antialias: !this.software, powerPreference: 'high-performance' });
     this.gl = this.renderer.getContext() as WebGL2RenderingContext;
     this.still = this.software ? new Still(this.renderer, canvas, () => this.change()) : null;
@@ -272,7 +272,7 @@ export class View {
 
   private drawAll(camera: PerspectiveCamera): void {
     this.still?.hide();
-    this.drape.draw(camera, this.gl.drawingBufferWidth, this.gl.drawingBufferHeight);
+    this.drape.show(camera);
     this.renderer.setClearColor(0x000000, clearAlpha);
     if (this.software) this.body.leaveOutBacks(camera.position.toArray() as Vec3);
     this.renderer.render(this.scene, camera);

@@ -114,7 +114,7 @@ function scene(tab: Tab): Promise<Scene> {
       const { left, top, right, bottom } = element.getBoundingClientRect();
       return { left, top, right, bottom };
     };
-    const over = [...document.querySelectorAll('#view > :not(canvas)')].filter((part) => part.getClientRects().length > 0);
+    const over = [...document.querySelectorAll('#view > :not(canvas, .still)')].filter((part) => part.getClientRects().length > 0);
     const { positions, triangles } = view.body.snapshot()!;
     const topology = view.body.topology!;
     const cut = topology.partners.length > 0;

@@ -206,7 +206,7 @@ test('Nothing of a kept picture shows beside one that is drawn as a whole', asyn
   await until(tab, 'nodes', () => globalThis.spherecut!.nodes !== null);
   await tab.keyboard.press('+', { delay: 300 });
   await frames(tab, 10);
-  const hidden = await tab.evaluate(() => [...document.querySelectorAll<HTMLElement>('canvas.still')].map((canvas) => getComputedStyle(canvas).visibility));
+  const hidden = await tab.evaluate(() => [...document.querySelectorAll('.still')].map((part) => getComputedStyle(part).visibility));
   assert.deepEqual(hidden, ['visible', 'hidden'], 'drape and kept picture');
   await tab.keyboard.press('n');
   await tab.keyboard.press('h');
