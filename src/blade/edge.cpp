@@ -12,12 +12,13 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double least_width = 0.75; // of the node spacing: half width of the edge's contact
-constexpr double open_reach = 0.3;   // node spacings from a sheet: a place there lies in the cut
-constexpr int way_parts = 32;        // of a motion that is looked at for tissue
-constexpr double depth_factor = 2;   // of its depth in the body: how far a piece of the edge may push
-constexpr double ahead = 0.1;        // of the half width: less material than that before a piece of the edge is none
-constexpr int entry_steps = 12;      // halvings towards the place where the edge entered
+constexpr double least_needed = 1e-9; // of the toughness: what the edge releases where the loads pay for it all
+constexpr double least_width = 0.75;  // of the node spacing: half width of the edge's contact
+constexpr double open_reach = 0.3;    // node spacings from a sheet: a place there lies in the cut
+constexpr int way_parts = 32;         // of a motion that is looked at for tissue
+constexpr double depth_factor = 2;    // of its depth in the body: how far a piece of the edge may push
+constexpr double ahead = 0.1;         // of the half width: less material than that before a piece of the edge is none
+constexpr int entry_steps = 12;       // halvings towards the place where the edge entered
 constexpr double opening_tolerance = 1e-6; // m
 constexpr double same_contact = 1e-4;      // of the node spacing, and of one: what has not moved
 constexpr double in_sheet = 0.1;           // node spacings from a sheet: a place there is in it
@@ -387,6 +388,11 @@ double BladeEdge::toughness(const EdgeMeeting& meeting) const {
     length += contact.length;
   }
   return length > 0 ? sum / length : 0;
+}
+
+double BladeEdge::needed(const EdgeMeeting& meeting, double paid) const {
+  const double all = toughness(meeting);
+  return std::max(least_needed * all, all - paid) / settings_.sharpness;
 }
 
 } // namespace spherecut::app

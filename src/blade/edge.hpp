@@ -82,9 +82,9 @@ class BladeEdge {
   /// 0: none, or it was drawn back.
   [[nodiscard]] double passed_uncut(const EdgeMeeting& meeting, const BodyModel& body, const topology::BladePose& from,
                                     const topology::BladePose& to) const;
-  /// Where the edge stands, J/m2; and the release that a cut needs there.
+  /// Where the edge stands, J/m2; and what its force has to release for a cut there, `paid` of which loads release.
   [[nodiscard]] double toughness(const EdgeMeeting& meeting) const;
-  [[nodiscard]] double needed(const EdgeMeeting& meeting) const { return toughness(meeting) / settings_.sharpness; }
+  [[nodiscard]] double needed(const EdgeMeeting& meeting, double paid) const;
 
  private:
   [[nodiscard]] bool lies_in(const topology::Incision& cut, const topology::RestMap& to_rest, const Vector3& x) const;

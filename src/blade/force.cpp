@@ -119,9 +119,9 @@ std::vector<topology::BladePose> BladeForce::wanted(const BodyModel& now) {
   const double way = way_.travel(edge_, 0, last);
   if (proposal_ && way < longer_proposal * proposal_->way)
     return {};
-  if (!(pressed.release > edge_.needed(meeting_)))
+  if (!(pressed.release > needed()))
     return {};
-  const double share = edge_.needed(meeting_) / pressed.release; // of its advance that the edge can keep
+  const double share = needed() / pressed.release; // of its advance that the edge can keep
   double remaining = share * way;
   // A cut of the least length is due when the edge has as much to spare before it as it lacks after it: half of that
   // length farther on. Where the edge gives way by less than that before it cuts, no more is cut at a time.
@@ -160,8 +160,7 @@ void BladeForce::wait(const BodyModel& now) {
     const auto is_late = [&](const topology::BladePose& pose) {
       const solvers::BladeState there =
           solvers::push_blade(meeting_.patch, edge_.advances(meeting_, now, pose), meeting_.patch.dragged ? 1 : 0);
-      return report_of(meeting_, there).release >
-             (first_cut(meeting_, there) ? first_wait : 1) * edge_.needed(meeting_);
+      return report_of(meeting_, there).release > (first_cut(meeting_, there) ? first_wait : 1) * needed();
     };
     if (!is_late(way_.poses()[stop])) {
       stroke(now, way_.poses()[stop], 1);
@@ -177,15 +176,8 @@ void BladeForce::wait(const BodyModel& now) {
   }
 }
 
-double BladeForce::needed_for_proposal() const {
-  constexpr double least = 1e-9; // of what the cut takes: the loads pay for it all
-  const double all = edge_.needed(meeting_) * (proposal_->meeting.area - meeting_.area);
-  return std::max(least * all, all - proposal_->drawn);
-}
-
-void BladeForce::propose(BodyModel body, std::size_t poses, double drawn) {
+void BladeForce::propose(BodyModel body, std::size_t poses) {
   Proposal next;
-  next.drawn = drawn;
   next.way = way_.travel(edge_, 0, way_.last());
   next.poses = poses + (proposal_ ? proposal_->poses : 0);
   next.body = std::move(body);
@@ -198,6 +190,14 @@ void BladeForce::propose(BodyModel body, std::size_t poses, double drawn) {
     throw;
   }
   proposal_->through = !edge_.inside(way_.poses()[proposal_->poses], proposal_->body);
+}
+
+std::vector<Vector3> BladeForce::places_at_front() const {
+  std::vector<Vector3> places;
+  for (std::size_t c = 0; c < meeting_.patch.contacts.size(); ++c)
+    if (meeting_.surface[c] == 0)
+      places.push_back(meeting_.patch.contacts[c].point);
+  return places;
 }
 
 void BladeForce::pass(std::size_t poses, const BodyModel& now) {

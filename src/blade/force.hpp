@@ -56,10 +56,15 @@ class BladeForce {
   /// Poses through which the next proposal should cut, in order; none: no cut is near. A later cut ends where the edge
   /// would be left with the force of steady cutting at the end of its motion.
   [[nodiscard]] std::vector<topology::BladePose> wanted(const BodyModel& now);
-  /// The body with the way cut through these poses. `drawn`, J: what loads other than the blade release by that cut;
-  /// the edge has the rest to pay. Throws NumericalError where a body at finite strain has no equilibrium under the
-  /// edge: what was proposed before stays.
-  void propose(BodyModel body, std::size_t poses, double drawn = 0);
+  /// The body with the way cut through these poses. Throws NumericalError where a body at finite strain has no
+  /// equilibrium under the edge: what was proposed before stays.
+  void propose(BodyModel body, std::size_t poses);
+  /// Where the edge presses on the front of a cut, m, at rest.
+  [[nodiscard]] std::vector<Vector3> places_at_front() const;
+  /// What loads other than the blade release there as the front goes on, J/m2. The edge has the rest to pay.
+  void draw_on(double release) { drawn_ = release; }
+  /// Where the edge stands, J/m2.
+  [[nodiscard]] double toughness() const { return edge_.toughness(meeting_); }
   /// Nothing is proposed any more.
   void withdraw() { proposal_.reset(); }
   /// The cut has grown otherwise: the blade meets the body `now`, and nothing is proposed. Poses of its way that lie in
@@ -97,11 +102,11 @@ class BladeForce {
     EdgeMeeting meeting;
     std::size_t poses = 0;
     double way = 0;       // m, from the front to the blade when it was proposed
-    double drawn = 0;     // J, released by other loads
     bool through = false; // it ends outside the body: nothing is left to press on
   };
 
-  [[nodiscard]] double needed_for_proposal() const; // J
+  [[nodiscard]] double needed() const { return edge_.needed(meeting_, drawn_); } // J/m2
+  [[nodiscard]] double needed_for_proposal() const { return needed() * (proposal_->meeting.area - meeting_.area); } // J
   void stroke(const BodyModel& now, const topology::BladePose& target, double share);
   void press(const BodyModel& now);
   [[nodiscard]] static double drag_of(const EdgeMeeting& meeting) { return meeting.patch.dragged ? 1 : 0; }
@@ -115,6 +120,7 @@ class BladeForce {
   EdgeMeeting meeting_;
   std::optional<solvers::BladeState> state_; // where the blade is; empty: the edge meets nothing
   std::optional<Proposal> proposal_;
+  double drawn_ = 0; // J/m2, released by other loads at the front
   solvers::BladeLedger ledger_;
 };
 

@@ -130,7 +130,7 @@ BladeGrip BladeForce::grip(const BodyModel& now) const {
       length += contact.length;
     // Where nothing is cut yet it is not known: what the blade waits for a first cut at or, past that, twice what there
     // is, is as far as a solve may be gone on from.
-    const double least = edge_.needed(meeting_) * length;
+    const double least = needed() * length;
     if (now.incision != nullptr && !first_cut(meeting_, *state_))
       grip.due = std::max(grip.edge, least);
     else

@@ -52,6 +52,14 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
     : domain_(std::move(domain)), wound_(std::make_unique<topology::IncrementalWound>(domain_->surface())),
       fields_(std::make_unique<topology::CutFields>(edge)) {
   options_.edge = edge;
+  if (scenario.blade) {
+    blade_ = topology::Blade{scenario.blade->edge, scenario.blade->edge_radius};
+    try {
+      sweep_.emplace(*blade_, domain_, options_);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}:{}: {}", scenario.file.string(), scenario.blade->line, error.what()));
+    }
+  }
   for (std::size_t k = 0; k < scenario.precuts.size(); ++k) {
     const PrecutSettings& precut = scenario.precuts[k];
     try { // one at a time, so that an unusable sheet is told with its line
@@ -72,41 +80,23 @@ IncisionBuilder::IncisionBuilder(const Scenario& scenario, std::shared_ptr<const
             fmt::format("{:.3g} % of its area lie on the precuts before it; allowed: none, sheets may only "
                         "cross",
                         100 * share));
-      add_own(std::move(sheet));
-      incision_ = std::make_shared<const topology::Incision>(own_, domain_, revision_);
-      grow(own_);
+      add(std::move(sheet));
+      use(sheets());
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}:{}: precut[{}]: {}", scenario.file.string(), precut.line, k + 1, error.what()));
     }
   }
-  if (!scenario.blade)
-    return;
-  blade_ = topology::Blade{scenario.blade->edge, scenario.blade->edge_radius};
-  try {
-    sweep_.emplace(*blade_, domain_, options_);
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}:{}: {}", scenario.file.string(), scenario.blade->line, error.what()));
-  }
 }
 
 std::vector<topology::SurfaceMesh> IncisionBuilder::sheets() const {
-  const std::vector<topology::SurfaceMesh> swept = sweep_ ? sweep_->sheets() : std::vector<topology::SurfaceMesh>{};
-  std::vector<topology::SurfaceMesh> all;
-  all.reserve(order_.size());
-  for (const int k : order_)
-    all.push_back(k >= 0 ? own_[static_cast<std::size_t>(k)] : swept[static_cast<std::size_t>(-1 - k)]);
-  return all;
+  return sweep_ ? sweep_->sheets() : own_;
 }
 
-void IncisionBuilder::add_own(topology::SurfaceMesh sheet) {
-  order_.push_back(static_cast<int>(own_.size()));
-  own_.push_back(std::move(sheet));
-}
-
-// Sheets that the blade has begun come after those that were there.
-void IncisionBuilder::find_swept() {
-  while (swept_ < std::ssize(sweep_->sheets()))
-    order_.push_back(-1 - swept_++);
+void IncisionBuilder::add(topology::SurfaceMesh sheet) {
+  if (sweep_)
+    sweep_->add(sheet);
+  else
+    own_.push_back(std::move(sheet));
 }
 
 void IncisionBuilder::use(const std::vector<topology::SurfaceMesh>& sheets) {
@@ -156,7 +146,6 @@ topology::SweepResult IncisionBuilder::move_to(const topology::BladePose& pose, 
     last.triangles = triangles;
     if (last.triangles == 0)
       return last;
-    find_swept();
     if (wound_before != nullptr)
       *wound_before = wound();
     use(sheets());
@@ -191,14 +180,12 @@ void IncisionBuilder::place(const topology::BladePose& pose, const topology::Res
 void IncisionBuilder::tear(const std::vector<topology::SurfaceMesh>& grown) {
   before_ = mark();
   try {
-    if (grown.size() != order_.size())
-      throw InputError(fmt::format("a tear of {} sheets in a cut of {}", grown.size(), order_.size()));
-    for (std::size_t s = 0; s < order_.size(); ++s) {
-      if (order_[s] >= 0)
-        own_[static_cast<std::size_t>(order_[s])] = grown[s];
-      else
-        sweep_->extend(-1 - order_[s], grown[s]);
-    }
+    if (const std::size_t count = sheets().size(); grown.size() != count)
+      throw InputError(fmt::format("a tear of {} sheets in a cut of {}", grown.size(), count));
+    if (!sweep_)
+      own_ = grown;
+    for (std::size_t s = 0; sweep_ && s < grown.size(); ++s)
+      sweep_->extend(static_cast<int>(s), grown[s]);
     use(grown);
   } catch (...) {
     take_back();
@@ -209,7 +196,7 @@ void IncisionBuilder::tear(const std::vector<topology::SurfaceMesh>& grown) {
 void IncisionBuilder::seed(topology::SurfaceMesh sheet) {
   before_ = mark();
   try {
-    add_own(std::move(sheet));
+    add(std::move(sheet));
     use(sheets());
   } catch (...) {
     take_back();
@@ -226,8 +213,6 @@ void IncisionBuilder::take_back() {
   const bool grew = incision_ != before_.incision;
   incision_ = before_.incision;
   own_ = before_.own;
-  order_ = before_.order;
-  swept_ = before_.swept;
   sweep_ = before_.sweep;
   at_ = before_.at;
   missed_ = before_.missed;

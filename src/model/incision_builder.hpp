@@ -47,14 +47,12 @@ class IncisionBuilder {
   /// The cut as it is, to go back to from further motions.
   struct Mark {
     std::vector<topology::SurfaceMesh> sheets, own;
-    std::vector<int> order;
-    int swept = 0;
     std::shared_ptr<const topology::Incision> incision;
     std::optional<topology::BladeSweep> sweep;
     std::optional<topology::BladePose> at;
     std::vector<topology::BladePose> missed;
   };
-  [[nodiscard]] Mark mark() const { return {sheets(), own_, order_, swept_, incision_, sweep_, at_, missed_}; }
+  [[nodiscard]] Mark mark() const { return {sheets(), own_, incision_, sweep_, at_, missed_}; }
   void go_back(const Mark& mark);
 
   /// Brings the level sets to the incision. Throws InputError when they need too much memory.
@@ -66,8 +64,7 @@ class IncisionBuilder {
 
  private:
   [[nodiscard]] std::vector<topology::SurfaceMesh> sheets() const;
-  void add_own(topology::SurfaceMesh sheet);
-  void find_swept();
+  void add(topology::SurfaceMesh sheet);
   void use(const std::vector<topology::SurfaceMesh>& sheets);
   void grow(const std::vector<topology::SurfaceMesh>& sheets);
 
@@ -75,10 +72,8 @@ class IncisionBuilder {
   std::shared_ptr<const topology::Domain> domain_;
   std::optional<topology::Blade> blade_;
   topology::SweepOptions options_;
-  std::vector<topology::SurfaceMesh> own_; // precuts, then seeds of tears
-  std::vector<int> order_;                 // of the incision's sheets: k >= 0 for own_[k], -1 - k for sheet k of sweep_
-  int swept_ = 0;                          // sheets of sweep_ in it
-  std::optional<topology::BladeSweep> sweep_;
+  std::vector<topology::SurfaceMesh> own_;    // precuts, then seeds of tears, of a scenario without a blade
+  std::optional<topology::BladeSweep> sweep_; // has them otherwise, and what the blade has cut
   std::unique_ptr<topology::IncrementalWound> wound_;
   std::optional<topology::Wound> mended_; // that wound without its splinters, where it has some
   std::unique_ptr<topology::CutFields> fields_;

@@ -137,12 +137,27 @@ void ResistedBlade::leave(const StepSample& sample) {
   drop_proposal();
 }
 
+// What else loads the body pays for a part of the cut.
+void ResistedBlade::look_at_loads(double time) {
+  const std::vector<Vector3> places = force_.places_at_front();
+  const double release = fronts_.released(state_.model, places);
+  force_.draw_on(release);
+  if (const double toughness = places.empty() ? 0 : force_.toughness();
+      !state_.scenario.tearing.enabled && !places.empty() && release >= toughness)
+    state_.log.warn("ahead",
+                    fmt::format("t = {:g} s: the loads alone release {:.3g} J/m2 at the front that the blade is "
+                                "at, of a toughness of {:.3g}: it would run ahead of the blade, which [tearing] "
+                                "lets it do. Without that it goes along with the blade, which needs no force",
+                                time, release, toughness));
+}
+
 // A cut is built when it comes near, beside the body, and the body becomes it when it is due. Where it is built beside
 // the steps the blade waits at the force of steady cutting: what it does is then what it would have done, only later.
 // The energy of the surface, J.
 double ResistedBlade::cut_on(const StepSample& sample, bool in_background, CutReport& report) {
   int triangles = report.triangles;
   double surface = 0;
+  look_at_loads(sample.time);
   bool waits = false; // what takes a body over leaves the next one to the next step
   for (;;) {
     waits = waits || background_.proposing() != nullptr;
@@ -178,6 +193,7 @@ double ResistedBlade::cut_on(const StepSample& sample, bool in_background, CutRe
     BladeForce::Taken taken = force_.take();
     surface += taken.surface;
     state_.model = std::move(taken.body);
+    look_at_loads(sample.time);
     forget_mark();
     waits = in_background;
   }
@@ -236,8 +252,7 @@ bool ResistedBlade::propose(const std::vector<topology::BladePose>& poses, const
     updater_.build_cut(renewed_, next, report);
     const StageTimer timer(report.seconds.solve);
     contact_.solve(sample, next);
-    const double drawn = fronts_.released(state_.model, *next.incision);
-    force_.propose(std::move(next), poses.size(), drawn);
+    force_.propose(std::move(next), poses.size());
     return true;
   } catch (const InputError& error) {
     return refuse(error.what());

@@ -39,6 +39,7 @@ class ResistedBlade {
   [[nodiscard]] bool proposes_in_background() const;
   double press_at(const StepSample& sample, CutReport& report);
   void leave(const StepSample& sample);
+  void look_at_loads(double time);
   double cut_on(const StepSample& sample, bool in_background, CutReport& report);
   bool sweep(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
   bool propose(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);

@@ -161,21 +161,20 @@ TearFronts::thin_layer(const BodyModel& model, const std::vector<solvers::FrontS
   return layer < limit ? std::optional<ThinLayer>({foremost->frame.point, layer}) : std::nullopt;
 }
 
-double TearFronts::released(const BodyModel& model, const topology::Incision& after) const {
-  if (!scenario_.tearing.enabled || model.incision == nullptr)
+double TearFronts::released(const BodyModel& model, const std::vector<Vector3>& places) const {
+  const VectorX& moved = model.finite != nullptr ? model.finite->coefficients() : model.field.coefficients;
+  if (places.empty() || model.incision == nullptr || model.incision->front().empty() || moved.isZero(0))
     return 0;
   const std::optional<std::vector<solvers::FrontState>> states = known_states(model);
-  if (!states || states->empty())
-    return 0;
   const double reach = 2 * zone_.spacing.fine;
-  double release = 0, weights = 0;
-  for (const solvers::FrontState& state : *states)
-    if (const auto front = after.front_frame(state.frame.point, reach);
-        !front || front->distance > 1e-3 * zone_.spacing.fine) { // it has moved
+  double release = 0, count = 0;
+  for (const solvers::FrontState& state : states.value_or(std::vector<solvers::FrontState>{}))
+    if (std::any_of(places.begin(), places.end(),
+                    [&](const Vector3& place) { return (state.frame.point - place).norm() < reach; })) {
       release += state.release;
-      weights += 1;
+      count += 1;
     }
-  return weights > 0 ? release / weights * std::max(0.0, after.area() - model.incision->area()) : 0;
+  return count > 0 ? release / count : 0;
 }
 
 } // namespace spherecut::app

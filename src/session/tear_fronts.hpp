@@ -41,9 +41,10 @@ class TearFronts {
   [[nodiscard]] std::optional<ThinLayer> thin_layer(const BodyModel& model,
                                                     const std::vector<solvers::FrontState>& states, double least) const;
 
-  /// What the loads on the body, without the blade, release when the cut grows to `after`, J: by the intensities at the
-  /// fronts near its new part. Two bodies' energies would tell it too, but nodes differ between them.
-  [[nodiscard]] double released(const BodyModel& model, const topology::Incision& after) const;
+  /// What the loads on the body, without the blade, release as the front goes on near these places, J/m2: the mean over
+  /// the front within two fine spacings of one of them, by its intensities. Two bodies' energies would tell it too, but
+  /// nodes differ between them. 0 where nothing loads the body.
+  [[nodiscard]] double released(const BodyModel& model, const std::vector<Vector3>& places) const;
 
  private:
   [[nodiscard]] std::vector<solvers::FrontState> found_states(const BodyModel& model) const;

@@ -229,6 +229,16 @@ void BladeSweep::lift() {
   state_->swept.place({});
 }
 
+void BladeSweep::add(const SurfaceMesh& sheet) {
+  check_sheet(sheet, "the sheet");
+  State& state = *state_;
+  const int own = state.swept.add(sheet);
+  state.given.resize(static_cast<std::size_t>(own) + 1, -1);
+  state.given.back() = static_cast<int>(state.order.size());
+  state.order.push_back(own);
+  ++state.revision;
+}
+
 void BladeSweep::extend(int sheet, const SurfaceMesh& grown) {
   State& state = *state_;
   if (sheet < 0 || sheet >= std::ssize(state.order))

@@ -82,6 +82,10 @@ class BladeSweep {
   /// The next motion starts afresh from wherever it places the blade (the blade was lifted).
   void lift();
 
+  /// A sheet that is cut already, as a precut or the seed of a tear is, comes after those of sheets(). The blade does
+  /// not cut where it lies, and cuts on from its border. Throws InputError where check_sheet() does.
+  void add(const SurfaceMesh& sheet);
+
   /// Sheet `sheet` of sheets() has grown otherwise, by a tear: `grown` is that sheet continued, vertices and triangles
   /// in their places. The next strip starts a sheet of its own, from where the edge is. Throws InputError when there is
   /// no such sheet or it has not grown.

@@ -31,6 +31,15 @@ void EdgeSweep::place(std::vector<Vector3> row) {
   anchors_.assign(row_.size(), {});
 }
 
+int EdgeSweep::add(const SurfaceMesh& sheet) {
+  const int number = sheets_.add_sheet();
+  for (const Vector3& x : sheet.vertices)
+    sheets_.add_vertex(number, x);
+  for (const Triangle& triangle : sheet.triangles)
+    sheets_.add_triangle(number, triangle);
+  return number;
+}
+
 void EdgeSweep::extend(int sheet, const SurfaceMesh& grown) {
   const SurfaceMesh& now = sheets_.sheets()[static_cast<std::size_t>(sheet)];
   const std::size_t vertices = now.vertices.size(), triangles = now.triangles.size();

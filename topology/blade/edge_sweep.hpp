@@ -30,6 +30,8 @@ class EdgeSweep {
   /// Moves the row to `next`, of as many points, and adds what it sweeps.
   void advance(std::vector<Vector3> next, Tally& tally);
 
+  /// A sheet that is there otherwise: number of it.
+  int add(const SurfaceMesh& sheet);
   /// A sheet continued otherwise: `grown` has its vertices and triangles first. The next strip starts a sheet.
   void extend(int sheet, const SurfaceMesh& grown);
 

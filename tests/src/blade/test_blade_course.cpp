@@ -59,7 +59,7 @@ TEST_CASE("An edge meets the body where it is in it, with the toughness of "
   REQUIRE_FALSE(meeting.pieces.empty());
   CHECK(meeting.area == 0);
   CHECK(in.edge.toughness(meeting) == Approx(12));
-  CHECK(in.edge.needed(meeting) == Approx(12 / in.edge.settings().sharpness));
+  CHECK(in.edge.needed(meeting, 3) == Approx((12 - 3) / in.edge.settings().sharpness));
   const VectorX motions = in.edge.motions(meeting, way.back()), advances = in.edge.advances(meeting, body, way.back());
   for (Eigen::Index c = 0; c < motions.size(); ++c) {
     CHECK(meeting.surface[static_cast<std::size_t>(c)] != 0);
