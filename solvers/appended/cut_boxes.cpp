@@ -3,8 +3,10 @@
 #include "solvers/quadrature/split_box.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace spherecut::solvers {
 
@@ -21,27 +23,57 @@ bool sees(const topology::Incision& incision, const CutPart& a, const CutPart& b
   return !incision.blocks(a.centroid, b.centroid) || !incision.blocks(a.eye, b.eye);
 }
 
+void join(std::vector<CutPart>& parts, std::size_t a, std::size_t b) {
+  if (a == b || a >= most_parts || b >= most_parts)
+    return;
+  parts[a].joins |= static_cast<std::uint8_t>(1U << b);
+  parts[b].joins |= static_cast<std::uint8_t>(1U << a);
+}
+
 /// The largest part takes over those too small to stand alone; shares add up to one.
 void tidy(std::vector<CutPart>& parts) {
-  std::stable_sort(parts.begin(), parts.end(), [](const CutPart& a, const CutPart& b) { return a.share > b.share; });
+  std::vector<std::size_t> order(parts.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return parts[a].share > parts[b].share; });
+  const std::vector<CutPart> before = std::exchange(parts, {});
+  for (const std::size_t k : order) {
+    parts.push_back(before[k]);
+    parts.back().joins = 0;
+  }
+  for (std::size_t a = 0; a < order.size(); ++a)
+    for (std::size_t b = a + 1; b < order.size(); ++b)
+      if (order[b] < most_parts && (before[order[a]].joins >> order[b] & 1) != 0)
+        join(parts, a, b);
   double kept = 0;
   std::size_t count = 0;
   for (; count < parts.size() && count < most_parts && parts[count].share >= least_share; ++count)
     kept += parts[count].share;
   parts.resize(count);
+  for (CutPart& part : parts)
+    part.joins &= static_cast<std::uint8_t>((1U << count) - 1);
   parts.front().share += 1 - kept;
 }
 
 } // namespace
 
 bool CutBoxes::Divided::operator==(const Divided& other) const {
-  return joined == other.joined && links == other.links &&
-         std::equal(parts.begin(), parts.end(), other.parts.begin(), other.parts.end(),
-                    [](const CutPart& a, const CutPart& b) { return a.share == b.share && a.centroid == b.centroid; });
+  return links == other.links && std::equal(parts.begin(), parts.end(), other.parts.begin(), other.parts.end(),
+                                            [](const CutPart& a, const CutPart& b) {
+                                              return a.share == b.share && a.centroid == b.centroid &&
+                                                     a.joins == b.joins;
+                                            });
 }
 
+// Samples that see the first one of a part are in it. In a box where the sheet bends, places of one side need not see
+// one another: parts hang together where neighbouring samples of them do.
 std::vector<CutPart> CutBoxes::divide_by_samples(const SmallBox& box, const topology::Incision& incision) const {
+  struct Sample {
+    Vector3 place;
+    std::size_t part;
+  };
   std::vector<CutPart> parts;
+  std::array<std::vector<Sample>, samples_along * samples_along * samples_along> samples;
   const Vector3 half = box.half / samples_along;
   double whole = 0;
   for (int a = 0; a < samples_along; ++a)
@@ -65,11 +97,32 @@ std::vector<CutPart> CutBoxes::divide_by_samples(const SmallBox& box, const topo
                                    [&](const CutPart& p) { return !incision.blocks(p.eye, place); });
           if (part == parts.end())
             part = parts.insert(parts.end(), {0, Vector3::Zero(), place});
+          samples[(a * samples_along + b) * samples_along + c].push_back(
+              {place, static_cast<std::size_t>(part - parts.begin())});
           part->share += volume;
           part->centroid += volume * place;
           whole += volume;
         }
       }
+  const auto look = [&](const std::vector<Sample>& from, const std::vector<Sample>& to) {
+    for (const Sample& x : from)
+      for (const Sample& y : to)
+        if (x.part != y.part && !incision.blocks(x.place, y.place))
+          join(parts, x.part, y.part);
+  };
+  if (parts.size() > 1)
+    for (int a = 0; a < samples_along; ++a)
+      for (int b = 0; b < samples_along; ++b)
+        for (int c = 0; c < samples_along; ++c) {
+          const int at = (a * samples_along + b) * samples_along + c;
+          look(samples[at], samples[at]);
+          if (a + 1 < samples_along)
+            look(samples[at], samples[at + samples_along * samples_along]);
+          if (b + 1 < samples_along)
+            look(samples[at], samples[at + samples_along]);
+          if (c + 1 < samples_along)
+            look(samples[at], samples[at + 1]);
+        }
   for (CutPart& part : parts) {
     part.centroid /= part.share;
     if (incision.blocks(part.eye, part.centroid))
@@ -161,10 +214,11 @@ std::vector<int> CutBoxes::update(const topology::Incision& incision, const Boun
     const Divided was = old != before.end() ? old->second : divided;
     const SmallBox& at = boxes_.boxes()[box];
     const auto front = incision.front_frame(at.centre, at.half.norm());
-    divided.joined = front && ((front->point - at.centre).cwiseAbs().array() <= at.half.array()).all();
-    for (std::size_t a = 0; a < divided.parts.size() && !divided.joined; ++a)
-      for (std::size_t b = a + 1; b < divided.parts.size() && !divided.joined; ++b)
-        divided.joined = sees(incision, divided.parts[a], divided.parts[b]);
+    const bool holds_front = front && ((front->point - at.centre).cwiseAbs().array() <= at.half.array()).all();
+    for (std::size_t a = 0; a < divided.parts.size(); ++a)
+      for (std::size_t b = a + 1; b < divided.parts.size(); ++b)
+        if (holds_front || sees(incision, divided.parts[a], divided.parts[b]))
+          join(divided.parts, a, b);
     const std::span<const int> neighbours = boxes_.neighbours(box);
     divided.links.assign(neighbours.size(), 0);
     for (std::size_t n = 0; n < neighbours.size(); ++n)

@@ -4,6 +4,7 @@
 #include "solvers/appended/small_boxes.hpp"
 #include "topology/incision/incision.hpp"
 
+#include <cstdint>
 #include <optional>
 #include <unordered_map>
 
@@ -14,6 +15,7 @@ struct CutPart {
   double share = 1;                   // of the box's volume inside the body
   Vector3 centroid = Vector3::Zero(); // m
   Vector3 eye = Vector3::Zero();      // m, a place in it
+  std::uint8_t joins = 0;             // bit k: it hangs together with part k of the same box
 };
 
 /// Number of the k-th part of a box.
@@ -69,7 +71,6 @@ class CutBoxes {
  private:
   struct Divided {
     std::vector<CutPart> parts;
-    bool joined = false;              // a front lies in the box: its parts hang together
     std::vector<std::uint64_t> links; // of every neighbour: bit 8 k + j, its part j is linked to part k here
     [[nodiscard]] bool operator==(const Divided& other) const;
   };
@@ -88,10 +89,9 @@ void CutBoxes::for_each_linked(PartId id, Visit&& visit) const {
   const int box = box_of(id), k = id % most_parts;
   const std::span<const int> neighbours = boxes_.neighbours(box);
   if (const std::optional<Divided>& own = divided_[box]) {
-    if (own->joined)
-      for (int other = 0; other < std::ssize(own->parts); ++other)
-        if (other != k)
-          visit(part_id(box, other));
+    for (unsigned bits = own->parts[k].joins, other = 0; bits != 0; bits >>= 1, ++other)
+      if ((bits & 1) != 0)
+        visit(part_id(box, static_cast<int>(other)));
     for (std::size_t n = 0; n < neighbours.size(); ++n)
       for (std::uint64_t bits = own->links[n] >> most_parts * k & 0xff, j = 0; bits != 0; bits >>= 1, ++j)
         if ((bits & 1) != 0)

@@ -139,28 +139,29 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
     }
     return std::pair{before, after};
   };
+  double in = 0;
   if (on_surface) {
     while (leg + 1 < poses.size() && outside(poses[leg + 1]))
       ++leg;
     if (leg + 1 >= poses.size())
       return;
-    const double in = end_of(leg, 0, outside).second;
+    in = end_of(leg, 0, outside).second;
     met = pose_between(poses[leg], poses[leg + 1], in);
-    // Where it comes back into a cut it meets nothing before it has gone through that.
-    const auto is_cut = [&](const topology::BladePose& pose) {
-      return lies_in(*body.incision, to_rest, placed(pose, part.point));
-    };
-    if (body.incision != nullptr && is_cut(met)) {
-      double begin = in;
-      while (leg + 1 < poses.size() && is_cut(poses[leg + 1])) {
-        ++leg;
-        begin = 0;
-      }
-      if (leg + 1 >= poses.size())
-        return;
-      met = pose_between(poses[leg], poses[leg + 1], end_of(leg, begin, is_cut).first);
-      on_surface = false;
+  }
+  // Where it comes into a cut, or stands in one far from its front, it meets nothing before it has gone through that.
+  const auto is_cut = [&](const topology::BladePose& pose) {
+    return lies_in(*body.incision, to_rest, placed(pose, part.point));
+  };
+  if (body.incision != nullptr && is_cut(met) &&
+      (on_surface || !body.incision->front_frame(to_rest(placed(met, part.point)), 2 * spacing_))) {
+    while (leg + 1 < poses.size() && is_cut(poses[leg + 1])) {
+      ++leg;
+      in = 0;
     }
+    if (leg + 1 >= poses.size())
+      return;
+    met = pose_between(poses[leg], poses[leg + 1], end_of(leg, in, is_cut).first);
+    on_surface = false;
   }
   // Its way from there: to where it is clear of its start and, past a turn, of the cut that is there already, on whose
   // faces it does not push when it goes back.

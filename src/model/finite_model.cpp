@@ -54,8 +54,6 @@ Hindrance hindrance_of(const Scenario& scenario) {
     return {fmt::format("method.name = \"{}\"", solvers::to_string(scenario.method.method)), line};
   if (scenario.blade && scenario.toughness > 0 && scenario.tearing.enabled)
     return {"[blade] with material.toughness and [tearing]", scenario.blade->line};
-  if (scenario.blade && scenario.toughness > 0 && scenario.tool && scenario.tool->grasp)
-    return {"[blade] with material.toughness beside a grasper", scenario.blade->line};
   const bool cuts = scenario.blade || !scenario.precuts.empty();
   if (cuts && scenario.cut.lips == solvers::LipCondition::sticking)
     return {"cut.lips = \"sticking\"", line};

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <random>
 
 using namespace spherecut;
 using namespace spherecut::solvers;
@@ -96,6 +97,40 @@ TEST_CASE("A cut that appends parts a body completely") {
   const MatrixX own = cut->contact_compliance(above);
   const MatrixX across = cut->compliance_between(below, above);
   CHECK(across.cwiseAbs().maxCoeff() < 1e-14 * own.cwiseAbs().maxCoeff());
+}
+
+TEST_CASE("A sheet with sharp bends parts a body completely") {
+  // A blade that leaves an earlier cut in moved tissue makes steps of a part of a box and bends of 60 degrees and more.
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> in(0, 1);
+  experiments::CutBody body = appended_cube();
+  for (int trial = 0; trial < 12; ++trial) {
+    std::vector<Vector3> profile{{-0.6, 0, 0.2 * in(random)-0.1}};
+    while (profile.back().x() < 0.6) { // steps up and down in turns, with a piece between two of them
+      const double height = 0.01 + 0.07 * in(random), way = (0.1 + in(random)) * height;
+      const double to = profile.back().z() + (profile.size() % 4 == 2 ? -height : height);
+      profile.emplace_back(profile.back().x() + 0.02 + 0.2 * in(random), 0, profile.back().z());
+      profile.emplace_back(profile.back().x() + way, 0, to);
+    }
+    constexpr int rows = 9;
+    topology::SurfaceMesh sheet;
+    for (const Vector3& x : profile)
+      for (int row = 0; row < rows; ++row)
+        sheet.vertices.emplace_back(x.x() + 0.02 * row / rows, -0.6 + 1.2 * row / (rows - 1), x.z());
+    for (int k = 0; k + 1 < std::ssize(profile); ++k)
+      for (int row = 0; row + 1 < rows; ++row) {
+        const int v = rows * k + row;
+        sheet.triangles.push_back({v, v + rows, v + 1});
+        sheet.triangles.push_back({v + 1, v + rows, v + rows + 1});
+      }
+    Problem problem = body.problem;
+    problem.incision = std::make_shared<const topology::Incision>(std::vector{sheet}, problem.domain);
+    experiments::hold_surface(
+        problem, [](const Vector3& x, const Vector3& n) { return std::abs(n.z()) > 0.5 && std::abs(x.z()) > 0.49; },
+        [](const Vector3&) -> Vector3 { return Vector3::Zero(); });
+    INFO("trial " << trial);
+    CHECK(discretise(problem, appending())->report().pieces.size() == 2);
+  }
 }
 
 TEST_CASE("A straight crack that is appended opens as it should") {

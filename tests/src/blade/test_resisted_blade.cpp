@@ -1,4 +1,5 @@
 // A blade that the tissue resists, in sessions: its force, the account of its work, and what it cuts.
+#include "src/model/finite_model.hpp"
 #include "src/session/session.hpp"
 #include "tests/src/blade_text.hpp"
 #include "tests/src/scenario_session.hpp"
@@ -252,4 +253,84 @@ rotation = [4, 0, 0]
   // All but the edge's lag behind the way of 12 mm from surface to end, 30 mm wide.
   CHECK(last.cut->area > 0.8 * 0.012 * 0.03);
   CHECK(work > 5 * last.cut->area);
+}
+
+namespace {
+
+/// A strip of 80 x 10 x 40 mm between clamps above and below, strained across by `strain`, whose sides do not go
+/// outwards; a slit along its middle from one end, and a blade that cuts on from there. It releases (lambda + 2 mu)
+/// strain^2 H / 2 per m2 where both halves are free behind the front.
+std::string stretched_strip(double strain, const std::string& law) {
+  std::string text = "[organ]\nshape = \"block\"\nsize = [0.08, 0.01, 0.04]\nedge = 0.005\n[material]\n" + law +
+                     "young_modulus = 10000\npoisson_ratio = 0.3\ntoughness = 10\npretension = [0, 0, " +
+                     std::to_string(strain) + "]\n";
+  const auto held = [&](const std::string& point, const std::string& normal, const std::string& axes) {
+    text += "[[fixed]]\nregion = \"half_space\"\npoint = " + point + "\nnormal = " + normal + axes;
+  };
+  held("[0, 0, 0.0005]", "[0, 0, 1]\n", "");
+  held("[0, 0, 0.0395]", "[0, 0, -1]\n", "");
+  held("[0, -0.0049, 0]", "[0, 1, 0]\n", "axes = [\"y\"]\n");
+  held("[0, 0.0049, 0]", "[0, -1, 0]\n", "axes = [\"y\"]\n");
+  return text +
+         "[nodes]\nfine_spacing = 0.0035\ncoarse_spacing = 0.008\n[[precut]]\nshape = \"rectangle\"\ncentre = [-0.04, "
+         "0, "
+         "0.0211]\nnormal = [0, 0, 1]\nup = [1, 0, 0]\nwidth = 0.03\nheight = 0.05\n" +
+         blade({"[-0.017, 0, 0.0211]", "[0.012, 0, 0.0211]"}, 0.009, "0.05");
+}
+
+} // namespace
+
+TEST_CASE("A blade that goes on in a slit cuts from its front, and tension pays for its cut") {
+  constexpr double modulus = 1e4 * 0.7 / (1.3 * 0.4), height = 0.04, toughness = 10; // lambda + 2 mu, Pa; m; J/m2
+  for (const double strain : {0.0, 0.1, 0.14}) {
+    Session session = session_of(stretched_strip(strain, ""));
+    const std::vector<StepResult> results = run(session);
+    const CutReport& last = *results.back().cut;
+    CHECK(results.front().cut->area == Approx(0.01 * 0.025).epsilon(1e-3));
+    CHECK(last.area == Approx(0.01 * (0.04 + 0.012)).epsilon(0.01)); // and not once more where the slit was
+    const auto from =
+        std::find_if(results.begin(), results.end(), [](const StepResult& r) { return r.cut->area > 0.01 * 0.031; });
+    REQUIRE(from != results.end());
+    const double paid = (last.blade.ledger.work - from->cut->blade.ledger.work) / (last.area - from->cut->area);
+    INFO("strain " << strain);
+    CHECK(paid == Approx(toughness - 0.5 * modulus * strain * strain * height).margin(0.03 * toughness));
+  }
+}
+
+TEST_CASE("A front that tension alone would drive on is told where a blade is at it and nothing tears") {
+  Session session = session_of(stretched_strip(0.22, ""));
+  run(session);
+  CHECK(std::any_of(session.warnings().begin(), session.warnings().end(), [](const std::string& warning) {
+    return warning.find("it would run ahead") != std::string::npos;
+  }));
+}
+
+TEST_CASE("At finite strain, too, what a grasper's pull releases pays for a blade's cut") {
+  const std::string text =
+      "[organ]\nshape = \"block\"\nsize = [0.06, 0.016, 0.03]\nedge = 0.004\n[material]\nlaw = \"neo_hookean\"\n"
+      "young_modulus = 10000\npoisson_ratio = 0.3\ntoughness = 2\n[[fixed]]\nregion = \"half_space\"\npoint = [0, 0, "
+      "0.001]\nnormal = [0, 0, 1]\n[nodes]\nfine_spacing = 0.003\ncoarse_spacing = 0.008\n[[precut]]\nshape = "
+      "\"rectangle\"\ncentre = [-0.03, 0, 0.0231]\nnormal = [0, 0, 1]\nup = [1, 0, 0]\nwidth = 0.03\nheight = 0.04\n"
+      "[tool]\nshape = \"grasper\"\nradius = 0.005\nstep = 0.25\n[[tool.path]]\ntime = 0\nposition = [-0.03, 0, "
+      "0.028]\n"
+      "[[tool.path]]\ntime = 0.5\nposition = [-0.03, 0, 0.034]\n[[tool.path]]\ntime = 1\nposition = [-0.03, 0, "
+      "0.034]\n" +
+      blade({"[-0.045, 0, 0.0231]", "[-0.0135, 0, 0.0231]", "[-0.001, 0, 0.0231]"}, 0.012, "0.25");
+  Session session = session_of(text);
+  double held = 0, area = 0;
+  StepResult last;
+  for (const StepSample& sample : session.steps()) {
+    last = session.step(sample);
+    if (sample.time == 1) {
+      held = session.model().finite->last().energy;
+      area = last.cut->area;
+    }
+  }
+  const solvers::BladeLedger& ledger = last.cut->blade.ledger;
+  const double stored = session.model().finite->last().energy; // with what the blade stores
+  const double spent = 2 * (last.cut->area - area);
+  CHECK(held > 6e-5);
+  CHECK(spent > 2e-4);
+  CHECK(ledger.work < 0.85 * spent);
+  CHECK(ledger.work - ledger.excess - (stored - held) == Approx(spent).epsilon(0.06));
 }

@@ -213,10 +213,6 @@ TEST_CASE("What a law other than linear does not go with is refused with its lin
   refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 100") + incision_at_end +
               "[tearing]\n",
           "[blade] with material.toughness and [tearing]");
-  refused(replaced(block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 100") + incision_at_end +
-              "[tool]\nshape = \"grasper\"\nradius = 0.005\nstep = 0.25\n[[tool.path]]\ntime = 0\nposition = [0, 0, "
-              "0.03]\n[[tool.path]]\ntime = 1\nposition = [0, 0, 0.035]\n",
-          "[blade] with material.toughness beside a grasper");
   refused(block + disc_precut + "[cut]\nlips = \"sticking\"\n", "cut.lips = \"sticking\"");
   refused(replaced(block, "poisson_ratio = 0.3\n", "poisson_ratio = 0.3\n[[material.prony]]\nshare = 0.3\ntime = 2\n") +
               incision_at_end,

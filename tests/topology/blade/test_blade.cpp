@@ -2,6 +2,7 @@
 #include "topology/blade/blade.hpp"
 
 #include "topology/base/errors.hpp"
+#include "topology/incision/cut_sheets.hpp"
 #include "topology/incision/sheet_front.hpp"
 #include "topology/organ/organs.hpp"
 #include "topology/wound/wound.hpp"
@@ -272,6 +273,33 @@ TEST_CASE("A deeper cut beside its own abuts on it") {
   for (double x = 0.0601; x > 0.0607 - way + 0.75 * edge; x -= 0.0007)
     for (double z = 0.0175; z < 0.05; z += 0.0007)
       REQUIRE(sweep.incision()->blocks(Vector3(x, 0.02, z), Vector3(x, 0.04, z)));
+}
+
+TEST_CASE("A blade cuts nothing where a sheet is already, and goes on from the border of that") {
+  // Half of the block is cut across at z = 0.02; the edge comes in there along y, on the sheet or beside it by less
+  // than an edge, and goes on by 0.03 m.
+  for (const double beside : {0.0, 0.0004, -0.0011, 0.0026, -0.0043})
+    for (const double start : {-0.0123, -0.0117, -0.0101}) {
+      BladeSweep sweep({{Vector3(0, -0.06, 0), Vector3(0, 0.06, 0)}, 1e-4}, block(), options());
+      sweep.add(make_rectangle_sheet(Vector3(0, 0.05, 0.02), Vector3::UnitZ(), Vector3::UnitX(), 0.2, 0.1, edge));
+      const RestMap onto_sheet = [&](const Vector3& x) -> Vector3 { // a face that is drawn aside up to the front
+        return x.x() < 0.05 ? Vector3(x.x(), x.y(), 0.02) : x;
+      };
+      double area = 0;
+      for (int k = 0; k < 32; ++k) {
+        const SweepResult swept = sweep.move_to(at(k, start + 0.003 * k, 0.05, 0.02 + beside), onto_sheet);
+        if (start + 0.003 * k < 0.05 - edge)
+          CHECK(swept.triangles == 0);
+        area += swept.area;
+      }
+      INFO(beside << " m beside the sheet, from " << start);
+      require_sheets(sweep);
+      const double end = start + 0.003 * 31;
+      CHECK(area == Approx((end - 0.05) * 0.1).margin(0.1 * (1.1 * std::abs(beside) + 1e-3 * edge)));
+      CHECK(sweep.incision()->front_length() == Approx(0.1).epsilon(1e-3));
+      for (double x = 0.001; x < end - 0.001; x += 0.0007)
+        REQUIRE(sweep.incision()->blocks(Vector3(x, 0.0501, 0.01), Vector3(x, 0.0501, 0.03)));
+    }
 }
 
 TEST_CASE("A path that crosses its own sheet goes on in a new sheet", "[blade]") {
