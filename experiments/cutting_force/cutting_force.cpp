@@ -3,7 +3,9 @@
 //            3.5, 4.9 and 7 spacings wide (half width), the same in metres. Lips in frictionless contact.
 // Reference: the force of steady cutting, G_c times the width of the front; the force and depth of the first rupture on
 //            other spacings; work = G_c area + stored energy + friction.
+//            Under tension (tension.hpp): G_c less what the tension releases.
 // Command:   spherecut experiment run cutting_force --out DIR
+#include "experiments/cutting_force/tension.hpp"
 #include "experiments/registered.hpp"
 #include "experiments/support/cutting_run.hpp"
 
@@ -118,6 +120,7 @@ std::vector<Check> run_cutting_force(const ExperimentContext& context) {
       figure.series.push_back(series);
     }
   }
+  cut_under_tension(context, checks);
   ruptures.write(context.out / "ruptures.csv");
   runs.write(context.out / "runs.csv");
   app::write_png(figure, context.out / "force.png");

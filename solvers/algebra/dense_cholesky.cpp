@@ -3,6 +3,7 @@
 #include "solvers/algebra/blas.inl"
 
 #include <cmath>
+#include <vector>
 
 namespace spherecut::solvers {
 
@@ -24,24 +25,52 @@ int factor_lower(MatrixX& matrix) {
   return info > 0 ? info - 1 : -1;
 }
 
+namespace {
+
+/// Unknowns of which the others leave nothing, taken from the largest pivot down: of those that repeat one another it
+/// is the faintest that is left out. Those that are not left out get 0; -1 - k: unknown k has a negative energy.
+int find_redundant(const MatrixX& lower, const VectorX& scale, std::vector<char>& is_redundant) {
+  const MatrixX whole = lower.selfadjointView<Eigen::Lower>();
+  const Eigen::Index count = whole.rows();
+  MatrixX columns(count, count);
+  VectorX left = whole.diagonal();
+  is_redundant.assign(static_cast<std::size_t>(count), 1);
+  for (Eigen::Index step = 0; step < count; ++step) {
+    Eigen::Index next = -1;
+    for (Eigen::Index k = 0; k < count; ++k)
+      if (is_redundant[k] != 0 && left[k] > redundant * scale[k] && (next < 0 || left[k] > left[next]))
+        next = k;
+    if (next < 0)
+      break;
+    is_redundant[next] = 0;
+    VectorX column = whole.col(next);
+    column -= columns.leftCols(step) * columns.row(next).head(step).transpose();
+    columns.col(step) = column / std::sqrt(left[next]);
+    left -= columns.col(step).cwiseAbs2();
+  }
+  for (Eigen::Index k = 0; k < count; ++k)
+    if (is_redundant[k] != 0 && !(left[k] > -negative * scale[k]))
+      return static_cast<int>(-1 - k);
+  return 0;
+}
+
+} // namespace
+
 int factor_lower_semidefinite(MatrixX& matrix, const VectorX& scale) {
   const MatrixX whole = matrix;
   if (factor_lower(matrix) < 0 && (matrix.diagonal().cwiseAbs2().array() >= redundant * scale.array()).all())
     return -1;
+  std::vector<char> is_redundant;
+  if (const int found = find_redundant(whole, scale, is_redundant); found < 0)
+    return -1 - found;
   matrix = whole;
-  const Eigen::Index count = matrix.rows();
-  for (Eigen::Index k = 0; k < count; ++k) {
-    VectorX below = matrix.col(k).tail(count - k);
-    below -= matrix.block(k, 0, count - k, k) * matrix.row(k).head(k).transpose();
-    matrix.col(k).setZero();
-    if (below[0] > redundant * scale[k])
-      matrix.col(k).tail(count - k) = below / std::sqrt(below[0]);
-    else if (below[0] > -negative * scale[k])
-      matrix(k, k) = superfluous * std::sqrt(scale[k]);
-    else
-      return static_cast<int>(k);
-  }
-  return -1;
+  for (Eigen::Index k = 0; k < matrix.rows(); ++k)
+    if (is_redundant[k] != 0) {
+      matrix.row(k).setZero();
+      matrix.col(k).setZero();
+      matrix(k, k) = superfluous * superfluous * scale[k];
+    }
+  return factor_lower(matrix);
 }
 
 } // namespace spherecut::solvers

@@ -9,9 +9,9 @@ namespace spherecut::solvers {
 /// the first column that is not positive, or -1.
 int factor_lower(MatrixX& matrix);
 
-/// The same of a semidefinite matrix: an unknown of which the ones before it leave less than 1e-13 of its `scale` (one
-/// an unknown, its own energy) is superfluous, and stays zero in every solution. Returns the first column that is
-/// negative beyond rounding, or -1.
+/// The same of a semidefinite matrix: an unknown of which others leave less than 1e-13 of its `scale` (one an unknown,
+/// its own energy) is superfluous, and stays zero in every solution. Of those that repeat one another it is the
+/// faintest. Returns the first column that is negative beyond rounding, or -1.
 int factor_lower_semidefinite(MatrixX& matrix, const VectorX& scale);
 
 } // namespace spherecut::solvers

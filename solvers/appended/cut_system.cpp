@@ -112,7 +112,8 @@ void CutSystem::update(const CutSpace::Change& change, const std::vector<std::ve
   solve_multipliers();
 }
 
-// Rigid motions of a loose piece, as its twins carry them, made orthonormal.
+// Rigid motions of a loose piece, as its twins carry them, made orthonormal: each counts by the root of its energy. One
+// that has next to none in the piece costs nothing to move, and would take the spring's share alone.
 void CutSystem::add_springs(const std::vector<std::vector<int>>& loose) {
   springs_ = MatrixX::Zero(schur_.rows(), 6 * std::ssize(loose));
   for (Eigen::Index p = 0; p < std::ssize(loose); ++p) {
@@ -127,6 +128,10 @@ void CutSystem::add_springs(const std::vector<std::vector<int>>& loose) {
       const Vector3 x = (uncut_.nodes().positions[space_->functions()[k].twin.node] - centre) / spacing;
       rigid.block<3, 3>(3 * static_cast<Eigen::Index>(k), 0).setIdentity();
       rigid.block<3, 3>(3 * static_cast<Eigen::Index>(k), 3) << 0, x.z(), -x.y(), -x.z(), 0, x.x(), x.y(), -x.x(), 0;
+    }
+    for (const int k : loose[p]) {
+      const Eigen::Index row = 3 * static_cast<Eigen::Index>(k);
+      rigid.middleRows<3>(row) *= std::sqrt(elastic_.diagonal().segment<3>(row).sum());
     }
     const double stiffness = uncut_.problem().material.young_modulus * spacing;
     const MatrixX basis = Eigen::HouseholderQR<MatrixX>(rigid).householderQ() * MatrixX::Identity(rigid.rows(), 6);

@@ -138,11 +138,20 @@ void condense_drag_torque(const Discretisation& body, const Field& base, const B
   patch.drag_torques = same != nullptr ? same->drag_torques : body.pattern_displacements(turns, patch.responses);
 }
 
+/// Adds to every field what keeps the shares of a patch where they are: forces there, whose columns are returned.
+MatrixX keep_in_place(const Discretisation& body, const ContactPatch& held, std::vector<Field>& fields) {
+  const MatrixX forces = -held.compliance.partialPivLu().solve(body.contact_displacements(held.nodes, fields));
+  const std::vector<Field> back = body.case_responses(held.nodes, forces);
+  for (std::size_t k = 0; k < fields.size(); ++k)
+    fields[k].add(1, back[k]);
+  return forces;
+}
+
 } // namespace
 
 BladePatch condense_blade(const Discretisation& body, const Field& base, const std::vector<EdgeContact>& contacts,
                           double half_width, const std::vector<LipPair>& pairs, const ForcePattern& drag,
-                          const BladePatch* known) {
+                          const BladePatch* known, const ContactPatch* held) {
   if (contacts.empty())
     throw InputError("a blade without contacts has nothing to condense");
   BladePatch patch;
@@ -172,12 +181,19 @@ BladePatch condense_blade(const Discretisation& body, const Field& base, const s
       unknown.push_back(patterns[i]);
   }
   std::vector<Field> found = unknown.empty() ? std::vector<Field>{} : body.pattern_responses(unknown);
-  auto next = found.begin();
-  for (const Eigen::Index entry : entries)
-    if (entry < 0)
-      patch.responses.push_back(std::move(*next++));
-    else
-      patch.responses.push_back(before.responses[static_cast<std::size_t>(entry)]);
+  const bool is_held = held != nullptr && !held->nodes.empty();
+  const MatrixX holding = is_held && !found.empty() ? keep_in_place(body, *held, found) : MatrixX{};
+  if (is_held)
+    patch.held_forces.resize(3 * std::ssize(held->nodes), std::ssize(entries));
+  Eigen::Index next = 0;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const Eigen::Index entry = entries[i], own = static_cast<Eigen::Index>(i);
+    if (is_held)
+      patch.held_forces.col(own) = entry < 0 ? holding.col(next) : before.held_forces.col(entry);
+    patch.responses.push_back(entry < 0 ? std::move(found[static_cast<std::size_t>(next)])
+                                        : before.responses[static_cast<std::size_t>(entry)]);
+    next += entry < 0 ? 1 : 0;
+  }
   if (is_same) {
     patch.compliance = before.compliance;
   } else {

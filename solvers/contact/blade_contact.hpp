@@ -85,15 +85,17 @@ struct BladePatch {
   /// those of small motions about a state at finite strain.
   double energy = 0;
   std::vector<Field> responses; // none at finite strain
+  MatrixX held_forces;          // N, of a unit of every entry, on the body at shares that a tool holds: 3 rows each
   MatrixX patterns;             // there: a unit of every entry, on the nodes
 };
 
 /// Condenses onto contacts, pairs (may be empty) and drag (may hold no points). `base` is the field without blade.
-/// `known` (may be null): a patch of the same body and half width, whose responses are taken over where contacts, pairs
-/// and drag are its own. Throws InputError without contacts.
+/// `known` (may be null): a patch of the same body, half width and `held`, whose responses are taken over where
+/// contacts, pairs and drag are its own. `held` (may be null): the shares of this patch are held where they are in
+/// `base`. Throws InputError without contacts.
 BladePatch condense_blade(const Discretisation& body, const Field& base, const std::vector<EdgeContact>& contacts,
                           double half_width, const std::vector<LipPair>& pairs = {}, const ForcePattern& drag = {},
-                          const BladePatch* known = nullptr);
+                          const BladePatch* known = nullptr, const ContactPatch* held = nullptr);
 
 /// Tissue under the blade.
 struct BladeState {

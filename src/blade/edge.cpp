@@ -65,7 +65,8 @@ BladeEdge::BladeEdge(const Scenario& scenario, std::shared_ptr<const topology::D
                      MapOf map_of, std::function<double(const Vector3&)> toughness)
     : settings_(*scenario.blade), toughness_(std::move(toughness)), spacing_(spacing),
       half_width_(solvers::edge_half_width(scenario.material, settings_.edge_radius, scenario.toughness)),
-      lips_(scenario.cut.lips), domain_(std::move(domain)), map_of_(std::move(map_of)) {
+      lips_(scenario.cut.lips), grasps_(scenario.tool && scenario.tool->grasp), domain_(std::move(domain)),
+      map_of_(std::move(map_of)) {
   finer_ = half_width_ < least_width * spacing;
   half_width_ = std::max(half_width_, least_width * spacing);
   for (std::size_t i = 1; i < settings_.edge.size(); ++i) {
@@ -213,7 +214,9 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
     add_contact(body, to_rest, poses, front, piece, meeting, contacts);
   if (contacts.empty())
     return meeting;
-  const solvers::BladePatch* known = last.is_with(body) ? &last.patch : nullptr;
+  if (grasps_ && body.finite == nullptr)
+    meeting.held = body.patch.nodes;
+  const solvers::BladePatch* known = last.is_with(body) && last.held == meeting.held ? &last.patch : nullptr;
   meeting.body = body.body.get();
   meeting.finite = body.finite.get();
   meeting.incision = body.incision;
@@ -246,7 +249,8 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
       pairs.push_back(body.pairs[p]);
     }
   for (int round = 0; round < 3; ++round) { // pairs that the blade would press through one another, and no others
-    meeting.patch = solvers::condense_blade(*body.body, base, contacts, half_width_, pairs, flanks, known);
+    meeting.patch = solvers::condense_blade(*body.body, base, contacts, half_width_, pairs, flanks, known,
+                                            meeting.held.empty() ? nullptr : &body.patch);
     known = &meeting.patch;
     if (lips_ == solvers::LipCondition::open || body.pairs.empty())
       break;

@@ -28,6 +28,7 @@ struct EdgeMeeting {
   const FiniteModel* finite = nullptr;
   std::shared_ptr<const topology::Incision> incision;
   std::vector<Vector3> nodes; // m
+  std::vector<int> held;      // of them, by a grasper
   [[nodiscard]] bool is_with(const BodyModel& model) const {
     return body == model.body.get() && finite == model.finite.get() && incision == model.incision &&
            nodes == model.sprinkling.nodes.positions;
@@ -100,6 +101,7 @@ class BladeEdge {
   double spacing_, half_width_;
   bool finer_ = false;
   solvers::LipCondition lips_;
+  bool grasps_; // the tool is a grasper
   std::shared_ptr<const topology::Domain> domain_;
   MapOf map_of_;
   std::vector<Piece> pieces_;

@@ -15,6 +15,8 @@ namespace {
 constexpr double smallest_increment = 0.05; // of the node spacing: no later cut is shorter at all
 constexpr double longer_proposal = 1.5;     // how much farther the blade is when a longer cut is proposed instead
 constexpr int stroke_parts = 4;             // over which the forces are taken to change evenly
+constexpr int most_looks = 5;               // at a cut that is due by small motions, and is not where the edge is then
+constexpr double early = 0.01;              // of the energy that a cut needs: so much less is enough
 constexpr int wait_steps = 20;              // halvings towards the place where a cut is due
 
 } // namespace
@@ -214,21 +216,40 @@ bool BladeForce::advance(const BodyModel& now) {
       ledger_.stored = state_->stored;
     return false;
   }
-  const double friction = meeting_.patch.dragged ? 1 : 0;
   for (const std::size_t stop : way_.stops(edge_)) {
     const topology::BladePose target = way_.poses()[stop];
-    std::optional<double> share;
-    if (proposal_ && (proposal_->through || !proposal_->meeting.pieces.empty()))
-      share = solvers::cutting_share(meeting_.patch, {state_->advance, edge_.advances(meeting_, now, target)},
-                                     proposal_->meeting.patch,
-                                     {edge_.advances(proposal_->meeting, proposal_->body, way_.at()),
-                                      edge_.advances(proposal_->meeting, proposal_->body, target)},
-                                     needed_for_proposal(), friction);
-    stroke(now, target, share.value_or(1));
-    if (share)
-      return true;
+    for (int look = 1; const std::optional<double> share = due_on_way_to(now, target); ++look) {
+      stroke(now, target, *share);
+      if (look == most_looks || now.finite == nullptr || is_due())
+        return true;
+    }
+    stroke(now, target, 1);
   }
   return false;
+}
+
+// The share of the motion to a pose at which the proposal is due.
+std::optional<double> BladeForce::due_on_way_to(const BodyModel& now, const topology::BladePose& target) const {
+  if (!proposal_ || (!proposal_->through && proposal_->meeting.pieces.empty()))
+    return std::nullopt;
+  const EdgeMeeting& meeting = proposal_->meeting;
+  return solvers::cutting_share(
+      meeting_.patch, {state_->advance, edge_.advances(meeting_, now, target)}, meeting.patch,
+      {edge_.advances(meeting, proposal_->body, way_.at()), edge_.advances(meeting, proposal_->body, target)},
+      needed_for_proposal(), drag_of(meeting_));
+}
+
+// At finite strain the patches are those of small motions about where the edge was last. Where the blade has come to
+// they may tell that the cut is not due yet.
+bool BladeForce::is_due() {
+  press_proposal();
+  const EdgeMeeting& meeting = proposal_->meeting;
+  const double kept =
+      meeting.pieces.empty()
+          ? 0
+          : solvers::push_blade(meeting.patch, edge_.advances(meeting, proposal_->body, way_.at()), drag_of(meeting_))
+                .driving;
+  return state_->driving - kept >= (1 - early) * needed_for_proposal();
 }
 
 // A share of the blade's motion to a pose, straight.

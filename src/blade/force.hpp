@@ -90,6 +90,9 @@ class BladeForce {
   /// The proposed body, which is the present one from now on.
   Taken take();
 
+  /// What the blade puts on the shares that a grasper holds, N on the body, 3 entries each; empty: there is no such
+  /// share, the blade does not press, or the law is not linear.
+  [[nodiscard]] VectorX on_held() const;
   /// Field of the body under the blade; `body.field` where it does not press.
   [[nodiscard]] solvers::Field field(const BodyModel& body) const;
   [[nodiscard]] BladeReport report() const;
@@ -113,6 +116,8 @@ class BladeForce {
   [[nodiscard]] static solvers::BladeState state_at(EdgeMeeting& meeting, const BodyModel& body,
                                                     const VectorX& advance);
   void press_proposal();
+  [[nodiscard]] std::optional<double> due_on_way_to(const BodyModel& now, const topology::BladePose& target) const;
+  [[nodiscard]] bool is_due();
 
   BladeEdge edge_;
   bool tears_; // the cut may run ahead of the blade

@@ -62,6 +62,11 @@ solvers::Field BladeForce::field(const BodyModel& body) const {
   return field;
 }
 
+VectorX BladeForce::on_held() const {
+  return state_ && meeting_.patch.held_forces.size() > 0 ? VectorX(meeting_.patch.held_forces * state_->forces)
+                                                         : VectorX{};
+}
+
 BladeReport BladeForce::report() const {
   if (!state_)
     return BladeReport{.ledger = ledger_};

@@ -46,6 +46,18 @@ void ResistedBlade::load_body() {
     state_.model.finite->show_pressed(force_.presses());
 }
 
+void ResistedBlade::add_to_grasper(StepResult& result) const {
+  const VectorX forces = force_.on_held();
+  const solvers::ContactPatch& patch = state_.model.patch;
+  for (Eigen::Index c = 0; 3 * c < forces.size(); ++c) {
+    const Vector3 force = -forces.segment<3>(3 * c);
+    const Vector3 place =
+        patch.rest[static_cast<std::size_t>(c)] + state_.model.state->tool.displacement.segment<3>(3 * c);
+    result.force += force;
+    result.torque += (place - result.pose.point).cross(force);
+  }
+}
+
 void ResistedBlade::lift() {
   force_.lift();
   if (state_.model.finite != nullptr)

@@ -2,6 +2,7 @@
 // work allows.
 #pragma once
 
+#include "src/session/step_result.hpp"
 #include "src/session/tear_fronts.hpp"
 #include "src/tissue/body_updater.hpp"
 
@@ -24,6 +25,8 @@ class ResistedBlade {
   double press(const StepSample& sample, CutReport& report);
   /// The field of the solved body becomes that under the blade; without_blade keeps the other.
   void load_body();
+  /// Adds what the blade puts on a grasper to the tool's force and torque; at finite strain they have it.
+  void add_to_grasper(StepResult& result) const;
 
   /// The hand has let go of it: it is nowhere until it is put somewhere.
   void lift();

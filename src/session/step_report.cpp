@@ -43,8 +43,10 @@ void StepReport::tell_linear(ResistedBlade* blade, StepResult& result) {
   state_.displacements = contact_.displacements(state_.model);
   if (result.has_grown() || !state_.options.force_only)
     result.residual = residual(state_.model);
-  if (blade != nullptr)
+  if (blade != nullptr) {
     blade->load_body();
+    blade->add_to_grasper(result);
+  }
   if (!result.force.allFinite())
     throw NumericalError(fmt::format("the tool force at t = {:g} s is not finite; residual {:.1e}, condition estimate "
                                      "{:.1e}",

@@ -1,4 +1,5 @@
 #include "solvers/contact/blade_contact.hpp"
+#include "solvers/contact/solver.hpp"
 
 #include "tests/support/cut_block.hpp"
 #include "topology/base/errors.hpp"
@@ -293,6 +294,31 @@ TEST_CASE("On a body the edge meets what it asks for, and the held surface carri
     CHECK((condense_blade(*body, base, moved, 0.15, {}, drag, &fresh).compliance -
            condense_blade(*body, base, moved, 0.15, {}, drag).compliance)
               .norm() < 1e-12 * fresh.compliance.norm());
+    // What a tool holds stays where it is, and bears a part of the edge's force.
+    std::vector<int> grasped;
+    for (int i = 0; i < problem.nodes.size(); ++i)
+      if (problem.nodes.positions[i].z() > 0.5 - 1e-9 && problem.nodes.positions[i].head<2>().norm() < 0.3)
+        grasped.push_back(i);
+    REQUIRE(grasped.size() >= 2);
+    const ContactPatch grip = condense(*body, grasped);
+    const BladePatch gripped = condense_blade(*body, base, contacts, 0.15, {}, {}, nullptr, &grip);
+    const BladeState pressed = push_blade(gripped, advance);
+    const Field under = deform(gripped, pressed, base);
+    CHECK((body->contact_displacements(grasped, {under}) - body->contact_displacements(grasped, {base})).norm() <
+          1e-9 * advance.norm());
+    CHECK(pressed.edge_force.norm() > 1.001 * state.edge_force.norm());
+    const VectorX borne = gripped.held_forces * pressed.forces;
+    Vector3 all = pressed.edge_force, at_base = Vector3::Zero();
+    for (Eigen::Index c = 0; c < borne.size(); c += 3)
+      all -= borne.segment<3>(c);
+    for (const Vector3& force : body->constraint_forces(under))
+      at_base += force;
+    CHECK((all - at_base).norm() < 1e-7 * pressed.edge_force.norm());
+    const BladePatch taken = condense_blade(*body, base, fewer, 0.15, {}, {}, &gripped, &grip),
+                     alone = condense_blade(*body, base, fewer, 0.15, {}, {}, nullptr, &grip);
+    CHECK((taken.compliance - alone.compliance).norm() < 1e-12 * alone.compliance.norm());
+    CHECK((taken.held_forces - alone.held_forces).norm() < 1e-9 * alone.held_forces.norm());
+
     Vector3 held = Vector3::Zero();
     for (const Vector3& force : body->constraint_forces(field))
       held += force;
