@@ -140,7 +140,7 @@ void condense_drag_torque(const Discretisation& body, const Field& base, const B
 
 /// Adds to every field what keeps the shares of a patch where they are: forces there, whose columns are returned.
 MatrixX keep_in_place(const Discretisation& body, const ContactPatch& held, std::vector<Field>& fields) {
-  const MatrixX forces = -held.compliance.partialPivLu().solve(body.contact_displacements(held.nodes, fields));
+  MatrixX forces = -held.compliance.partialPivLu().solve(body.contact_displacements(held.nodes, fields));
   const std::vector<Field> back = body.case_responses(held.nodes, forces);
   for (std::size_t k = 0; k < fields.size(); ++k)
     fields[k].add(1, back[k]);
@@ -190,9 +190,10 @@ BladePatch condense_blade(const Discretisation& body, const Field& base, const s
     const Eigen::Index entry = entries[i], own = static_cast<Eigen::Index>(i);
     if (is_held)
       patch.held_forces.col(own) = entry < 0 ? holding.col(next) : before.held_forces.col(entry);
-    patch.responses.push_back(entry < 0 ? std::move(found[static_cast<std::size_t>(next)])
-                                        : before.responses[static_cast<std::size_t>(entry)]);
-    next += entry < 0 ? 1 : 0;
+    if (entry < 0)
+      patch.responses.push_back(std::move(found[static_cast<std::size_t>(next++)]));
+    else
+      patch.responses.push_back(before.responses[static_cast<std::size_t>(entry)]);
   }
   if (is_same) {
     patch.compliance = before.compliance;
