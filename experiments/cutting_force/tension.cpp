@@ -33,8 +33,9 @@ double release_of(const TensionLaw& law, double strain) {
   double energy = 0;
   Matrix3 stress;
   solvers::make_law(law.spec)->evaluate({&gradient, 1}, {}, {&energy, 1}, {&stress, 1});
-  return energy * height / (law.name == "linear" ? 1 : 1 + strain); // of finite strain energies are those of the volume
-} // without stress
+  // Of finite strain energies are those of the volume without stress.
+  return energy * height / (law.name == "linear" ? 1 : 1 + strain);
+}
 
 std::string held_half_space(const Vector3& point, const Vector3& normal, const char* axes) {
   return fmt::format("[[fixed]]\nregion = \"half_space\"\npoint = [{}, {}, {}]\nnormal = [{}, {}, {}]\naxes = [{}]\n",
@@ -111,10 +112,11 @@ void cut_under_tension(const ExperimentContext& context, std::vector<Check>& che
         series.x.push_back(release / toughness);
         series.y.push_back(paid.back() / toughness);
       }
-      context.say(fmt::format("{}, strain {:.3f}: the tension releases {:.2f} J/m2, the blade's work is {:.3f} J/m2 "
-                              "({:.3f} wanted)",
-                              law.name, strain, release, *std::min_element(paid.begin(), paid.end()),
-                              toughness - release));
+      context.say(
+          fmt::format("{}, strain {:.3f}: the tension releases {:.2f} J/m2, the blade's work is {:.3f} to {:.3f} "
+                      "J/m2 ({:.3f} wanted)",
+                      law.name, strain, release, *std::min_element(paid.begin(), paid.end()),
+                      *std::max_element(paid.begin(), paid.end()), toughness - release));
     }
     checks.push_back({"cutting_force_under_tension_" + law.name, worst, "<=", 0.03}); // of the toughness
     figure.series.push_back(series);

@@ -2,6 +2,7 @@
 
 #include "solvers/algebra/blas.inl"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -56,13 +57,17 @@ int find_redundant(const MatrixX& lower, const VectorX& scale, std::vector<char>
 
 } // namespace
 
-int factor_lower_semidefinite(MatrixX& matrix, const VectorX& scale) {
+int factor_lower_semidefinite(MatrixX& matrix, const VectorX& scale, bool* any_left_out) {
+  if (any_left_out != nullptr)
+    *any_left_out = false;
   const MatrixX whole = matrix;
   if (factor_lower(matrix) < 0 && (matrix.diagonal().cwiseAbs2().array() >= redundant * scale.array()).all())
     return -1;
   std::vector<char> is_redundant;
   if (const int found = find_redundant(whole, scale, is_redundant); found < 0)
     return -1 - found;
+  if (any_left_out != nullptr)
+    *any_left_out = std::find(is_redundant.begin(), is_redundant.end(), 1) != is_redundant.end();
   matrix = whole;
   for (Eigen::Index k = 0; k < matrix.rows(); ++k)
     if (is_redundant[k] != 0) {

@@ -1,6 +1,7 @@
 #include "solvers/appended/cut_boxes.hpp"
 
 #include "solvers/quadrature/split_box.hpp"
+#include "topology/search/disjoint_sets.hpp"
 
 #include <algorithm>
 #include <array>
@@ -24,34 +25,27 @@ bool sees(const topology::Incision& incision, const CutPart& a, const CutPart& b
 }
 
 void join(std::vector<CutPart>& parts, std::size_t a, std::size_t b) {
-  if (a == b || a >= most_parts || b >= most_parts)
-    return;
   parts[a].joins |= static_cast<std::uint8_t>(1U << b);
   parts[b].joins |= static_cast<std::uint8_t>(1U << a);
 }
 
-/// The largest part takes over those too small to stand alone; shares add up to one.
-void tidy(std::vector<CutPart>& parts) {
-  std::vector<std::size_t> order(parts.size());
+/// The largest part takes over those too small to stand alone; shares add up to one. Parts that are in one of `sides`,
+/// also by one that is taken over, hang together.
+void tidy(std::vector<CutPart>& parts, topology::DisjointSets& sides) {
+  std::vector<int> order(parts.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return parts[a].share > parts[b].share; });
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return parts[a].share > parts[b].share; });
   const std::vector<CutPart> before = std::exchange(parts, {});
-  for (const std::size_t k : order) {
-    parts.push_back(before[k]);
-    parts.back().joins = 0;
-  }
-  for (std::size_t a = 0; a < order.size(); ++a)
-    for (std::size_t b = a + 1; b < order.size(); ++b)
-      if (order[b] < most_parts && (before[order[a]].joins >> order[b] & 1) != 0)
-        join(parts, a, b);
   double kept = 0;
-  std::size_t count = 0;
-  for (; count < parts.size() && count < most_parts && parts[count].share >= least_share; ++count)
-    kept += parts[count].share;
-  parts.resize(count);
-  for (CutPart& part : parts)
-    part.joins &= static_cast<std::uint8_t>((1U << count) - 1);
+  for (const int k : order)
+    if (parts.size() < most_parts && before[k].share >= least_share) {
+      kept += before[k].share;
+      parts.push_back(before[k]);
+    }
+  for (std::size_t a = 0; a < parts.size(); ++a)
+    for (std::size_t b = a + 1; b < parts.size(); ++b)
+      if (sides.find(order[a]) == sides.find(order[b]))
+        join(parts, a, b);
   parts.front().share += 1 - kept;
 }
 
@@ -70,7 +64,7 @@ bool CutBoxes::Divided::operator==(const Divided& other) const {
 std::vector<CutPart> CutBoxes::divide_by_samples(const SmallBox& box, const topology::Incision& incision) const {
   struct Sample {
     Vector3 place;
-    std::size_t part;
+    int part;
   };
   std::vector<CutPart> parts;
   std::array<std::vector<Sample>, samples_along * samples_along * samples_along> samples;
@@ -98,17 +92,18 @@ std::vector<CutPart> CutBoxes::divide_by_samples(const SmallBox& box, const topo
           if (part == parts.end())
             part = parts.insert(parts.end(), {0, Vector3::Zero(), place});
           samples[(a * samples_along + b) * samples_along + c].push_back(
-              {place, static_cast<std::size_t>(part - parts.begin())});
+              {place, static_cast<int>(part - parts.begin())});
           part->share += volume;
           part->centroid += volume * place;
           whole += volume;
         }
       }
+  topology::DisjointSets sides(static_cast<int>(parts.size()));
   const auto look = [&](const std::vector<Sample>& from, const std::vector<Sample>& to) {
     for (const Sample& x : from)
       for (const Sample& y : to)
         if (x.part != y.part && !incision.blocks(x.place, y.place))
-          join(parts, x.part, y.part);
+          sides.join(x.part, y.part);
   };
   if (parts.size() > 1)
     for (int a = 0; a < samples_along; ++a)
@@ -129,6 +124,8 @@ std::vector<CutPart> CutBoxes::divide_by_samples(const SmallBox& box, const topo
       part.centroid = part.eye;
     part.share /= whole;
   }
+  if (!parts.empty())
+    tidy(parts, sides);
   return parts;
 }
 
@@ -152,17 +149,17 @@ std::vector<CutPart> CutBoxes::divide(int index, const topology::Incision& incis
       const BoxPart& side = sheet->normal.dot(corner - sheet->point) >= 0 ? sides[0] : sides[1];
       is_plane = side.volume == 0 || !incision.blocks(side.centroid, corner);
     }
-    if (is_plane)
+    if (is_plane) {
       for (const BoxPart& side : sides)
         if (side.volume > 0)
           parts.push_back({side.volume / box.volume, side.centroid, side.centroid});
+      topology::DisjointSets apart(static_cast<int>(parts.size()));
+      tidy(parts, apart);
+    }
   }
   if (parts.empty())
     parts = divide_by_samples(box, incision);
-  if (parts.empty())
-    return {all};
-  tidy(parts);
-  return parts;
+  return parts.empty() ? std::vector<CutPart>{all} : parts;
 }
 
 // A sheet in the plane of a face divides no box, and parts the boxes on both sides of it.

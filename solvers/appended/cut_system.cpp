@@ -139,7 +139,10 @@ void CutSystem::add_springs(const std::vector<std::vector<int>>& loose) {
   }
 }
 
+// What is left out depends on all unknowns: where there is such a one all of it is factored.
 void CutSystem::factor(Eigen::Index unchanged) {
+  if (has_left_out_)
+    unchanged = 0;
   const Eigen::Index count = schur_.rows(), first = 3 * unchanged, rest = count - first;
   MatrixX lower = MatrixX::Zero(count, count);
   lower.topLeftCorner(first, first) = lower_.topLeftCorner(first, first);
@@ -154,13 +157,15 @@ void CutSystem::factor(Eigen::Index unchanged) {
       lower.bottomLeftCorner(rest, first) = beside.transpose();
     }
     const VectorX energy = elastic_.diagonal().tail(rest) + penalty_.diagonal().tail(rest);
-    if (const int column = factor_lower_semidefinite(corner, energy); column >= 0) {
+    if (const int column = factor_lower_semidefinite(corner, energy, &has_left_out_); column >= 0) {
       const CutFunction& function = space_->functions()[unchanged + column / 3];
       const Vector3 x = function.is_front ? function.group.station.point : uncut_.nodes().positions[function.twin.node];
       throw NumericalError(fmt::format("what the cut appends is not semidefinite (unknown {} of {}, about ({:.4g}, "
                                        "{:.4g}, {:.4g}) m): a severed piece is not held, or a function repeats another",
                                        first + column, count, x.x(), x.y(), x.z()));
     }
+    if (has_left_out_ && first > 0)
+      return factor(0);
     lower.bottomRightCorner(rest, rest) = corner;
   }
   lower_ = std::move(lower);

@@ -126,11 +126,12 @@ class CutSystem {
   std::vector<char> held_touched_;         // some function reaches into the share
   std::vector<std::vector<int>> carriers_; // nodes of every function
   std::vector<PartedShare> parted_;
-  MatrixX elastic_; // of Kee, without penalties
-  MatrixX penalty_; // of Kee
-  MatrixX springs_; // rows of Kee, a column a spring of stiffness 1 N/m
-  MatrixX half_;    // W, base rows in elimination order; with room for more columns
-  MatrixX schur_;   // S, then its lower Cholesky factor in `lower_`
+  MatrixX elastic_;           // of Kee, without penalties
+  MatrixX penalty_;           // of Kee
+  bool has_left_out_ = false; // the factor has unknowns that repeat others
+  MatrixX springs_;           // rows of Kee, a column a spring of stiffness 1 N/m
+  MatrixX half_;              // W, base rows in elimination order; with room for more columns
+  MatrixX schur_;             // S, then its lower Cholesky factor in `lower_`
   MatrixX lower_;
   MatrixX parted_half_, parted_schur_, parted_lower_; // L^-1 d, L_S^-1 of what is appended, factor of what is left
 };

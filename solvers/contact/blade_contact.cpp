@@ -140,7 +140,7 @@ void condense_drag_torque(const Discretisation& body, const Field& base, const B
 
 /// Adds to every field what keeps the shares of a patch where they are: forces there, whose columns are returned.
 MatrixX keep_in_place(const Discretisation& body, const ContactPatch& held, std::vector<Field>& fields) {
-  MatrixX forces = -held.compliance.partialPivLu().solve(body.contact_displacements(held.nodes, fields));
+  MatrixX forces = forces_against(held, body.contact_displacements(held.nodes, fields));
   const std::vector<Field> back = body.case_responses(held.nodes, forces);
   for (std::size_t k = 0; k < fields.size(); ++k)
     fields[k].add(1, back[k]);

@@ -20,6 +20,7 @@
 #include <atomic>
 #include <cmath>
 #include <fmt/format.h>
+#include <numeric>
 
 namespace spherecut::solvers {
 
@@ -121,22 +122,30 @@ ContactState resting(const ContactPatch& patch, const topology::ToolPose& pose) 
   return state;
 }
 
-/// Nodes with prescribed displacements `values` on `held`, the others free of force. Along an axis that the body itself
-/// is held at a node no force moves it, and it gets none.
-void hold(const ContactPatch& patch, const std::vector<int>& held, const std::vector<Vector3>& values,
-          ContactState& state) {
+/// Rows of these candidates but those along axes that the body itself is held at: no force moves it there.
+std::vector<Eigen::Index> movable_rows(const ContactPatch& patch, const std::vector<int>& candidates) {
   constexpr double rigid = 1e-9; // of the softest entry's compliance
   double softest = 0;
-  for (const int c : held)
+  for (const int c : candidates)
     softest = std::max(softest, patch.compliance.diagonal().segment<3>(3 * c).maxCoeff());
   std::vector<Eigen::Index> rows;
-  std::vector<double> way;
-  for (std::size_t a = 0; a < held.size(); ++a)
+  for (const int c : candidates)
     for (int axis = 0; axis < 3; ++axis)
-      if (const Eigen::Index row = 3 * held[a] + axis; patch.compliance(row, row) > rigid * softest) {
+      if (const Eigen::Index row = 3 * c + axis; patch.compliance(row, row) > rigid * softest)
         rows.push_back(row);
-        way.push_back(values[a][axis] - patch.base_displacement[row]);
-      }
+  return rows;
+}
+
+/// Nodes with prescribed displacements `values` on `held`, the others free of force; none along an axis that the body
+/// itself is held at.
+void hold(const ContactPatch& patch, const std::vector<int>& held, const std::vector<Vector3>& values,
+          ContactState& state) {
+  const std::vector<Eigen::Index> rows = movable_rows(patch, held);
+  std::vector<double> way;
+  for (const Eigen::Index row : rows) {
+    const auto a = std::find(held.begin(), held.end(), static_cast<int>(row / 3)) - held.begin();
+    way.push_back(values[static_cast<std::size_t>(a)][row % 3] - patch.base_displacement[row]);
+  }
   const MatrixX compliance = patch.compliance(rows, rows);
   const VectorX forces = compliance.partialPivLu().solve(Eigen::Map<const VectorX>(way.data(), std::ssize(way)));
   std::fill(state.nodal_forces.begin(), state.nodal_forces.end(), Vector3::Zero());
@@ -508,6 +517,16 @@ std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState
     memory.share.push_back(limit > 0 ? Vector3(state.along[c] / limit) : Vector3::Zero());
   }
   return memory;
+}
+
+MatrixX forces_against(const ContactPatch& patch, const MatrixX& displacements) {
+  std::vector<int> all(patch.nodes.size());
+  std::iota(all.begin(), all.end(), 0);
+  const std::vector<Eigen::Index> rows = movable_rows(patch, all);
+  MatrixX forces = MatrixX::Zero(displacements.rows(), displacements.cols());
+  forces(rows, Eigen::all) =
+      -MatrixX(patch.compliance(rows, rows)).partialPivLu().solve(displacements(rows, Eigen::all));
+  return forces;
 }
 
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements) {

@@ -113,6 +113,10 @@ Vector3 torque_about(const ContactState& state, const Vector3& point);
 /// What friction needs to go on with other nodes than those of this patch; nothing without contact.
 std::optional<GripMemory> remember(const ContactPatch& patch, const ContactState& state, double friction);
 
+/// Forces on the nodes of the patch, N, that take back displacements of them, m: 3 rows a node, a column a case. None
+/// along an axis that the body itself is held at a node.
+MatrixX forces_against(const ContactPatch& patch, const MatrixX& displacements);
+
 /// Nodes of the patch with given displacements, m (bonded cap): solves for their forces. Throws InputError unless there
 /// is a finite one for every node.
 ContactState prescribe(const ContactPatch& patch, const std::vector<Vector3>& displacements);

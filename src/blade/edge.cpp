@@ -105,9 +105,22 @@ bool BladeEdge::is_in_open_cut(const topology::BladePose& pose, const BodyModel&
   return any;
 }
 
-solvers::Field without_lips(const BodyModel& body) {
-  const bool tool = body.state && !body.patch.nodes.empty();
-  return tool ? solvers::deform(*body.body, body.patch, body.state->tool) : body.base;
+namespace {
+
+/// The patch held where it is, without lips.
+solvers::ContactState held_patch_alone(const BodyModel& body) {
+  std::vector<Vector3> places;
+  for (Eigen::Index c = 0; c < std::ssize(body.patch.nodes); ++c)
+    places.emplace_back(body.state->tool.displacement.segment<3>(3 * c));
+  return solvers::prescribe(body.patch, places);
+}
+
+} // namespace
+
+solvers::Field without_lips(const BodyModel& body, bool grasped) {
+  if (!body.state || body.patch.nodes.empty())
+    return body.base;
+  return solvers::deform(*body.body, body.patch, grasped ? held_patch_alone(body) : body.state->tool);
 }
 
 // Whether material that is now at x was at rest on a sheet.
@@ -214,8 +227,14 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
     add_contact(body, to_rest, poses, front, piece, meeting, contacts);
   if (contacts.empty())
     return meeting;
-  if (grasps_ && body.finite == nullptr)
+  if (grasps_ && body.finite == nullptr && body.state && !body.patch.nodes.empty()) {
     meeting.held = body.patch.nodes;
+    meeting.grip = body.state->tool.displacement;
+    const solvers::ContactState alone = held_patch_alone(body);
+    meeting.held_base.resize(meeting.grip.size());
+    for (Eigen::Index c = 0; 3 * c < meeting.grip.size(); ++c)
+      meeting.held_base.segment<3>(3 * c) = alone.nodal_forces[static_cast<std::size_t>(c)];
+  }
   const solvers::BladePatch* known = last.is_with(body) && last.held == meeting.held ? &last.patch : nullptr;
   meeting.body = body.body.get();
   meeting.finite = body.finite.get();
@@ -239,7 +258,7 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
     meeting.patch = body.finite->edge_patch(contacts, half_width_, flanks);
     return meeting;
   }
-  const solvers::Field base = without_lips(body);
+  const solvers::Field base = without_lips(body, !meeting.held.empty());
   std::vector<solvers::LipPair> pairs;
   std::vector<char> used(body.pairs.size(), 0);
   for (std::size_t p = 0; known != nullptr && p < body.pairs.size(); ++p)

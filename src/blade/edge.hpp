@@ -29,6 +29,7 @@ struct EdgeMeeting {
   std::shared_ptr<const topology::Incision> incision;
   std::vector<Vector3> nodes; // m
   std::vector<int> held;      // of them, by a grasper
+  VectorX grip, held_base;    // m, N on the body at them, 3 entries each, with lips open and without the blade
   [[nodiscard]] bool is_with(const BodyModel& model) const {
     return body == model.body.get() && finite == model.finite.get() && incision == model.incision &&
            nodes == model.sprinkling.nodes.positions;
@@ -50,6 +51,7 @@ class BladeEdge {
             std::function<double(const Vector3&)> toughness);
 
   [[nodiscard]] const BladeSettings& settings() const { return settings_; }
+  [[nodiscard]] bool grasps() const { return grasps_; } // the tool is a grasper
   [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
   [[nodiscard]] double spacing() const { return spacing_; }
   /// m, of the edge's contact; `finer_than_nodes` when they are too coarse for it and stand for it instead.
@@ -107,7 +109,8 @@ class BladeEdge {
   std::vector<Piece> pieces_;
 };
 
-/// The body under its loads and its tool: lips that the blade brings together are in its own contact.
-solvers::Field without_lips(const BodyModel& body);
+/// The body under its loads and its tool: lips that the blade brings together are in its own contact. `grasped`: its
+/// patch is held where it is.
+solvers::Field without_lips(const BodyModel& body, bool grasped);
 
 } // namespace spherecut::app

@@ -194,11 +194,14 @@ void BladeForce::propose(BodyModel body, std::size_t poses) {
   proposal_->through = !edge_.inside(way_.poses()[proposal_->poses], proposal_->body);
 }
 
-std::vector<Vector3> BladeForce::places_at_front() const {
-  std::vector<Vector3> places;
+std::vector<FrontPlace> BladeForce::places_at_front() const {
+  double length = 0;
+  for (const solvers::EdgeContact& contact : meeting_.patch.contacts)
+    length += contact.length;
+  std::vector<FrontPlace> places;
   for (std::size_t c = 0; c < meeting_.patch.contacts.size(); ++c)
     if (meeting_.surface[c] == 0)
-      places.push_back(meeting_.patch.contacts[c].point);
+      places.push_back({meeting_.patch.contacts[c].point, meeting_.patch.contacts[c].length / length});
   return places;
 }
 
@@ -218,9 +221,12 @@ bool BladeForce::advance(const BodyModel& now) {
   }
   for (const std::size_t stop : way_.stops(edge_)) {
     const topology::BladePose target = way_.poses()[stop];
-    for (int look = 1; const std::optional<double> share = due_on_way_to(now, target); ++look) {
+    for (int look = 0; look < most_looks; ++look) {
+      const std::optional<double> share = due_on_way_to(now, target);
+      if (!share)
+        break;
       stroke(now, target, *share);
-      if (look == most_looks || now.finite == nullptr || is_due())
+      if (now.finite == nullptr || is_due())
         return true;
     }
     stroke(now, target, 1);

@@ -31,6 +31,12 @@ BladeReport report_of(const EdgeMeeting& meeting, const solvers::BladeState& sta
 /// Whether most of its force is where nothing is cut yet.
 bool first_cut(const EdgeMeeting& meeting, const solvers::BladeState& state);
 
+/// Where a piece of an edge presses on the front of a cut.
+struct FrontPlace {
+  Vector3 point = Vector3::Zero(); // m, at rest
+  double share = 0;                // of the length of the edge that presses, on surfaces as well
+};
+
 class BladeForce {
  public:
   BladeForce(const Scenario& scenario, BladeEdge edge);
@@ -59,8 +65,8 @@ class BladeForce {
   /// The body with the way cut through these poses. Throws NumericalError where a body at finite strain has no
   /// equilibrium under the edge: what was proposed before stays.
   void propose(BodyModel body, std::size_t poses);
-  /// Where the edge presses on the front of a cut, m, at rest.
-  [[nodiscard]] std::vector<Vector3> places_at_front() const;
+  /// Where the edge presses on the front of a cut.
+  [[nodiscard]] std::vector<FrontPlace> places_at_front() const;
   /// What loads other than the blade release there as the front goes on, J/m2. The edge has the rest to pay.
   void draw_on(double release) { drawn_ = release; }
   /// Where the edge stands, J/m2.
@@ -90,9 +96,11 @@ class BladeForce {
   /// The proposed body, which is the present one from now on.
   Taken take();
 
-  /// What the blade puts on the shares that a grasper holds, N on the body, 3 entries each; empty: there is no such
-  /// share, the blade does not press, or the law is not linear.
+  /// Forces on the shares that a grasper holds, blade and lips included, N on the body, 3 entries each; empty: there is
+  /// no such share, the blade does not press, or the law is not linear.
   [[nodiscard]] VectorX on_held() const;
+  /// Whether the grasper holds the body as it did when the blade met it last (linear law).
+  [[nodiscard]] bool is_gripped_as(const BodyModel& body) const;
   /// Field of the body under the blade; `body.field` where it does not press.
   [[nodiscard]] solvers::Field field(const BodyModel& body) const;
   [[nodiscard]] BladeReport report() const;

@@ -56,15 +56,22 @@ solvers::Field BladeForce::field(const BodyModel& body) const {
   if (!state_)
     return body.field;
   if (body.finite == nullptr)
-    return solvers::deform(meeting_.patch, *state_, without_lips(body));
+    return solvers::deform(meeting_.patch, *state_, without_lips(body, !meeting_.held.empty()));
   solvers::Field field = body.field;
   field.coefficients = body.finite->pressed_coefficients();
   return field;
 }
 
+bool BladeForce::is_gripped_as(const BodyModel& body) const {
+  const bool grips = edge_.grasps() && body.finite == nullptr && body.state && !body.patch.nodes.empty();
+  return grips ? meeting_.held == body.patch.nodes && meeting_.grip == body.state->tool.displacement
+               : meeting_.held.empty();
+}
+
 VectorX BladeForce::on_held() const {
-  return state_ && meeting_.patch.held_forces.size() > 0 ? VectorX(meeting_.patch.held_forces * state_->forces)
-                                                         : VectorX{};
+  return state_ && meeting_.patch.held_forces.size() > 0
+             ? VectorX(meeting_.held_base + meeting_.patch.held_forces * state_->forces)
+             : VectorX{};
 }
 
 BladeReport BladeForce::report() const {

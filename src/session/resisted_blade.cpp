@@ -46,15 +46,18 @@ void ResistedBlade::load_body() {
     state_.model.finite->show_pressed(force_.presses());
 }
 
-void ResistedBlade::add_to_grasper(StepResult& result) const {
+void ResistedBlade::load_grasper(solvers::ContactState& grasper, const topology::ToolPose& pose) const {
   const VectorX forces = force_.on_held();
-  const solvers::ContactPatch& patch = state_.model.patch;
-  for (Eigen::Index c = 0; 3 * c < forces.size(); ++c) {
-    const Vector3 force = -forces.segment<3>(3 * c);
-    const Vector3 place =
-        patch.rest[static_cast<std::size_t>(c)] + state_.model.state->tool.displacement.segment<3>(3 * c);
-    result.force += force;
-    result.torque += (place - result.pose.point).cross(force);
+  const std::vector<Vector3>& rest = state_.model.patch.rest;
+  if (forces.size() == 0 || forces.size() != 3 * std::ssize(rest))
+    return;
+  grasper.tool_force.setZero();
+  grasper.tool_torque.setZero();
+  for (std::size_t c = 0; c < rest.size(); ++c) {
+    const auto at = 3 * static_cast<Eigen::Index>(c);
+    grasper.nodal_forces[c] = forces.segment<3>(at);
+    grasper.tool_force -= grasper.nodal_forces[c];
+    grasper.tool_torque -= (rest[c] + grasper.displacement.segment<3>(at) - pose.point).cross(grasper.nodal_forces[c]);
   }
 }
 
@@ -84,7 +87,9 @@ bool ResistedBlade::proposes_in_background() const {
 double ResistedBlade::press(const StepSample& sample, CutReport& report) {
   if (sample.blade)
     return press_at(sample, report);
-  if (state_.model.finite != nullptr && force_.presses() && !state_.model.finite->is_pressed()) { // the tool has moved
+  const bool has_moved = state_.model.finite != nullptr ? !state_.model.finite->is_pressed() // the tool has
+                                                        : !force_.is_gripped_as(state_.model);
+  if (force_.presses() && has_moved) {
     drop_proposal();
     force_.meet_again(state_.model);
   }
@@ -98,6 +103,7 @@ double ResistedBlade::press(const StepSample& sample, CutReport& report) {
 
 // The energy of the surface that the blade makes on its way to the sample's pose, J.
 double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
+  drop_of_another_grip(sample);
   const topology::RestMap to_rest = state_.to_rest();
   std::vector<topology::BladePose> passed = blade_.passed();
   const bool placed = !force_.way().empty();
@@ -133,6 +139,20 @@ double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
   return surface + cut_on(sample, proposes_in_background() && !out, report);
 }
 
+// A proposal is solved with the tool as it was: where that touches or holds, and is elsewhere now, it is of no use.
+void ResistedBlade::drop_of_another_grip(const StepSample& sample) {
+  const bool touches = contact_.is_in_reach();
+  const bool is_same =
+      touches == touched_ &&
+      (!touches || !tool_ || !sample.tool || (tool_->point == sample.tool->point && tool_->axis == sample.tool->axis));
+  if (!is_same && (force_.proposed() || background_.proposing() != nullptr)) {
+    force_.withdraw();
+    drop_proposal();
+  }
+  touched_ = touches;
+  tool_ = sample.tool;
+}
+
 // What it has passed without a cut is told.
 void ResistedBlade::leave(const StepSample& sample) {
   if (const double uncut = force_.passed_uncut(state_.model); uncut > 0)
@@ -151,9 +171,15 @@ void ResistedBlade::leave(const StepSample& sample) {
 
 // What else loads the body pays for a part of the cut.
 void ResistedBlade::look_at_loads(double time) {
-  const std::vector<Vector3> places = force_.places_at_front();
-  const double release = fronts_.released(state_.model, places);
+  const std::vector<FrontPlace> places = force_.places_at_front();
+  const std::optional<double> known = fronts_.released(state_.model, places);
+  const double release = known.value_or(0);
   force_.draw_on(release);
+  if (!known)
+    state_.log.warn("release",
+                    fmt::format("t = {:g} s: the front that the blade is at is too near the surface for its "
+                                "stress intensities: what the loads release there pays for no part of the cut",
+                                time));
   if (const double toughness = places.empty() ? 0 : force_.toughness();
       !state_.scenario.tearing.enabled && !places.empty() && release >= toughness)
     state_.log.warn("ahead",

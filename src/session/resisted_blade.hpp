@@ -25,8 +25,8 @@ class ResistedBlade {
   double press(const StepSample& sample, CutReport& report);
   /// The field of the solved body becomes that under the blade; without_blade keeps the other.
   void load_body();
-  /// Adds what the blade puts on a grasper to the tool's force and torque; at finite strain they have it.
-  void add_to_grasper(StepResult& result) const;
+  /// Gives the state of a grasper the forces that it has under the blade; at finite strain it has them.
+  void load_grasper(solvers::ContactState& grasper, const topology::ToolPose& pose) const;
 
   /// The hand has let go of it: it is nowhere until it is put somewhere.
   void lift();
@@ -43,6 +43,7 @@ class ResistedBlade {
   double press_at(const StepSample& sample, CutReport& report);
   void leave(const StepSample& sample);
   void look_at_loads(double time);
+  void drop_of_another_grip(const StepSample& sample);
   double cut_on(const StepSample& sample, bool in_background, CutReport& report);
   bool sweep(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
   bool propose(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
@@ -58,6 +59,8 @@ class ResistedBlade {
   const TearFronts& fronts_;
   BladeForce force_;
   std::string renewed_;                       // why all nodes are made anew for the last cut; empty: they are not
+  bool touched_ = false;                      // the tool was in reach in the last step,
+  std::optional<topology::ToolPose> tool_;    // there
   std::optional<IncisionBuilder::Mark> mark_; // the cut without the proposal; empty: there is none
 };
 

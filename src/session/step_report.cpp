@@ -18,6 +18,7 @@ namespace {
 
 constexpr double stretched_rotation = 10;   // degrees, beyond which linear elasticity is being stretched
 constexpr double at_front = 0.45;           // fine spacings: no lip node is so near to a front, half a spacing off
+constexpr double most_open_work = 0.25;     // of a blade, that its account may leave open
 constexpr int few_in_contact = 3;           // nodes
 constexpr double deep_press = 0.25;         // of the tip radius
 constexpr double most_between_shares = 0.1; // of the fine spacing: what may lie in the tool between middles of shares
@@ -27,7 +28,9 @@ constexpr double most_between_shares = 0.1; // of the fine spacing: what may lie
 void StepReport::tell_linear(ResistedBlade* blade, StepResult& result) {
   const StageTimer timer(state_.profile.evaluate);
   const std::optional<SurfaceWatch::Depths>& penetration = contact_.penetration();
-  const solvers::ContactState& tool = state_.model.state->tool;
+  solvers::ContactState tool = state_.model.state->tool;
+  if (blade != nullptr)
+    blade->load_grasper(tool, result.pose);
   result.force = tool.tool_force;
   result.torque = tool.tool_torque;
   result.tangential = solvers::tangential_force(state_.model.patch, tool,
@@ -43,10 +46,8 @@ void StepReport::tell_linear(ResistedBlade* blade, StepResult& result) {
   state_.displacements = contact_.displacements(state_.model);
   if (result.has_grown() || !state_.options.force_only)
     result.residual = residual(state_.model);
-  if (blade != nullptr) {
+  if (blade != nullptr)
     blade->load_body();
-    blade->add_to_grasper(result);
-  }
   if (!result.force.allFinite())
     throw NumericalError(fmt::format("the tool force at t = {:g} s is not finite; residual {:.1e}, condition estimate "
                                      "{:.1e}",
@@ -219,6 +220,14 @@ void StepReport::tell_cut(const ResistedBlade* blade, CutReport& report) {
   const topology::Wound& wound = *state_.wound();
   if (blade != nullptr)
     report.blade = blade->force().report();
+  if (const solvers::BladeLedger& ledger = report.blade.ledger;
+      ledger.surface > 0 && ledger.imbalance() > most_open_work)
+    state_.log.warn(
+        "blade account",
+        fmt::format("the account of the blade leaves {:.0f} % of its work open: its force and what it cuts are "
+                    "no better than that. Faces of the cut that a tool or the loads press together before the "
+                    "edge may do that",
+                    100 * ledger.imbalance()));
   if (state_.model.incision != nullptr) {
     report.area = state_.model.incision->area();
     report.front_length = state_.model.incision->front_length();

@@ -161,20 +161,25 @@ TearFronts::thin_layer(const BodyModel& model, const std::vector<solvers::FrontS
   return layer < limit ? std::optional<ThinLayer>({foremost->frame.point, layer}) : std::nullopt;
 }
 
-double TearFronts::released(const BodyModel& model, const std::vector<Vector3>& places) const {
+std::optional<double> TearFronts::released(const BodyModel& model, const std::vector<FrontPlace>& places) const {
   const VectorX& moved = model.finite != nullptr ? model.finite->coefficients() : model.field.coefficients;
   if (places.empty() || model.incision == nullptr || model.incision->front().empty() || moved.isZero(0))
-    return 0;
+    return 0.0;
   const std::optional<std::vector<solvers::FrontState>> states = known_states(model);
+  if (!states)
+    return std::nullopt;
   const double reach = 2 * zone_.spacing.fine;
-  double release = 0, count = 0;
-  for (const solvers::FrontState& state : states.value_or(std::vector<solvers::FrontState>{}))
-    if (std::any_of(places.begin(), places.end(),
-                    [&](const Vector3& place) { return (state.frame.point - place).norm() < reach; })) {
-      release += state.release;
-      count += 1;
-    }
-  return count > 0 ? release / count : 0;
+  double release = 0;
+  for (const FrontPlace& place : places) {
+    double sum = 0, count = 0;
+    for (const solvers::FrontState& state : *states)
+      if ((state.frame.point - place.point).norm() < reach) {
+        sum += state.release;
+        count += 1;
+      }
+    release += count > 0 ? place.share * sum / count : 0;
+  }
+  return release;
 }
 
 } // namespace spherecut::app

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "solvers/fracture/tearing.hpp"
+#include "src/blade/force.hpp"
 #include "src/model/body_model.hpp"
 #include "src/model/node_zone.hpp"
 #include "topology/incision/front_growth.hpp"
@@ -41,10 +42,11 @@ class TearFronts {
   [[nodiscard]] std::optional<ThinLayer> thin_layer(const BodyModel& model,
                                                     const std::vector<solvers::FrontState>& states, double least) const;
 
-  /// What the loads on the body, without the blade, release as the front goes on near these places, J/m2: the mean over
-  /// the front within two fine spacings of one of them, by its intensities. Two bodies' energies would tell it too, but
-  /// nodes differ between them. 0 where nothing loads the body.
-  [[nodiscard]] double released(const BodyModel& model, const std::vector<Vector3>& places) const;
+  /// What the loads on the body, without the blade, release as the front goes on at these places, J/m2: the sum of
+  /// their shares, each times the mean over the front within two fine spacings, by its intensities. Two bodies'
+  /// energies would tell it too, but nodes differ between them. 0 where nothing loads the body; nothing where it is not
+  /// known.
+  [[nodiscard]] std::optional<double> released(const BodyModel& model, const std::vector<FrontPlace>& places) const;
 
  private:
   [[nodiscard]] std::vector<solvers::FrontState> found_states(const BodyModel& model) const;

@@ -102,7 +102,8 @@ struct BladeSweep::State {
     const double turn = row_pose.orientation.angularDistance(pose.orientation);
     constexpr double widest_turn = 0.35; // rad a row
     const double steps = std::ceil(std::max(farthest / options.edge - 1e-6, turn / widest_turn));
-    const double triangles = swept.sheets().triangles() + 2 * steps * static_cast<double>(row.size() - 1);
+    const double triangles =
+        swept.sheets().triangles() - had_triangles + 2 * steps * static_cast<double>(row.size() - 1);
     if (!(triangles <= options.most_triangles))
       throw InputError(fmt::format("blade sweep: a motion of {} m could bring the cut to {:.0f} triangles, at most {} "
                                    "are allowed",
@@ -192,6 +193,7 @@ struct BladeSweep::State {
   std::optional<double> time;    // s, of the last pose
   std::vector<int> given, order; // place of each sheet among those given, -1 outside the body; and back
   int revision = 0;
+  int had_triangles = 0; // of sheets that were there, which the blade's own limit does not count
   mutable std::shared_ptr<const Incision> incision;
 };
 
@@ -233,6 +235,7 @@ void BladeSweep::add(const SurfaceMesh& sheet) {
   check_sheet(sheet, "the sheet");
   State& state = *state_;
   const int own = state.swept.add(sheet);
+  state.had_triangles += static_cast<int>(sheet.triangles.size());
   state.given.resize(static_cast<std::size_t>(own) + 1, -1);
   state.given.back() = static_cast<int>(state.order.size());
   state.order.push_back(own);

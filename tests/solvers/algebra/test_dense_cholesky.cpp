@@ -39,7 +39,12 @@ TEST_CASE("Of unknowns that repeat one another the faintest stays zero, and the 
   rows.col(2) *= 1e-3; // before the one that it repeats
   const MatrixX matrix = rows.transpose() * rows;
   MatrixX lower = matrix;
-  CHECK(factor_lower_semidefinite(lower, matrix.diagonal()) == -1);
+  bool any_left_out = false;
+  CHECK(factor_lower_semidefinite(lower, matrix.diagonal(), &any_left_out) == -1);
+  CHECK(any_left_out);
+  MatrixX fewer = matrix.topLeftCorner(3, 3); // without what the third repeats
+  CHECK(factor_lower_semidefinite(fewer, matrix.diagonal().head(3), &any_left_out) == -1);
+  CHECK_FALSE(any_left_out);
   const VectorX right = matrix * VectorX::LinSpaced(7, 1, 2), x = solution_by(lower, right);
   CHECK((matrix * x - right).norm() < 1e-11 * right.norm());
   CHECK(std::abs(x[3]) < 1e-9);

@@ -108,7 +108,7 @@ TEST_CASE("A sheet with sharp bends parts a body completely") {
     std::vector<Vector3> profile{{-0.6, 0, 0.2 * in(random)-0.1}};
     while (profile.back().x() < 0.6) { // steps up and down in turns, with a piece between two of them
       const double height = 0.01 + 0.07 * in(random), way = (0.1 + in(random)) * height;
-      const double to = profile.back().z() + (profile.size() % 4 == 2 ? -height : height);
+      const double to = profile.back().z() + (profile.size() % 4 == 3 ? -height : height);
       profile.emplace_back(profile.back().x() + 0.02 + 0.2 * in(random), 0, profile.back().z());
       profile.emplace_back(profile.back().x() + way, 0, to);
     }
@@ -123,6 +123,8 @@ TEST_CASE("A sheet with sharp bends parts a body completely") {
         sheet.triangles.push_back({v, v + rows, v + 1});
         sheet.triangles.push_back({v + 1, v + rows, v + rows + 1});
       }
+    for (const Vector3& x : profile)
+      REQUIRE(std::abs(x.z()) < 0.45);
     Problem problem = body.problem;
     problem.incision = std::make_shared<const topology::Incision>(std::vector{sheet}, problem.domain);
     experiments::hold_surface(

@@ -344,6 +344,41 @@ TEST_CASE("A blade that cuts beside a grasper pushes on what that holds, by eith
   CHECK(last[0].cut->blade.ledger.work == Approx(last[1].cut->blade.ledger.work).epsilon(0.05));
 }
 
+TEST_CASE("A grasper holds its patch under the blade where sides are held along an axis, too") {
+  std::string sides;
+  for (const int side : {-1, 1})
+    sides += "[[fixed]]\nregion = \"half_space\"\npoint = [0, " + std::to_string(side * 0.0079) +
+             ", 0]\nnormal = [0, " + std::to_string(-side) + ", 0]\naxes = [\"y\"]\n";
+  Session session = session_of(lifted_flap("", 0.0005) + sides);
+  const StepResult last = run(session).back();
+  const BodyModel& model = session.model();
+  const MatrixX moved = model.body->contact_displacements(model.patch.nodes, {model.field});
+  for (Eigen::Index c = 0; c < moved.rows(); c += 3)
+    CHECK((moved.col(0).segment<3>(c) - Vector3(0, 0, 0.0005)).norm() < 1e-8);
+  CHECK(last.force.x() > 0.001);
+  CHECK(last.cut->blade.ledger.imbalance() < 0.05);
+}
+
+TEST_CASE("A grasper that lets go while the blade rests in the tissue is free of force, and the blade stays") {
+  const std::string flap = lifted_flap("", 0.002);
+  Session session = session_of(replaced(flap, "shape = \"grasper\"\n", "shape = \"grasper\"\nrelease = 2.4\n") +
+                               "\n[[tool.path]]\ntime = 3\nposition = [-0.03, 0, 0.03]\n");
+  double before = 0;
+  for (const StepSample& sample : session.steps()) {
+    const StepResult result = session.step(sample);
+    if (sample.time > 2 && sample.time < 2.4) {
+      before = result.cut->blade.edge_force;
+      CHECK(result.force.norm() > 1e-3);
+    }
+    if (sample.time > 2.4) {
+      CHECK(result.force.norm() == 0);
+      CHECK(result.cut->blade.edge_force > 0.2 * before); // the flap gives way
+      CHECK(result.cut->blade.edge_force < before);
+    }
+  }
+  CHECK(before > 0);
+}
+
 TEST_CASE("At finite strain, too, what a grasper's pull releases pays for a blade's cut") {
   Session session = session_of(lifted_flap("law = \"neo_hookean\"\n", 0.006));
   double held = 0, area = 0;
