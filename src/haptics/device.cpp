@@ -2,6 +2,7 @@
 
 #include "topology/base/errors.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
@@ -70,6 +71,29 @@ std::string_view device_name(HeldDevice device) {
   return "unknown";
 }
 
+Hands read_hands(Device& first, Device* second, std::uint64_t tick) noexcept {
+  Hands hands(first.read(tick));
+  if (second == nullptr)
+    return hands;
+  DeviceState other = second->read(tick);
+  const auto mode = static_cast<HandMode>(other.mode);
+  if ((mode == HandMode::usual || mode == HandMode::blade) &&
+      hands.first.mode != static_cast<std::uint16_t>(HandMode::blade)) {
+    other.mode = static_cast<std::uint16_t>(HandMode::blade);
+    hands.second = other;
+  }
+  return hands;
+}
+
+DeviceState idle_hand(const DeviceState& other) noexcept {
+  DeviceState idle;
+  idle.tick = other.tick;
+  idle.time = other.time;
+  idle.connected = false;
+  idle.mode = static_cast<std::uint16_t>(HandMode::probe);
+  return idle;
+}
+
 PathPose path_pose(const std::vector<PathPose>& path, double time) noexcept {
   std::size_t low = 0;
   const Leg leg = leg_at(path, time, low);
@@ -85,12 +109,20 @@ std::vector<PathPose> driven_path(const std::vector<StepSample>& steps) {
     if (sample.tool)
       path.push_back(
           {sample.time, sample.tool->point, Eigen::Quaterniond::FromTwoVectors(Vector3::UnitZ(), sample.tool->axis)});
-  if (path.empty())
-    for (const StepSample& sample : steps)
-      if (sample.blade)
-        path.push_back({sample.time, sample.blade->position, sample.blade->orientation});
-  if (path.empty())
+  if (!path.empty())
+    return path;
+  if (std::none_of(steps.begin(), steps.end(), [](const StepSample& sample) { return sample.blade.has_value(); }))
     throw InputError("there is neither tool nor blade for a device to hold");
+  return blade_path(steps);
+}
+
+std::vector<PathPose> blade_path(const std::vector<StepSample>& steps) {
+  std::vector<PathPose> path;
+  for (const StepSample& sample : steps)
+    if (sample.blade)
+      path.push_back({sample.time, sample.blade->position, sample.blade->orientation});
+  if (path.empty())
+    throw InputError("there is no blade for a second device to hold");
   return path;
 }
 

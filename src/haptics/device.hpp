@@ -6,6 +6,7 @@
 // and a device has no clock, it is asked once a tick and answers with the newest it has.
 #pragma once
 
+#include "src/base/possible.hpp"
 #include "src/scenario/haptic_settings.hpp"
 #include "src/scenario/schedule.hpp"
 
@@ -57,6 +58,26 @@ class Device {
   virtual void render(const Vector3& force, const Vector3& /*torque*/) noexcept { apply(force); }
 };
 
+enum class WhichHand : std::uint8_t { first, second };
+
+/// Both hands at a tick of a loop.
+struct Hands {
+  DeviceState first;
+  /// The blade in the other hand, beside the tool in the first; its mode is HandMode::blade. Empty: there is no other
+  /// hand, or it holds nothing.
+  Possible<DeviceState> second;
+
+  Hands() = default;
+  Hands(const DeviceState& one) : first(one) {} // NOLINT(google-explicit-constructor): one hand alone
+};
+
+/// Where both devices are at a tick; `second` (null: there is none) holds the blade in the modes `usual` and `blade`,
+/// unless the first hand has it. To be called as Device::read is.
+Hands read_hands(Device& first, Device* second, std::uint64_t tick) noexcept;
+
+/// A hand that holds nothing, at the tick of another: it feels no force.
+DeviceState idle_hand(const DeviceState& other) noexcept;
+
 /// A pose at a time of a path.
 struct PathPose {
   double time = 0; // s
@@ -71,6 +92,9 @@ PathPose path_pose(const std::vector<PathPose>& path, double time) noexcept;
 /// The way of the tool through the moments of a run, or of the blade when there is no tool. Throws InputError when
 /// there is neither.
 std::vector<PathPose> driven_path(const std::vector<StepSample>& steps);
+
+/// The way of the blade through the moments of a run. Throws InputError when there is none.
+std::vector<PathPose> blade_path(const std::vector<StepSample>& steps);
 
 /// Follows a path whatever the force: an open loop.
 class ScriptedPath : public Device {

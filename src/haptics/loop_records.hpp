@@ -6,6 +6,17 @@
 
 namespace spherecut::app {
 
+/// What a tick did for the second hand, which holds the blade.
+struct SecondHandRecord {
+  DeviceState device;
+  Vector3 force = Vector3::Zero();         // N, on the hand
+  Vector3 tissue = Vector3::Zero();        // N, as TickRecord::tissue
+  Vector3 torque = Vector3::Zero();        // N m, on the hand, about the origin of the blade's frame
+  Vector3 tissue_torque = Vector3::Zero(); // N m, what belongs to `tissue`
+  double energy = 0;                       // J, put in by this hand so far
+  bool limited = false;
+};
+
 /// One tick.
 struct TickRecord {
   DeviceState device;
@@ -22,8 +33,9 @@ struct TickRecord {
   bool limited = false, outside = false, converged = true;
   double softened = 1; // share of the force that was rendered, for the device's stiffness
   int active = 0, rounds = 0;
-  double latency = 0; // s, from when the tick was due to when it began; 0 in virtual time
-  double compute = 0; // s of the thread's processor time; 0 in virtual time
+  double latency = 0;                       // s, from when the tick was due to when it began; 0 in virtual time
+  double compute = 0;                       // s of the thread's processor time; 0 in virtual time
+  Possible<SecondHandRecord> second; // empty: it holds nothing
 };
 
 /// A scheduling event: a solve that began at the pose of one tick and was taken over at another.
@@ -67,6 +79,7 @@ struct LoopRecords {
 };
 
 TickRecord record_of(const DeviceState& device, const TickResult& result, bool arrived) noexcept;
+SecondHandRecord second_record_of(const DeviceState& device, const TickResult& result) noexcept;
 SolveRecord record_of(const SolveEvent& event, const ContactSnapshot& snapshot);
 
 } // namespace spherecut::app

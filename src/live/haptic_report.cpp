@@ -52,6 +52,29 @@ void write_ticks(const std::filesystem::path& file, const LoopRecords& records,
   out.close();
 }
 
+void write_second(const std::filesystem::path& file, const std::vector<TickRecord>& ticks) {
+  OutputFile out(file);
+  std::string text = "tick,time_s,x_m,y_m,z_m,force_x_N,force_y_N,force_z_N,tissue_N,energy_J,limited,torque_x_Nm,"
+                     "torque_y_Nm,torque_z_Nm,tissue_Nm\n";
+  for (const TickRecord& tick : ticks) {
+    if (!tick.second)
+      continue;
+    const SecondHandRecord& hand = *tick.second;
+    const Vector3& x = hand.device.position;
+    text += fmt::format("{},{:.6g},{:.9g},{:.9g},{:.9g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{:.6g},{:.6g},{:.6g},"
+                        "{:.6g}\n",
+                        hand.device.tick, hand.device.time, x.x(), x.y(), x.z(), hand.force.x(), hand.force.y(),
+                        hand.force.z(), hand.tissue.norm(), hand.energy, hand.limited, hand.torque.x(), hand.torque.y(),
+                        hand.torque.z(), hand.tissue_torque.norm());
+    if (text.size() > 1'000'000) {
+      out.write(text);
+      text.clear();
+    }
+  }
+  out.write(text);
+  out.close();
+}
+
 void write_solves(const std::filesystem::path& file, const std::vector<SolveRecord>& solves) {
   OutputFile out(file);
   std::string text =
@@ -206,6 +229,66 @@ ModelError model_error(const std::vector<TickRecord>& ticks, const std::vector<S
   return error;
 }
 
+namespace {
+
+SecondHandFindings second_findings(const std::vector<TickRecord>& ticks) {
+  SecondHandFindings found;
+  const SecondHandRecord* before = nullptr;
+  for (const TickRecord& tick : ticks) {
+    const SecondHandRecord* now = tick.second ? &*tick.second : nullptr;
+    if (now != nullptr) {
+      ++found.ticks;
+      found.peak = std::max(found.peak, now->force.norm());
+      found.peak_torque = std::max(found.peak_torque, now->torque.norm());
+      found.energy = now->energy;
+      found.lowest_energy = std::min(found.lowest_energy, now->energy);
+      found.limited += now->limited ? 1 : 0;
+      if (before != nullptr)
+        found.step = std::max(found.step, (now->force - before->force).norm());
+    }
+    before = now;
+  }
+  return found;
+}
+
+nlohmann::json json_of(const BridgeCounters& bridge) {
+  nlohmann::json json = {{"poses", bridge.poses},  {"clients", bridge.clients}, {"silent", bridge.lost},
+                         {"old", bridge.old},      {"garbage", bridge.garbage}, {"others", bridge.others},
+                         {"unsent", bridge.unsent}};
+  add_pace(json, bridge);
+  return json;
+}
+
+nlohmann::json json_of(const HaplyCounters& haply) {
+  nlohmann::json json = {{"messages", haply.messages},
+                         {"garbage", haply.garbage},
+                         {"poses", haply.poses},
+                         {"silent", haply.lost},
+                         {"connected_again", haply.renewed}};
+  add_pace(json, haply);
+  return json;
+}
+
+/// `hand`: before each line.
+std::string text_of(const std::string& hand, const std::optional<BridgeCounters>& bridge,
+                    const std::optional<HaplyCounters>& haply, double tick_rate) {
+  std::string text;
+  if (bridge)
+    text += fmt::format("{}bridge: {} poses of {} clients, {} of them fell silent; {} packets too old, {} garbage, {} "
+                        "of others; {} forces unsent\n",
+                        hand, bridge->poses, bridge->clients, bridge->lost, bridge->old, bridge->garbage,
+                        bridge->others, bridge->unsent) +
+            rate_text(*bridge, tick_rate);
+  if (haply)
+    text += fmt::format("{}haply: {} messages of the service, {} of them garbage; {} poses taken; {} times silent, "
+                        "connected again {} times\n",
+                        hand, haply->messages, haply->garbage, haply->poses, haply->lost, haply->renewed) +
+            rate_text(*haply, tick_rate);
+  return text;
+}
+
+} // namespace
+
 HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report) {
   HapticFindings findings;
   findings.loop = report;
@@ -249,6 +332,7 @@ HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& re
   findings.solve = percentiles(std::move(solve));
   findings.steps = force_steps(records);
   findings.energy = records.ticks.empty() ? 0 : records.ticks.back().energy;
+  findings.second = second_findings(records.ticks);
   return findings;
 }
 
@@ -292,17 +376,13 @@ std::string text_of(const HapticFindings& f) {
                         f.error.ticks, f.error.rms, f.error.peak > 0 ? 100 * f.error.rms / f.error.peak : 0.0,
                         f.error.peak, f.error.largest);
   text += fmt::format("energy at the port: {:.3g} J put in by the hand, lowest {:.3g} J\n", f.energy, f.lowest_energy);
-  if (f.bridge)
-    text += fmt::format("bridge: {} poses of {} clients, {} of them fell silent; {} packets too old, {} garbage, {} of "
-                        "others; {} forces unsent\n",
-                        f.bridge->poses, f.bridge->clients, f.bridge->lost, f.bridge->old, f.bridge->garbage,
-                        f.bridge->others, f.bridge->unsent) +
-            rate_text(*f.bridge, f.tick_rate);
-  if (f.haply)
-    text += fmt::format("haply: {} messages of the service, {} of them garbage; {} poses taken; {} times silent, "
-                        "connected again {} times\n",
-                        f.haply->messages, f.haply->garbage, f.haply->poses, f.haply->lost, f.haply->renewed) +
-            rate_text(*f.haply, f.tick_rate);
+  text += text_of("", f.bridge, f.haply, f.tick_rate);
+  if (f.second.ticks > 0)
+    text += fmt::format("second hand, with the blade: {} ticks; force: peak {:.4g} N, largest step in a tick {:.3g} N; "
+                        "torque: peak {:.4g} mN m; {} ticks limited; {:.3g} J put in, lowest {:.3g} J\n",
+                        f.second.ticks, f.second.peak, f.second.step, 1e3 * f.second.peak_torque, f.second.limited,
+                        f.second.energy, f.second.lowest_energy);
+  text += text_of("second hand: ", f.second.bridge, f.second.haply, f.tick_rate);
   if (has_clock)
     text += fmt::format("time: ticks {:.3g} s, solves {:.3g} s, {} frames {:.3g} s, of {:.3g} s; {:.3g} s to prepare",
                         f.loop.haptic_cpu_seconds, f.loop.solve_seconds, f.loop.frames, f.loop.viewer_seconds,
@@ -315,6 +395,8 @@ std::string text_of(const HapticFindings& f) {
 void write_haptics(const std::filesystem::path& folder, const LoopRecords& records, const HapticFindings& findings,
                    const std::vector<SolvedForce>& solved) {
   write_ticks(folder / "haptic_ticks.csv", records, solved);
+  if (findings.second.ticks > 0)
+    write_second(folder / "haptic_second.csv", records.ticks);
   write_solves(folder / "haptic_solves.csv", records.solves);
   write_deadlines(folder / "haptic_deadlines.csv", records.ticks);
   const HapticFindings& f = findings;
@@ -358,19 +440,20 @@ void write_haptics(const std::filesystem::path& folder, const LoopRecords& recor
   for (const AccountEntry& entry : account_of(f.blade_account))
     json["blade"][entry.key] = entry.joules;
   if (f.bridge)
-    json["bridge"] = {{"poses", f.bridge->poses},  {"clients", f.bridge->clients}, {"silent", f.bridge->lost},
-                      {"old", f.bridge->old},      {"garbage", f.bridge->garbage}, {"others", f.bridge->others},
-                      {"unsent", f.bridge->unsent}};
-  if (f.bridge)
-    add_pace(json["bridge"], *f.bridge);
-  if (f.haply) {
-    json["haply"] = {{"messages", f.haply->messages},
-                     {"garbage", f.haply->garbage},
-                     {"poses", f.haply->poses},
-                     {"silent", f.haply->lost},
-                     {"connected_again", f.haply->renewed}};
-    add_pace(json["haply"], *f.haply);
-  }
+    json["bridge"] = json_of(*f.bridge);
+  if (f.haply)
+    json["haply"] = json_of(*f.haply);
+  if (f.second.ticks > 0)
+    json["second_hand"] = {{"ticks", f.second.ticks},
+                           {"peak_force_N", f.second.peak},
+                           {"peak_torque_Nm", f.second.peak_torque},
+                           {"largest_step_N", f.second.step},
+                           {"port_energy_J", {{"end", f.second.energy}, {"lowest", f.second.lowest_energy}}},
+                           {"ticks_limited", f.second.limited}};
+  if (f.second.bridge)
+    json["second_hand"]["bridge"] = json_of(*f.second.bridge);
+  if (f.second.haply)
+    json["second_hand"]["haply"] = json_of(*f.second.haply);
   replace_file(folder / "haptic.json", json.dump(2) + "\n");
 }
 

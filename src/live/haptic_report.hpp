@@ -30,6 +30,17 @@ struct ModelError {
 };
 ModelError model_error(const std::vector<TickRecord>& ticks, const std::vector<SolvedForce>& solved);
 
+/// Of the second hand, over the ticks in which it held the blade.
+struct SecondHandFindings {
+  std::size_t ticks = 0;
+  double peak = 0, peak_torque = 0;     // N, N m, on the hand
+  double step = 0;                      // N, largest between two ticks on end
+  double energy = 0, lowest_energy = 0; // J, at its port
+  std::uint64_t limited = 0;            // ticks
+  std::optional<BridgeCounters> bridge; // with that device
+  std::optional<HaplyCounters> haply;   // likewise
+};
+
 struct HapticFindings {
   RealtimeReport loop;
   double rate = 0;       // ticks per second, over the session
@@ -54,6 +65,7 @@ struct HapticFindings {
   int highest_degradation = 0;
   std::optional<BridgeCounters> bridge; // with that device
   std::optional<HaplyCounters> haply;   // likewise
+  SecondHandFindings second;
 };
 HapticFindings findings_of(const HapticSettings& settings, const LoopRecords& records, const RealtimeReport& report);
 
@@ -66,8 +78,8 @@ std::string too_slow_text(double rate);
 /// As lines for a screen.
 std::string text_of(const HapticFindings& findings);
 
-/// haptic_ticks.csv, haptic_solves.csv, haptic_deadlines.csv (histograms of latency and compute time), haptic.json.
-/// Throws InputError when a file cannot be written.
+/// haptic_ticks.csv, haptic_second.csv where a second hand has held the blade, haptic_solves.csv, haptic_deadlines.csv
+/// (histograms of latency and compute time), haptic.json. Throws InputError when a file cannot be written.
 void write_haptics(const std::filesystem::path& folder, const LoopRecords& records, const HapticFindings& findings,
                    const std::vector<SolvedForce>& solved);
 

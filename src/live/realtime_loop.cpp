@@ -1,6 +1,7 @@
 #include "src/live/realtime_loop.hpp"
 
 #include "src/haptics/ring.hpp"
+#include "src/live/second_hand.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/base/interruption.hpp"
 
@@ -48,9 +49,9 @@ constexpr std::size_t solve_slots = 1U << 14U; // waiting for the viewer's threa
 struct Shared {
   explicit Shared(double rate)
       : way(static_cast<std::size_t>(std::ceil(ring_seconds * rate))), ticks(way.slots()), solves(solve_slots) {}
-  TripleBuffer<DeviceState> poses;
-  Ring<DeviceState> way; // the same, every one of them, written before
-  TripleBuffer<ContactSnapshot> snapshots;
+  TripleBuffer<Hands> poses;
+  Ring<Hands> way; // the same, every one of them, written before
+  TripleBuffer<BothSnapshots> snapshots;
   Ring<TickRecord> ticks;   // haptic thread to viewer
   Ring<SolveRecord> solves; // simulation thread to viewer
   std::atomic<bool> stop{false}, done{false};
@@ -62,9 +63,14 @@ bool at_rest(const DeviceState& a, const DeviceState& b) {
          a.buttons == b.buttons;
 }
 
+bool at_rest(const Hands& a, const Hands& b) {
+  return at_rest(a.first, b.first) && a.second.has_value() == b.second.has_value() &&
+         (!a.second || at_rest(*a.second, *b.second));
+}
+
 // The haptic thread: allocates, locks, throws and logs nothing.
-void haptic_thread(const HapticSettings& settings, Device& device, const DeviceState& first, HapticTick& core,
-                   Shared& shared, const RealtimeOptions& options, std::uint64_t count,
+void haptic_thread(const HapticSettings& settings, Device& device, const Hands& first, HapticTick& core,
+                   SecondHand& other, Shared& shared, const RealtimeOptions& options, std::uint64_t count,
                    RealtimeReport& report) noexcept {
   pthread_setname_np(pthread_self(), "haptic"); // so that a profiler finds it
   report.fifo = options.fifo && ask_for_fifo();
@@ -87,18 +93,21 @@ void haptic_thread(const HapticSettings& settings, Device& device, const DeviceS
     while (began < due)
       began = clock_now(CLOCK_MONOTONIC);
     const long long cpu = clock_now(CLOCK_THREAD_CPUTIME_ID);
-    const DeviceState state = tick == 0 ? first : device.read(tick);
-    lost += shared.way.push(state) ? 0 : 1;
-    shared.poses.back() = state;
+    const Hands hands = tick == 0 ? first : read_hands(device, other.device(), tick);
+    const DeviceState& state = hands.first;
+    lost += shared.way.push(hands) ? 0 : 1;
+    shared.poses.back() = hands;
     shared.poses.publish();
     const bool arrives = shared.snapshots.waiting();
     if (arrives) {
       shared.snapshots.fetch();
-      core.arrive(shared.snapshots.front());
+      core.arrive(shared.snapshots.front().first);
+      other.arrive(shared.snapshots.front().second);
     }
     const TickResult result = core.tick(state);
     device.render(result.force, result.torque);
     record = record_of(state, result, arrives);
+    other.tick(hands, record);
     record.latency = 1e-9 * static_cast<double>(began - due);
     record.compute = 1e-9 * static_cast<double>(clock_now(CLOCK_THREAD_CPUTIME_ID) - cpu);
     lost += shared.ticks.push(record) ? 0 : 1;
@@ -117,8 +126,8 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
     static_cast<void>(setpriority(PRIO_PROCESS, 0, options.niceness)); // of this thread alone
   DegradationRule rule(settings.budget);
   std::uint64_t sequence = 0;
-  std::optional<DeviceState> solved; // the last that was
-  bool tearing = false;              // in that
+  std::optional<Hands> solved; // the last that was
+  bool tearing = false;        // in that
   const auto interval = options.most_solves > 0 ? static_cast<long long>(second / options.most_solves) : 0; // ns
   long long next = 0;                                                                                       // solve
   const Session& session = simulation.session();
@@ -128,10 +137,10 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
       std::this_thread::sleep_for(std::chrono::microseconds(50));
       continue;
     }
-    const DeviceState state = shared.poses.front();
-    for (; shared.way.waiting() > 0 && shared.way.front().tick < state.tick; shared.way.pop())
+    const Hands hands = shared.poses.front();
+    for (; shared.way.waiting() > 0 && shared.way.front().first.tick < hands.first.tick; shared.way.pop())
       simulation.pass(shared.way.front());
-    if (!options.solve_at_rest && !tearing && solved && at_rest(state, *solved) && !simulation.body_is_there() &&
+    if (!options.solve_at_rest && !tearing && solved && at_rest(hands, *solved) && !simulation.body_is_there() &&
         !simulation.has_put_off()) {
       feed.offer_again(simulation);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -144,11 +153,12 @@ void solve_on(const HapticSettings& settings, HapticSimulation& simulation, Shar
       continue;
     }
     next = began + (session.pending().under_way ? std::max(interval, second / solves_beside) : interval);
-    solved = state;
-    const SolveEvent event{++sequence,   state.tick, SolveEvent::never, rule.level(), simulation.body_is_there(),
-                           in_background};
-    ContactSnapshot& snapshot = shared.snapshots.back();
-    const SolveRecord record = solve_recording(simulation, state, event, snapshot);
+    solved = hands;
+    const SolveEvent event{++sequence,   hands.first.tick,           SolveEvent::never,
+                           rule.level(), simulation.body_is_there(), in_background};
+    BothSnapshots& snapshots = shared.snapshots.back();
+    const SolveRecord record = solve_recording(simulation, hands, event, snapshots.first,
+                                               options.second != nullptr ? &snapshots.second : nullptr);
     lost += shared.solves.push(record) ? 0 : 1;
     tearing = !record.failed && simulation.tearing();
     if (record.failed)
@@ -224,9 +234,12 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
   const Session& session = simulation.session();
   const topology::ContactQuery query(session.organ().domain->surface());
   HapticTick core(settings, simulation.tool(), &query, session.scenario().tool.has_value());
-  const DeviceState first = device.read(0);
+  SecondHand other(settings, simulation.tool(), query, options.second);
+  if (other.is_there())
+    simulation.require_two_hands();
+  const Hands first = read_hands(device, options.second, 0);
   simulation.prepare(first);
-  core.start(first);
+  core.start(first.first);
   auto shared = std::make_unique<Shared>(settings.rate);
   ViewerFeed own(settings.viewer_rate);
   ViewerFeed& feed = options.feed != nullptr ? *options.feed : own;
@@ -244,7 +257,7 @@ LoopRecords run_realtime(const HapticSettings& settings, HapticSimulation& simul
     const std::stop_callback end(token, [ends] { ends->done.store(true, std::memory_order_release); });
     simulation_thread(settings, simulation, *shared, feed, options, lost_solves, report);
   });
-  std::thread haptic([&] { haptic_thread(settings, device, first, core, *shared, options, ticks, report); });
+  std::thread haptic([&] { haptic_thread(settings, device, first, core, other, *shared, options, ticks, report); });
   Collector collector(*shared, options, records);
   std::exception_ptr failure;
   const auto guarded = [&](const auto& act) {

@@ -25,7 +25,8 @@ struct RealtimeReport {
 };
 
 struct RealtimeOptions {
-  bool fifo = true;   // ask for SCHED_FIFO
+  Device* second = nullptr; // of a second hand, which has the blade; null: there is none
+  bool fifo = true;         // ask for SCHED_FIFO
   double spin = 1e-4; // s before a tick is due from which the thread spins; only with SCHED_FIFO and a second core
   std::function<bool()> stop = [] { return false; };                            // asked by the viewer's thread
   std::function<void(const ViewerFrame&)> view = [](const ViewerFrame&) {};     // on the viewer's thread

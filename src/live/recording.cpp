@@ -7,6 +7,7 @@
 #include "topology/base/regular_file.hpp"
 #include "topology/wound/wound.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -19,9 +20,10 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "recordings are written as they lie in memory");
 
 constexpr std::string_view signature = "SPHCREC\n";
-constexpr std::uint32_t header_lot = 1, tick_lot = 2, solve_lot = 3, end_lot = 4, client_lot = 5;
+constexpr std::uint32_t header_lot = 1, tick_lot = 2, solve_lot = 3, end_lot = 4, client_lot = 5, second_lot = 6,
+                        second_client_lot = 7;
 constexpr std::size_t lot_head = 16; // kind, size of the payload, its checksum
-constexpr std::size_t tick_size = 136, solve_size = 88, client_size = 56;
+constexpr std::size_t tick_size = 136, solve_size = 88, client_size = 56, second_size = 128;
 constexpr std::size_t torque_size = 24; // of a tick and of a solve, from version 2 on
 constexpr std::size_t lot_of_ticks = 256;
 constexpr std::uint32_t longest_lot = 64U << 20U;
@@ -53,6 +55,30 @@ void put(std::string& bytes, const Vector3& v) {
 void put_text(std::string& bytes, std::string_view text) {
   put(bytes, static_cast<std::uint32_t>(text.size()));
   bytes.append(text);
+}
+
+void put_hand(std::string& bytes, const DeviceState& device, const Vector3& force) {
+  put(bytes, device.tick);
+  put(bytes, device.time);
+  put(bytes, device.position);
+  for (int i = 0; i < 4; ++i)
+    put(bytes, device.orientation.coeffs()[i]);
+  put(bytes, force);
+  put(bytes, device.connected ? connected : 0U);
+  put(bytes, device.mode);
+  put(bytes, device.buttons);
+}
+
+/// Where there is more to tell than the pose.
+void put_client(std::string& bytes, const DeviceState& device) {
+  const ClientReading& client = device.client;
+  if (!(client.period > 1) && !(client.share < 1))
+    return;
+  put(bytes, device.tick);
+  put(bytes, client.position);
+  put(bytes, client.period);
+  put(bytes, client.share);
+  put(bytes, static_cast<std::uint64_t>(client.fresh ? 1 : 0));
 }
 
 /// Reads values from a lot, and throws rather than past its end.
@@ -111,12 +137,9 @@ RecordingHeader header_of(Reader& in) {
   return header;
 }
 
-RecordedTick tick_of(Reader& in, std::uint32_t version, std::size_t expected) {
-  RecordedTick tick;
-  DeviceState& device = tick.device;
-  device.tick = in.get<std::uint64_t>();
-  if (device.tick != expected)
-    in.fail(fmt::format("tick {} where tick {} should be", device.tick, expected));
+// Pose, force, and what the hand does.
+void read_hand(Reader& in, RecordedHand& hand) {
+  DeviceState& device = hand.device;
   device.time = in.number();
   device.position = in.vector();
   if (!(device.position.cwiseAbs().maxCoeff() <= farthest))
@@ -125,14 +148,36 @@ RecordedTick tick_of(Reader& in, std::uint32_t version, std::size_t expected) {
     device.orientation.coeffs()[i] = in.number();
   if (std::abs(device.orientation.norm() - 1) > 1e-6)
     in.fail(fmt::format("an orientation of length {:g}; allowed: 1", device.orientation.norm()));
-  tick.force = in.vector();
+  hand.force = in.vector();
   device.connected = (in.get<std::uint32_t>() & connected) != 0;
   device.mode = in.get<std::uint16_t>();
   device.buttons = in.get<std::uint16_t>();
+}
+
+RecordedTick tick_of(Reader& in, std::uint32_t version, std::size_t expected) {
+  RecordedTick tick;
+  tick.device.tick = in.get<std::uint64_t>();
+  if (tick.device.tick != expected)
+    in.fail(fmt::format("tick {} where tick {} should be", tick.device.tick, expected));
+  read_hand(in, tick);
   tick.sequence = in.get<std::uint64_t>();
   if (version > 1)
     tick.torque = in.vector();
   return tick;
+}
+
+/// Those of a session that was killed may be of ticks that are missing.
+RecordedHand second_of(Reader& in, const std::vector<RecordedHand>& before) {
+  RecordedHand hand;
+  hand.device.tick = in.get<std::uint64_t>();
+  if (!before.empty() && hand.device.tick <= before.back().device.tick)
+    in.fail(fmt::format("tick {} of the second hand after its tick {}", hand.device.tick, before.back().device.tick));
+  read_hand(in, hand);
+  hand.torque = in.vector();
+  if (hand.device.mode != static_cast<std::uint16_t>(HandMode::blade))
+    in.fail(fmt::format("a second hand in mode {}; allowed: {}, the blade", hand.device.mode,
+                        static_cast<std::uint16_t>(HandMode::blade)));
+  return hand;
 }
 
 /// What is known of a client at a tick that has more to tell than its pose.
@@ -159,6 +204,17 @@ void set_clients(Recording& recording, const std::vector<RecordedClient>& client
   for (const RecordedClient& client : clients)
     if (client.tick < recording.ticks.size())
       recording.ticks[client.tick].device.client = client.reading;
+}
+
+/// Likewise.
+void set_second(Recording& recording, const std::vector<RecordedHand>& hands,
+                const std::vector<RecordedClient>& clients) {
+  for (const RecordedHand& hand : hands)
+    if (hand.device.tick < recording.ticks.size())
+      recording.ticks[hand.device.tick].second = hand;
+  for (const RecordedClient& client : clients)
+    if (client.tick < recording.ticks.size() && recording.ticks[client.tick].second)
+      recording.ticks[client.tick].second->device.client = client.reading;
 }
 
 SolveRecord solve_of(Reader& in, std::uint32_t version, const std::vector<SolveRecord>& before) {
@@ -254,23 +310,14 @@ void RecordingWriter::write(std::uint32_t kind, std::string& payload) {
 
 void RecordingWriter::add(const TickRecord& tick) {
   const DeviceState& device = tick.device;
-  put(ticks_, device.tick);
-  put(ticks_, device.time);
-  put(ticks_, device.position);
-  for (int i = 0; i < 4; ++i)
-    put(ticks_, device.orientation.coeffs()[i]);
-  put(ticks_, tick.force);
-  put(ticks_, device.connected ? connected : 0U);
-  put(ticks_, device.mode);
-  put(ticks_, device.buttons);
+  put_hand(ticks_, device, tick.force);
   put(ticks_, tick.sequence);
   put(ticks_, tick.torque);
-  if (const ClientReading& client = device.client; client.period > 1 || client.share < 1) {
-    put(clients_, device.tick);
-    put(clients_, client.position);
-    put(clients_, client.period);
-    put(clients_, client.share);
-    put(clients_, static_cast<std::uint64_t>(client.fresh ? 1 : 0));
+  put_client(clients_, device);
+  if (tick.second) {
+    put_hand(seconds_, tick.second->device, tick.second->force);
+    put(seconds_, tick.second->torque);
+    put_client(second_clients_, tick.second->device);
   }
   ++tick_count_;
   if (ticks_.size() >= lot_of_ticks * tick_size)
@@ -295,6 +342,8 @@ void RecordingWriter::add(const SolveRecord& solve) {
 void RecordingWriter::flush() {
   write(solve_lot, solves_);
   write(client_lot, clients_);
+  write(second_lot, seconds_);
+  write(second_client_lot, second_clients_);
   write(tick_lot, ticks_);
 }
 
@@ -323,7 +372,8 @@ Recording read_recording(const std::filesystem::path& file) {
            fmt::format("a recording of format {}; this program reads 1 to {}", recording.version, recording_version));
   static_cast<void>(start.get<std::uint32_t>());
   const std::size_t torque = recording.version > 1 ? 0 : torque_size; // that is not there
-  std::vector<RecordedClient> clients;
+  std::vector<RecordedClient> clients, second_clients;
+  std::vector<RecordedHand> seconds;
   bool named = false;
   for (std::size_t at = signature.size() + 8; at < bytes.size();) {
     Reader head(std::string_view(bytes).substr(at), file, at);
@@ -335,8 +385,8 @@ Recording read_recording(const std::filesystem::path& file) {
     const auto kind = head.get<std::uint32_t>();
     const auto size = head.get<std::uint32_t>();
     const auto sum = head.get<std::uint64_t>();
-    if (kind < header_lot || kind > client_lot || size > longest_lot || recording.finished ||
-        named == (kind == header_lot))
+    if (kind < header_lot || kind > (recording.version > 2 ? second_client_lot : client_lot) || size > longest_lot ||
+        recording.finished || named == (kind == header_lot))
       refuse(at, fmt::format("a lot of kind {} with {} bytes does not belong here", kind, size));
     if (head.left() < size)
       cut_off();
@@ -354,6 +404,10 @@ Recording read_recording(const std::filesystem::path& file) {
       recording.solves.push_back(solve_of(in, recording.version, recording.solves));
     while (kind == client_lot && in.left() >= client_size)
       clients.push_back(client_of(in));
+    while (kind == second_client_lot && in.left() >= client_size)
+      second_clients.push_back(client_of(in));
+    while (kind == second_lot && in.left() >= second_size)
+      seconds.push_back(second_of(in, seconds));
     if (in.left() != 0)
       in.fail(fmt::format("{} bytes too many in a lot of kind {}", in.left(), kind));
     named = true;
@@ -364,17 +418,24 @@ Recording read_recording(const std::filesystem::path& file) {
     refuse(bytes.size(), "the file is cut off here, before anything was recorded");
   set_arrivals(recording, file);
   set_clients(recording, clients);
+  set_second(recording, seconds, second_clients);
   return recording;
 }
 
-RecordedMotion::RecordedMotion(const Recording& recording, double rate) : rate_(rate) {
+bool Recording::has_second() const {
+  return std::any_of(ticks.begin(), ticks.end(), [](const RecordedTick& tick) { return tick.second.has_value(); });
+}
+
+RecordedMotion::RecordedMotion(const Recording& recording, double rate, WhichHand hand) : rate_(rate) {
   if (recording.ticks.empty())
     throw InputError("a recording without ticks is no motion; allowed: one tick or more");
   if (recording.header.rate != rate)
     throw InputError(fmt::format("a recording of {:g} ticks per second in a loop of {:g}; allowed: haptics.rate = {:g}",
                                  recording.header.rate, rate, recording.header.rate));
   for (const RecordedTick& tick : recording.ticks)
-    states_.push_back(tick.device);
+    states_.push_back(hand == WhichHand::first ? tick.device
+                      : tick.second            ? tick.second->device
+                                               : idle_hand(tick.device));
 }
 
 DeviceState RecordedMotion::read(std::uint64_t tick) noexcept {

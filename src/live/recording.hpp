@@ -10,8 +10,8 @@
 
 namespace spherecut::app {
 
-/// Written. Read are all from 1 on; torques came with 2.
-inline constexpr std::uint32_t recording_version = 2;
+/// Written. Read are all from 1 on; torques came with 2, a second hand with 3.
+inline constexpr std::uint32_t recording_version = 3;
 
 /// What a recording is of.
 struct RecordingHeader {
@@ -43,16 +43,21 @@ class RecordingWriter {
  private:
   void write(std::uint32_t kind, std::string& payload);
   OutputFile file_;
-  std::string ticks_, solves_, clients_;
+  std::string ticks_, solves_, clients_, seconds_, second_clients_;
   std::uint64_t tick_count_ = 0, solve_count_ = 0;
 };
 
-/// A tick as recorded.
-struct RecordedTick {
+/// What a hand did and felt at a tick.
+struct RecordedHand {
   DeviceState device;
   Vector3 force = Vector3::Zero();  // N, on the hand
   Vector3 torque = Vector3::Zero(); // N m, on the hand; zero in version 1
-  std::uint64_t sequence = 0;       // of the snapshot in use
+};
+
+/// A tick as recorded.
+struct RecordedTick : RecordedHand {
+  std::uint64_t sequence = 0;           // of the snapshot in use
+  std::optional<RecordedHand> second{}; // of the second hand, with the blade; empty: it holds nothing
 };
 
 struct Recording {
@@ -61,6 +66,9 @@ struct Recording {
   std::vector<RecordedTick> ticks;
   std::vector<SolveRecord> solves; // event, failed, resprinkled, cut_triangles, nodes, topology, force, torque
   bool finished = false;           // false: the session was killed; everything up to its last lot is here
+
+  /// Whether a second hand has held the blade.
+  [[nodiscard]] bool has_second() const;
 };
 
 /// Throws InputError, naming the place, when the file is not a recording, of a newer version, cut off within a lot,
@@ -71,7 +79,7 @@ Recording read_recording(const std::filesystem::path& file);
 class RecordedMotion : public Device {
  public:
   /// Throws InputError when the recording is empty or of another rate.
-  RecordedMotion(const Recording& recording, double rate);
+  RecordedMotion(const Recording& recording, double rate, WhichHand hand = WhichHand::first);
   DeviceState read(std::uint64_t tick) noexcept override;
   void apply(const Vector3& /*force*/) noexcept override {}
 

@@ -24,13 +24,20 @@ bool same_solve(const SolveRecord& a, const SolveRecord& b, bool torques) {
          (!torques || same_bits(a.torque, b.torque));
 }
 
+bool same_second(const TickRecord& now, const RecordedTick& then) {
+  if (!now.second || !then.second)
+    return now.second.has_value() == then.second.has_value();
+  return same_bits(now.second->force, then.second->force) && same_bits(now.second->torque, then.second->torque);
+}
+
 } // namespace
 
 std::string text_of(const ReplayReport& r) {
   std::string text = fmt::format("replay of {} ticks and {} solves: ", r.ticks, r.solves);
   if (r.same())
-    text += r.torques ? "forces, torques and topology are the same, bit by bit"
-                      : "forces and topology are the same, bit by bit; this recording has no torques";
+    text += r.two_hands ? "forces and torques of both hands and topology are the same, bit by bit"
+            : r.torques ? "forces, torques and topology are the same, bit by bit"
+                        : "forces and topology are the same, bit by bit; this recording has no torques";
   if (r.differing_tick)
     text += fmt::format("force or torque first differ at tick {}, in {} ticks altogether, by up to {:.3g} N and {:.3g} "
                         "N m",
@@ -65,12 +72,16 @@ ReplayReport replay(const Recording& recording, HapticSimulation& simulation, Lo
     if (solve.event.pose_tick < recording.ticks.size())
       events.push_back(solve.event);
   RecordedMotion device(recording, recording.header.rate);
+  RecordedMotion second(recording, recording.header.rate, WhichHand::second);
   VirtualOptions options;
+  if (recording.has_second())
+    options.second = &second;
   options.stop = stop;
   records = run_virtual(session.scenario().haptics, simulation, device, events, recording.ticks.size(), options);
   ReplayReport report;
   report.ticks = records.ticks.size();
   report.torques = recording.version > 1;
+  report.two_hands = recording.has_second();
   report.solves = std::min(records.solves.size(), events.size());
   report.same_build = recording.header.build == build_identity();
   report.same_processor = recording.header.processor == processor_name();
@@ -78,13 +89,18 @@ ReplayReport replay(const Recording& recording, HapticSimulation& simulation, Lo
     const TickRecord& now = records.ticks[i];
     const RecordedTick& then = recording.ticks[i];
     const bool turned = report.torques && !same_bits(now.torque, then.torque);
-    if (same_bits(now.force, then.force) && now.sequence == then.sequence && !turned)
+    const bool other = !same_second(now, then);
+    if (same_bits(now.force, then.force) && now.sequence == then.sequence && !turned && !other)
       continue;
     report.differing_tick = report.differing_tick.value_or(i);
     ++report.differing_ticks;
     report.largest = std::max(report.largest, (now.force - then.force).norm());
     if (report.torques)
       report.largest_torque = std::max(report.largest_torque, (now.torque - then.torque).norm());
+    if (other && now.second && then.second) {
+      report.largest = std::max(report.largest, (now.second->force - then.second->force).norm());
+      report.largest_torque = std::max(report.largest_torque, (now.second->torque - then.second->torque).norm());
+    }
   }
   for (std::size_t i = 0; i < report.solves && !report.differing_solve; ++i)
     if (!same_solve(records.solves[i], recording.solves[i], report.torques))

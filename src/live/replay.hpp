@@ -6,9 +6,8 @@
 
 namespace spherecut::app {
 
-/// What a replay found. Forces and, where the recording has them, torques are compared by their bits, at every tick; of
-/// solves these, the nodes, the hash of
-/// the topology, and whether they failed.
+/// What a replay found. Forces and, where the recording has them, torques are compared by their bits, at every tick and
+/// for both hands; of solves these, the nodes, the hash of the topology, and whether they failed.
 struct ReplayReport {
   std::size_t ticks = 0, solves = 0; // compared
   std::optional<std::uint64_t> differing_tick;
@@ -17,6 +16,7 @@ struct ReplayReport {
   double largest = 0;        // N, of the differences between forces on the hand
   double largest_torque = 0; // N m, likewise
   bool torques = true;       // recorded
+  bool two_hands = false;    // a second hand has held the blade
   bool same_build = true, same_processor = true;
   [[nodiscard]] bool same() const { return !differing_tick && !differing_solve; }
 };

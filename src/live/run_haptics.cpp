@@ -84,7 +84,74 @@ std::unique_ptr<Device> make_device(const HapticSettings& settings, const Haptic
   return make_device(settings, simulation.path());
 }
 
+std::unique_ptr<Device> make_second_device(const HapticSettings& settings, const HapticSimulation& simulation) {
+  if (settings.device == HeldDevice::recording) {
+    const Recording recording = read_recording(settings.recording);
+    if (!recording.has_second())
+      return nullptr;
+    return std::make_unique<RecordedMotion>(recording, settings.rate, WhichHand::second);
+  }
+  if (!settings.second)
+    return nullptr;
+  HapticSettings own = settings;
+  own.device = settings.second->device;
+  own.bridge = settings.second->bridge;
+  own.haply = settings.second->haply;
+  return make_device(own, simulation.second_path());
+}
+
 namespace {
+
+/// A device of real hardware, and what is said of it while it runs.
+class WatchedDevice {
+ public:
+  /// `hand`: before what is said; empty where there is one hand. `haply`: of that device.
+  WatchedDevice(const Device* device, std::string hand, const HaplySettings& haply)
+      : bridge_(dynamic_cast<const BridgeDevice*>(device)), haply_(dynamic_cast<const HaplyDevice*>(device)),
+        hand_(std::move(hand)), settings_(haply) {}
+
+  void say_where(const std::string& address, Progress& progress) const {
+    if (bridge_ != nullptr)
+      progress.say(fmt::format("{}bridge at {} port {}", hand_, address, bridge_->port()));
+    if (haply_ != nullptr)
+      progress.say(fmt::format("{}Inverse3 {} at {}", hand_, haply_->device_id(), settings_.address));
+  }
+
+  /// What has changed since the last time.
+  void say_changes(Progress& progress) {
+    if (haply_ != nullptr)
+      if (const HaplyLink link = haply_->link(); link != linked_) {
+        linked_ = link;
+        progress.say(hand_ + link_text(link, settings_));
+      }
+    const PaceReading pace = bridge_ != nullptr ? bridge_->pace() : haply_ != nullptr ? haply_->pace() : PaceReading{};
+    if (pace.kind == told_)
+      return;
+    told_ = pace.kind;
+    if (bridge_ != nullptr || told_ != PaceKind::unknown) // of an Inverse3 its link tells more
+      progress.say(hand_ + pace_text(pace, bridge_ != nullptr ? "bridge: the client" : "haply: the service"));
+  }
+
+  void count(std::optional<BridgeCounters>& bridge, std::optional<HaplyCounters>& haply) const {
+    if (bridge_ != nullptr)
+      bridge = bridge_->counters();
+    if (haply_ != nullptr)
+      haply = haply_->counters();
+  }
+
+ private:
+  const BridgeDevice* bridge_;
+  const HaplyDevice* haply_;
+  std::string hand_;
+  HaplySettings settings_;
+  PaceKind told_ = PaceKind::unknown;
+  HaplyLink linked_ = HaplyLink::streams;
+};
+
+/// What both hands hold.
+struct HeldDevices {
+  std::unique_ptr<Device> first, second; // second null: there is none
+};
 
 /// A session and what it left behind.
 struct HapticRun {
@@ -105,11 +172,13 @@ LoopRecords run_solving(const HapticSettings& settings, HapticSimulation& simula
 }
 
 LoopRecords run_loop(const HapticCommand& command, const HapticSettings& settings, HapticSimulation& simulation,
-                     Device& device, const InterruptWatch& watch, HapticRun& run, Progress& progress) {
+                     const HeldDevices& devices, const InterruptWatch& watch, HapticRun& run, Progress& progress) {
+  Device& device = *devices.first;
   const auto stop = [&watch] { return watch.interrupted(); };
   if (command.in_virtual_time) {
     VirtualOptions options;
     options.stop = stop;
+    options.second = devices.second.get();
     run.recorder->listen(options);
     const std::uint64_t ticks = ticks_of(settings, command.duration);
     LoopRecords records = run_solving(settings, simulation, device, ticks, options);
@@ -118,27 +187,15 @@ LoopRecords run_loop(const HapticCommand& command, const HapticSettings& setting
   }
   progress.say(
       fmt::format("{:g} s at {:g} ticks/s, model {}", command.duration, settings.rate, to_string(settings.model)));
-  const auto* bridge = dynamic_cast<const BridgeDevice*>(&device);
-  const auto* haply = dynamic_cast<const HaplyDevice*>(&device);
-  if (bridge != nullptr)
-    progress.say(fmt::format("bridge at {} port {}", settings.bridge.address, bridge->port()));
-  if (haply != nullptr)
-    progress.say(fmt::format("Inverse3 {} at {}", haply->device_id(), settings.haply.address));
+  WatchedDevice first(&device, devices.second != nullptr ? "first hand: " : "", settings.haply);
+  WatchedDevice second(devices.second.get(), "second hand: ", settings.second.value_or(SecondDevice{}).haply);
+  first.say_where(settings.bridge.address, progress);
+  second.say_where(settings.second.value_or(SecondDevice{}).bridge.address, progress);
   RealtimeOptions options;
-  PaceKind told = PaceKind::unknown;
-  HaplyLink linked = HaplyLink::streams;
+  options.second = devices.second.get();
   options.stop = [&] { // asked now and then by the viewer's thread, which may say what it sees
-    if (haply != nullptr)
-      if (const HaplyLink link = haply->link(); link != linked) {
-        linked = link;
-        progress.say(link_text(link, settings.haply));
-      }
-    const PaceReading pace = bridge != nullptr ? bridge->pace() : haply != nullptr ? haply->pace() : PaceReading{};
-    if (pace.kind != told) {
-      told = pace.kind;
-      if (bridge != nullptr || told != PaceKind::unknown) // of an Inverse3 its link tells more
-        progress.say(pace_text(pace, bridge != nullptr ? "bridge: the client" : "haply: the service"));
-    }
+    first.say_changes(progress);
+    second.say_changes(progress);
     return watch.interrupted();
   };
   if (run.recorder)
@@ -161,9 +218,14 @@ RunEnd say_nothing_was_run(const HapticCommand& command, const HapticSettings& s
 
 // Real hardware has the clock's time.
 void require_clock(const HapticCommand& command, const HapticSettings& settings) {
-  if (command.in_virtual_time && (settings.device == HeldDevice::bridge || settings.device == HeldDevice::haply))
-    throw InputError(fmt::format("haptics.device = \"{}\" cannot follow virtual time; allowed: without --virtual",
-                                 device_name(settings.device)));
+  const auto require = [&](HeldDevice device, const char* key) {
+    if (command.in_virtual_time && (device == HeldDevice::bridge || device == HeldDevice::haply))
+      throw InputError(
+          fmt::format("{} = \"{}\" cannot follow virtual time; allowed: without --virtual", key, device_name(device)));
+  };
+  require(settings.device, "haptics.device");
+  if (settings.second)
+    require(settings.second->device, "haptics.second.device");
 }
 
 // A simulated device does its four manoeuvres in virtual time; a real one as somebody does them, for so long each.
@@ -183,18 +245,18 @@ RunEnd run_bench(const HapticCommand& command, const InterruptWatch& watch, Prog
     for (const Manoeuvre& manoeuvre : bench_manoeuvres(settings)) {
       interruption_point();
       HapticSimulation simulation(manoeuvre.scenario);
-      const std::unique_ptr<Device> device = make_device(settings, manoeuvre.path);
+      const HeldDevices devices{make_device(settings, manoeuvre.path), nullptr};
       if (!claim)
         claim = claim_results_folder(command.out);
       LoopRecords records;
       if (simulated) {
         VirtualOptions options;
         options.stop = [&watch] { return watch.interrupted(); };
-        records = run_solving(settings, simulation, *device, ticks_of(settings, manoeuvre.seconds), options);
+        records = run_solving(settings, simulation, *devices.first, ticks_of(settings, manoeuvre.seconds), options);
       } else {
         progress.say(fmt::format("{}, {:g} s: {}", manoeuvre.name, command.duration, manoeuvre.asks));
         HapticRun run; // without a recorder
-        records = run_loop(command, settings, simulation, *device, watch, run, progress);
+        records = run_loop(command, settings, simulation, devices, watch, run, progress);
       }
       interruption_point();
       results.push_back({manoeuvre.name, bench_figures(bench_series(settings, records), manoeuvre.holds)});
@@ -236,15 +298,15 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   require_clock(command, settings);
   HapticRun run;
   std::unique_ptr<HapticSimulation> made;
-  std::unique_ptr<Device> device;
+  HeldDevices devices;
   LoopRecords records;
   try {
     interruption_point();
     made = std::make_unique<HapticSimulation>(scenario);
-    device = make_device(settings, *made);
+    devices = {make_device(settings, *made), make_second_device(settings, *made)};
     run.claim = claim_results_folder(command.out);
     run.recorder = std::make_unique<Recorder>(command.out, *made);
-    records = run_loop(command, settings, *made, *device, watch, run, progress);
+    records = run_loop(command, settings, *made, devices, watch, run, progress);
     run.recorder->finish(run.report.lost);
   } catch (const Interrupted&) {
     return say_nothing_was_run(command, settings, watch, run, progress);
@@ -253,13 +315,10 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   const HapticSimulation& simulation = *made;
   if (records.ticks.empty() && report.stopped)
     return say_nothing_was_run(command, settings, watch, run, progress);
-  const auto* bridge = dynamic_cast<const BridgeDevice*>(device.get());
   HapticFindings findings = findings_of(settings, records, report);
   findings.unfollowed = simulation.session().pending().lags;
-  if (bridge != nullptr)
-    findings.bridge = bridge->counters();
-  if (const auto* haply = dynamic_cast<const HaplyDevice*>(device.get()))
-    findings.haply = haply->counters();
+  WatchedDevice(devices.first.get(), "", {}).count(findings.bridge, findings.haply);
+  WatchedDevice(devices.second.get(), "", {}).count(findings.second.bridge, findings.second.haply);
   std::vector<SolvedForce> solved;
   bool is_cut_short = false; // the session is complete, what follows it is not
   if (command.solved_stride > 0 && (scenario.tool || simulation.session().blade() != nullptr) && !report.stopped) {

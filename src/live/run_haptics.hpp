@@ -24,5 +24,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen);
 /// read_recording, BridgeDevice and HaplyDevice.
 std::unique_ptr<Device> make_device(const HapticSettings& settings, const std::vector<PathPose>& path);
 std::unique_ptr<Device> make_device(const HapticSettings& settings, const HapticSimulation& simulation);
+/// That of a second hand, on the path of the blade; null: there is none. Throws as make_device.
+std::unique_ptr<Device> make_second_device(const HapticSettings& settings, const HapticSimulation& simulation);
 
 } // namespace spherecut::app

@@ -8,6 +8,7 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <fmt/format.h>
 #include <utility>
 
 namespace spherecut::app {
@@ -77,28 +78,39 @@ const topology::ToolShape& HapticSimulation::tool() const {
   return session_.scenario().tool ? session_.scenario().tool->shape : none;
 }
 
-StepSample HapticSimulation::sample(const DeviceState& device) const {
+StepSample HapticSimulation::sample(const Hands& hands) const {
   const Scenario& scenario = session_.scenario();
+  const DeviceState& device = hands.first;
   StepSample sample{device.time, std::nullopt, std::nullopt};
   const auto mode = static_cast<HandMode>(device.mode);
+  const auto blade_of = [&](const DeviceState& hand) {
+    return topology::BladePose{device.time, hand.position, hand.orientation};
+  };
   if (mode == HandMode::blade) {
     sample.tool = parked_;
     if (scenario.blade)
-      sample.blade = topology::BladePose{device.time, device.position, device.orientation};
-  } else if (mode == HandMode::probe || mode == HandMode::grasper) {
-    sample.tool = scenario.tool ? std::optional(tool_pose(scenario.tool->shape, device)) : std::nullopt;
+      sample.blade = blade_of(device);
   } else if (scenario.tool) {
     sample.tool = tool_pose(scenario.tool->shape, device);
-    if (scenario.blade) {
+    if (hands.second && scenario.blade) {
+      sample.blade = blade_of(*hands.second);
+    } else if (mode == HandMode::usual && scenario.blade) {
       double time = device.time;
       if (const double end = scenario.blade->path.back().time; solved_before(end)) // to there, whenever it is solved
         time = std::min(time, end);
       sample.blade = blade_pose(*scenario.blade, time);
     }
-  } else {
-    sample.blade = topology::BladePose{device.time, device.position, device.orientation};
+  } else if (mode == HandMode::usual) {
+    sample.blade = blade_of(device);
   }
   return sample;
+}
+
+void HapticSimulation::require_two_hands() const {
+  const Scenario& scenario = session_.scenario();
+  if (!scenario.tool || !scenario.blade)
+    throw InputError(fmt::format("{}: a second hand, but no {}; allowed: with [tool] and [blade]",
+                                 scenario.file.string(), scenario.tool ? "[blade]" : "[tool]"));
 }
 
 bool HapticSimulation::holds_blade() const {
@@ -123,33 +135,37 @@ void HapticSimulation::set_following_in_background(bool on) {
   session_.set_options(options);
 }
 
-void HapticSimulation::prepare(const DeviceState& device) {
-  session_.prepare(sample(device));
+void HapticSimulation::prepare(const Hands& hands) {
+  session_.prepare(sample(hands));
 }
 
-void HapticSimulation::pass(const DeviceState& device) {
+void HapticSimulation::pass(const Hands& hands) {
+  const DeviceState& device = hands.first;
+  const DeviceState& holder = hands.second.value_or(device);
   if (!session_.scenario().blade || !last_time_ || device.tick <= last_tick_ ||
-      static_cast<HandMode>(device.mode) != mode_ || !device.position.allFinite() ||
-      !device.orientation.coeffs().allFinite())
+      static_cast<HandMode>(device.mode) != mode_ || hands.second.has_value() != has_second_ ||
+      !holder.position.allFinite() || !holder.orientation.coeffs().allFinite())
     return;
-  const std::optional<topology::BladePose> pose = sample(device).blade;
+  const std::optional<topology::BladePose> pose = sample(hands).blade;
   const std::optional<topology::BladePose> last = passed_.empty() ? session_.last_blade() : passed_.back();
   if (pose && last && pose->time > last->time &&
       edge_travel(session_.scenario().blade->edge, *last, *pose) > pass_distance * session_.zone().spacing.fine)
     passed_.push_back(*pose);
 }
 
-void HapticSimulation::solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot) {
+void HapticSimulation::solve(const Hands& hands, int degradation, ContactSnapshot& snapshot, ContactSnapshot* second) {
   const auto start = std::chrono::steady_clock::now();
+  const DeviceState& device = hands.first;
   std::vector<topology::BladePose> passed = std::exchange(passed_, {});
   last_tick_ = device.tick;
   if (degradation != degradation_) {
     session_.coarsen(std::pow(coarse_per_level, degradation));
     degradation_ = degradation;
   }
-  if (const auto mode = static_cast<HandMode>(device.mode); mode != mode_) {
+  if (const auto mode = static_cast<HandMode>(device.mode); mode != mode_ || hands.second.has_value() != has_second_) {
     session_.lift_blade();
     mode_ = mode;
+    has_second_ = hands.second.has_value();
     passed.clear();
   }
   if (mode_ != HandMode::usual) {
@@ -157,8 +173,25 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
     options.grip = mode_ == HandMode::grasper && (device.buttons & 1U) != 0;
     session_.set_options(options);
   }
-  result_ = session_.step(sample(device), std::move(passed));
+  result_ = session_.step(sample(hands), std::move(passed));
   last_time_ = device.time;
+  fill_tool(snapshot);
+  if (holds_blade())
+    fill_blade(device, snapshot);
+  fill_common(device, snapshot);
+  if (second != nullptr) {
+    const DeviceState other = hands.second.value_or(idle_hand(device));
+    if (hands.second)
+      fill_blade(other, *second);
+    else
+      clear(*second);
+    fill_common(other, *second);
+  }
+  snapshot.solve_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// What presses or grasps, as if the first hand held it.
+void HapticSimulation::fill_tool(ContactSnapshot& snapshot) {
   const BodyModel& model = session_.model();
   snapshot.friction = session_.scenario().contact.friction;
   const solvers::ContactCondition condition =
@@ -168,26 +201,35 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
     snapshot.pose = result_.pose;
     snapshot.contact = result_.contact;
     snapshot.condition = condition;
-  } else {
-    const bool lips = model.lips && std::any_of(model.state->lips.closed.begin(), model.state->lips.closed.end(),
-                                                [](char closed) { return closed != 0; });
-    if (lips)
-      fill(solvers::held_patch(model.patch, *model.lips, model.state->lips.closed), model.state->tool, result_.contact,
-           condition, condensed_, snapshot);
-    else
-      fill(model.patch, model.state->tool, result_.contact, condition, condensed_, snapshot);
-    condensed_ = snapshot.condensed;
+    return;
   }
-  if (holds_blade()) {
-    clear(snapshot);
-    snapshot.pose.point = device.position;
-    snapshot.orientation = device.orientation;
-    if (session_.blade() != nullptr) {
-      snapshot.blade = session_.blade()->grip(model);
-      snapshot.force = snapshot.blade.force;
-      snapshot.torque = snapshot.blade.torque;
-    }
+  const bool lips = model.lips && std::any_of(model.state->lips.closed.begin(), model.state->lips.closed.end(),
+                                              [](char closed) { return closed != 0; });
+  if (lips)
+    fill(solvers::held_patch(model.patch, *model.lips, model.state->lips.closed), model.state->tool, result_.contact,
+         condition, condensed_, snapshot);
+  else
+    fill(model.patch, model.state->tool, result_.contact, condition, condensed_, snapshot);
+  condensed_ = snapshot.condensed;
+  if (session_.grasps()) { // its force is held until the next solve: that with the blade beside it
+    snapshot.force = result_.force;
+    snapshot.torque = result_.torque;
   }
+}
+
+// The blade in the hand.
+void HapticSimulation::fill_blade(const DeviceState& device, ContactSnapshot& snapshot) const {
+  clear(snapshot);
+  snapshot.pose.point = device.position;
+  snapshot.orientation = device.orientation;
+  if (session_.blade() == nullptr)
+    return;
+  snapshot.blade = session_.blade()->grip(session_.model());
+  snapshot.force = snapshot.blade.force;
+  snapshot.torque = snapshot.blade.torque;
+}
+
+void HapticSimulation::fill_common(const DeviceState& device, ContactSnapshot& snapshot) const {
   snapshot.pose_tick = device.tick;
   snapshot.mode = device.mode;
   snapshot.without_tool = !session_.scenario().tool;
@@ -197,11 +239,10 @@ void HapticSimulation::solve(const DeviceState& device, int degradation, Contact
   snapshot.degradation = degradation_;
   snapshot.nodes = result_.nodes;
   snapshot.topology = topology_of(session_, result_);
-  snapshot.solve_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
-                            ContactSnapshot& snapshot) {
+SolveRecord solve_recording(HapticSimulation& simulation, const Hands& hands, const SolveEvent& event,
+                            ContactSnapshot& snapshot, ContactSnapshot* second) {
   const auto failed = [&](const std::exception& error) {
     SolveRecord record;
     record.event = event;
@@ -213,7 +254,7 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     simulation.set_following_in_background(event.in_background);
     if (event.swaps)
       simulation.swap_body();
-    simulation.solve(device, event.degradation, snapshot);
+    simulation.solve(hands, event.degradation, snapshot, second);
   } catch (const NumericalError& error) {
     return failed(error);
   } catch (const InputError& error) { // of the pose: the contact has reached a fixed region
@@ -224,6 +265,8 @@ SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& dev
     return failed(error);
   }
   snapshot.sequence = event.sequence;
+  if (second != nullptr)
+    second->sequence = event.sequence;
   SolveRecord record = record_of(event, snapshot);
   record.force_jump = simulation.result().force_jump;
   if (const auto& cut = simulation.result().cut) {

@@ -29,24 +29,28 @@ class DegradationRule {
   int level_ = 0, quick_ = 0;
 };
 
-/// The device holds what HandMode says. When the hand takes the blade anew that is lifted: it cuts from where it is
-/// then.
+/// The first hand holds what HandMode says, the second the blade beside the first one's tool: both are solved at once.
+/// When a hand takes the blade anew that is lifted: it cuts from where it is then.
 class HapticSimulation {
  public:
   /// As Session. Throws InputError when there is neither tool nor blade to hold.
   explicit HapticSimulation(
       Scenario scenario, std::function<void(const std::string&)> say = [](const std::string&) {});
 
-  /// Builds and condenses the body at the device's first pose.
-  void prepare(const DeviceState& device);
+  /// Throws InputError unless there are tool and blade: what two hands hold.
+  void require_two_hands() const;
+
+  /// Builds and condenses the body at the hands' first poses.
+  void prepare(const Hands& hands);
 
   /// A tick that is not solved: the blade's way to the next solve leads through its pose. Ticks come in order, each
   /// once, with those that are solved in between.
-  void pass(const DeviceState& device);
+  void pass(const Hands& hands);
 
-  /// Solves at the pose and time of `device` and fills the snapshot; its sequence is the caller's. Throws
-  /// NumericalError or InputError as Session::step; the snapshot is then as before.
-  void solve(const DeviceState& device, int degradation, ContactSnapshot& snapshot);
+  /// Solves at the poses of the hands and the time of the first and fills the snapshots; their sequence is the
+  /// caller's. `second` is that of the second hand, without force where that holds nothing; null: not wanted. Throws
+  /// NumericalError or InputError as Session::step; the snapshots are then as before.
+  void solve(const Hands& hands, int degradation, ContactSnapshot& snapshot, ContactSnapshot* second = nullptr);
 
   /// Whether a body that was made in the background waits to be taken over; and takes it over, after waiting for it
   /// where need be.
@@ -62,15 +66,20 @@ class HapticSimulation {
   [[nodiscard]] const topology::ToolShape& tool() const;
   /// Whether a tear has grown in the last solve: it may grow on in the next, wherever the device is.
   [[nodiscard]] bool tearing() const { return result_.tear && result_.tear->increments.size() > 1; }
-  /// Whether the device held the blade in the last solve.
+  /// Whether the first hand held the blade in the last solve.
   [[nodiscard]] bool holds_blade() const;
   [[nodiscard]] std::vector<PathPose> path() const { return driven_path(session_.steps()); }
+  /// That of the blade. Throws InputError when there is none.
+  [[nodiscard]] std::vector<PathPose> second_path() const { return blade_path(session_.steps()); }
   /// Where the tool is while the hand holds something else: away from the organ, on the line through the start of its
   /// way. Nothing in a scenario without a tool.
   [[nodiscard]] std::optional<topology::ToolPose> parked_tool() const;
 
  private:
-  [[nodiscard]] StepSample sample(const DeviceState& device) const;
+  [[nodiscard]] StepSample sample(const Hands& hands) const;
+  void fill_tool(ContactSnapshot& snapshot);
+  void fill_blade(const DeviceState& device, ContactSnapshot& snapshot) const;
+  void fill_common(const DeviceState& device, ContactSnapshot& snapshot) const;
   [[nodiscard]] bool solved_before(double time) const { return last_time_ && *last_time_ < time; }
 
   Session session_;
@@ -81,11 +90,12 @@ class HapticSimulation {
   std::uint64_t last_tick_ = 0;             // of that
   std::vector<topology::BladePose> passed_; // by the blade since then, some way apart
   int degradation_ = 0;
-  HandMode mode_ = HandMode::usual; // of the last solve
+  HandMode mode_ = HandMode::usual; // of the first hand in the last solve
+  bool has_second_ = false;         // the second held the blade in it
 };
 
-/// Solves as an event says and tells what came of it. A failure leaves the snapshot as it was. Throws Interrupted.
-SolveRecord solve_recording(HapticSimulation& simulation, const DeviceState& device, const SolveEvent& event,
-                            ContactSnapshot& snapshot);
+/// Solves as an event says and tells what came of it. A failure leaves the snapshots as they were. Throws Interrupted.
+SolveRecord solve_recording(HapticSimulation& simulation, const Hands& hands, const SolveEvent& event,
+                            ContactSnapshot& snapshot, ContactSnapshot* second = nullptr);
 
 } // namespace spherecut::app

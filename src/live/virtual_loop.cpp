@@ -1,5 +1,6 @@
 #include "src/live/virtual_loop.hpp"
 
+#include "src/live/second_hand.hpp"
 #include "topology/base/errors.hpp"
 #include "topology/base/interruption.hpp"
 
@@ -22,9 +23,9 @@ void check_events(const std::vector<SolveEvent>& events) {
 // Solves that have not arrived yet; snapshots are large and used again.
 class InFlight {
  public:
-  ContactSnapshot& launch(const SolveEvent& event) {
+  BothSnapshots& launch(const SolveEvent& event) {
     if (spare_.empty())
-      spare_.push_back(std::make_unique<ContactSnapshot>());
+      spare_.push_back(std::make_unique<BothSnapshots>());
     flying_.push_back({event, std::move(spare_.back())});
     spare_.pop_back();
     return *flying_.back().snapshot;
@@ -38,7 +39,7 @@ class InFlight {
     return !flying_.empty() && flying_.front().event.arrival_tick <= tick;
   }
   /// The newest snapshot that is due; it stays until the next one lands.
-  const ContactSnapshot& land(std::uint64_t tick) {
+  const BothSnapshots& land(std::uint64_t tick) {
     while (due(tick)) {
       if (landed_ != nullptr)
         spare_.push_back(std::move(landed_));
@@ -51,12 +52,19 @@ class InFlight {
  private:
   struct Flight {
     SolveEvent event;
-    std::unique_ptr<ContactSnapshot> snapshot;
+    std::unique_ptr<BothSnapshots> snapshot;
   };
   std::deque<Flight> flying_;
-  std::unique_ptr<ContactSnapshot> landed_;
-  std::vector<std::unique_ptr<ContactSnapshot>> spare_;
+  std::unique_ptr<BothSnapshots> landed_;
+  std::vector<std::unique_ptr<BothSnapshots>> spare_;
 };
+
+Hands hands_of(const TickRecord& tick) {
+  Hands hands(tick.device);
+  if (tick.second)
+    hands.second = tick.second->device;
+  return hands;
+}
 
 } // namespace
 
@@ -80,6 +88,10 @@ TickRecord record_of(const DeviceState& device, const TickResult& result, bool a
   record.active = result.model.active;
   record.rounds = result.model.rounds;
   return record;
+}
+
+SecondHandRecord second_record_of(const DeviceState& device, const TickResult& result) noexcept {
+  return {device, result.force, result.tissue, result.torque, result.tissue_torque, result.energy, result.limited};
 }
 
 SolveRecord record_of(const SolveEvent& event, const ContactSnapshot& snapshot) {
@@ -118,36 +130,44 @@ std::vector<LoopRecords> run_virtual(const std::vector<HapticSettings>& settings
   for (const HapticSettings& one : settings)
     cores.push_back(
         std::make_unique<HapticTick>(one, simulation.tool(), &query, simulation.session().scenario().tool.has_value()));
+  SecondHand second(settings.front(), simulation.tool(), query, options.second);
+  if (second.is_there())
+    simulation.require_two_hands();
   std::vector<LoopRecords> records(settings.size());
   std::vector<SolveRecord> solves;
   InFlight flights;
   auto next = events.begin();
   const auto run_tick = [&](std::uint64_t tick) {
-    const DeviceState state = device.read(tick);
+    const Hands hands = read_hands(device, second.device(), tick);
+    const DeviceState& state = hands.first;
     if (tick == 0) {
-      simulation.prepare(state);
+      simulation.prepare(hands);
       for (const auto& core : cores)
         core->start(state);
     }
     if (next == events.end() || next->pose_tick > tick)
-      simulation.pass(state);
+      simulation.pass(hands);
     for (; next != events.end() && next->pose_tick <= tick; ++next) {
-      ContactSnapshot& snapshot = flights.launch(*next);
-      solves.push_back(solve_recording(simulation, state, *next, snapshot));
+      BothSnapshots& snapshots = flights.launch(*next);
+      solves.push_back(
+          solve_recording(simulation, hands, *next, snapshots.first, second.is_there() ? &snapshots.second : nullptr));
       options.on_solve(solves.back());
       if (solves.back().failed || next->arrival_tick == SolveEvent::never)
         flights.drop();
     }
     const bool arrives = flights.due(tick);
-    const ContactSnapshot* arrived = arrives ? &flights.land(tick) : nullptr;
+    const BothSnapshots* arrived = arrives ? &flights.land(tick) : nullptr;
     for (std::size_t m = 0; m < cores.size(); ++m) {
       if (arrives)
-        cores[m]->arrive(*arrived);
+        cores[m]->arrive(arrived->first);
       const TickResult result = cores[m]->tick(state);
       if (m == 0)
         device.render(result.force, result.torque);
       records[m].ticks.push_back(record_of(state, result, arrives));
     }
+    if (arrives)
+      second.arrive(arrived->second);
+    second.tick(hands, records.front().ticks.back());
     options.on_tick(records.front().ticks.back());
   };
   try {
@@ -173,10 +193,10 @@ std::vector<SolvedForce> solve_recorded(HapticSimulation& simulation, const std:
   ContactSnapshot snapshot;
   for (std::size_t i = 0; i < ticks.size() && !(stop && stop()); i += stride) {
     if (i == 0)
-      simulation.prepare(ticks[0].device);
+      simulation.prepare(hands_of(ticks[0]));
     for (std::size_t k = i < stride ? i : i - stride + 1; k < i; ++k)
-      simulation.pass(ticks[k].device);
-    simulation.solve(ticks[i].device, 0, snapshot);
+      simulation.pass(hands_of(ticks[k]));
+    simulation.solve(hands_of(ticks[i]), 0, snapshot);
     forces.push_back({ticks[i].device.tick, snapshot.force, simulation.result().resprinkled, snapshot.cut_triangles,
                       simulation.result().active_nodes, snapshot.torque});
   }

@@ -13,15 +13,16 @@ std::vector<SolveEvent> regular_solves(std::uint64_t ticks, std::uint64_t period
 
 /// Who else wants to know, and when to end.
 struct VirtualOptions {
+  Device* second = nullptr;                          // of a second hand, which has the blade; null: there is none
   std::function<bool()> stop = [] { return false; }; // asked at every tick
   std::function<void(const TickRecord&)> on_tick = [](const TickRecord&) {};
   std::function<void(const SolveRecord&)> on_solve = [](const SolveRecord&) {}; // before the ticks that use it
 };
 
-/// Runs `ticks` ticks: reads the device, solves where an event begins, takes over what arrives, computes the force and
-/// applies it. Events must be in the order of their sequence, pose and arrival ticks rising; a solve that no tick took
-/// over is solved all the same. `device` is read from tick 0 on; `simulation` is prepared there. Throws InputError when
-/// the events are out of order. A solve that fails is in its record, and the loop goes on.
+/// Runs `ticks` ticks: reads the devices, solves where an event begins, takes over what arrives, computes the forces
+/// and applies them. Events must be in the order of their sequence, pose and arrival ticks rising; a solve that no tick
+/// took over is solved all the same. `device` is read from tick 0 on; `simulation` is prepared there. Throws InputError
+/// when the events are out of order. A solve that fails is in its record, and the loop goes on.
 LoopRecords run_virtual(const HapticSettings& settings, HapticSimulation& simulation, Device& device,
                         const std::vector<SolveEvent>& events, std::uint64_t ticks, const VirtualOptions& options = {});
 

@@ -70,6 +70,14 @@ struct HaplySettings {
   double timeout = 0.1;  // s without a pose after which the device has gone
 };
 
+/// The device of a second hand, which holds the blade beside the tool in the first. Limits, model and simulated hand
+/// are those of the first.
+struct SecondDevice {
+  HeldDevice device = HeldDevice::hand; // not a recording: that of the first has both hands
+  BridgeSettings bridge;
+  HaplySettings haply;
+};
+
 struct HapticSettings {
   double rate = 1000; // ticks per second
   ForceModelKind model = ForceModelKind::tangent;
@@ -83,6 +91,7 @@ struct HapticSettings {
   HaplySettings haply;
   DeviceLimits limits;
   HandSettings hand;
+  std::optional<SecondDevice> second; // none: one hand, beside which a blade keeps to its path
 };
 
 } // namespace spherecut::app

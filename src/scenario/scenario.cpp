@@ -224,13 +224,39 @@ HeldDevice held_device(const std::string& name) {
   throw InputError(fmt::format("haptics.device = \"{}\": the program has no such device", name));
 }
 
-HaplySettings haply(const Section& section, Offences& offences) {
+/// `path`: of the section, for errors.
+HaplySettings haply(const Section& section, const char* path, Offences& offences) {
   HaplySettings haply{section.text("address"), section.text("device_id"), section.number("timeout")};
   if (!websocket_address(haply.address))
-    offences.add(section.line("address"),
-                 fmt::format("haptics.haply.address = \"{}\": allowed: ws://HOST:PORT, as in ws://localhost:10001",
-                             haply.address));
+    offences.add(
+        section.line("address"),
+        fmt::format("{}.address = \"{}\": allowed: ws://HOST:PORT, as in ws://localhost:10001", path, haply.address));
   return haply;
+}
+
+BridgeSettings bridge(const Section& section) {
+  return {section.text("address"), static_cast<int>(section.integer("port")), section.number("timeout")};
+}
+
+/// Two devices of one hand each: they cannot be the same one.
+SecondDevice second_device(const Section& section, const HapticSettings& first, Offences& offences) {
+  if (first.device == HeldDevice::recording)
+    offences.add(section.line(), "haptics.second beside haptics.device = \"recording\": a recording of two hands moves "
+                                 "both; allowed: one of the two");
+  SecondDevice second{held_device(section.text("device")), bridge(section.table("bridge")),
+                      haply(section.table("haply"), "haptics.second.haply", offences)};
+  if (second.device == HeldDevice::bridge && first.device == HeldDevice::bridge && second.bridge.port != 0 &&
+      second.bridge.port == first.bridge.port)
+    offences.add(section.line("device"),
+                 fmt::format("haptics.second.bridge.port = {}: that of the first hand, too; allowed: another one",
+                             second.bridge.port));
+  if (second.device == HeldDevice::haply && first.device == HeldDevice::haply &&
+      (second.haply.device_id.empty() || second.haply.device_id == first.haply.device_id))
+    offences.add(section.line("device"),
+                 fmt::format("haptics.second.haply.device_id = \"{}\": which of two Inverse3 is in which hand is not "
+                             "known; allowed: a device_id for each hand, two different ones",
+                             second.haply.device_id));
+  return second;
 }
 
 HapticSettings haptics(const Section& section, const std::filesystem::path& scenario, Offences& offences) {
@@ -247,9 +273,8 @@ HapticSettings haptics(const Section& section, const std::filesystem::path& scen
   else if (haptics.device == HeldDevice::recording)
     offences.add(section.line("device"), "haptics.device = \"recording\": which one is missing; allowed: beside "
                                          "haptics.recording = \"FILE\"");
-  const Section bridge = section.table("bridge");
-  haptics.bridge = {bridge.text("address"), static_cast<int>(bridge.integer("port")), bridge.number("timeout")};
-  haptics.haply = haply(section.table("haply"), offences);
+  haptics.bridge = bridge(section.table("bridge"));
+  haptics.haply = haply(section.table("haply"), "haptics.haply", offences);
   const Section limits = section.table("limits");
   haptics.limits = {limits.number("gain"),       limits.number("force"),
                     limits.number("slew"),       limits.number("torque"),
@@ -258,6 +283,8 @@ HapticSettings haptics(const Section& section, const std::filesystem::path& scen
   const Section hand = section.table("hand");
   haptics.hand = {hand.number("mass"),       hand.number("stiffness"), hand.number("damping"),
                   haptics.limits.resolution, haptics.limits.delay,     true};
+  if (section.has("second"))
+    haptics.second = second_device(section.table("second"), haptics, offences);
   return haptics;
 }
 
@@ -391,6 +418,11 @@ Scenario scenario_of(const ScenarioDocument& document, const std::filesystem::pa
     offences.add(1, "there is no tool, no blade, no precut and no load (gravity, material.pretension): nothing to "
                     "compute; allowed: one of them or more");
   scenario.haptics = haptics(root.table("haptics"), file, offences);
+  if (scenario.haptics.second && (!scenario.tool || !scenario.blade))
+    offences.add(root.table("haptics").table("second").line(),
+                 fmt::format("haptics.second: a second hand holds the blade beside the tool in the first, and there is "
+                             "no {}; allowed: with [tool] and [blade]",
+                             scenario.tool ? "[blade]" : "[tool]"));
   const Section output = root.table("output");
   scenario.output = {static_cast<int>(output.integer("vtp_every")), output.boolean("figures")};
   offences.throw_if_any();

@@ -24,15 +24,21 @@ void HeldTool::let_go(LiveSession& session) {
 }
 
 void HeldTool::put_down(LiveSession& session, HandMode mode) {
-  const std::uint32_t number = target_.number;
-  const std::uint32_t jumps = target_.jumps;
-  target_ = session.places().parked(mode);
-  target_.number = number;
-  target_.jumps = jumps + 1;
+  aim_anew(session, session.places().parked(mode));
+}
+
+void HeldTool::lay_away(LiveSession& session) {
+  aim_anew(session, {});
+}
+
+void HeldTool::aim_anew(LiveSession& session, PointerTarget target) {
+  target.number = target_.number;
+  target.jumps = target_.jumps + 1;
+  target_ = target;
   parked_ = true;
   inside_since_.reset();
   inside_told_ = false;
-  session.aim(target_);
+  session.aim(target_, hand_);
 }
 
 bool HeldTool::move(LiveSession& session, const Request& request) {
@@ -55,16 +61,21 @@ bool HeldTool::move(LiveSession& session, const Request& request) {
   target_ = target;
   if (std::exchange(parked_, false))
     ++target_.jumps;
-  session.aim(target_);
+  session.aim(target_, hand_);
   return true;
 }
 
 void HeldTool::grip(LiveSession& session, bool closed) {
   target_.buttons = closed ? 1 : 0;
-  session.aim(target_);
+  session.aim(target_, hand_);
 }
 
 void HeldTool::change_session(LiveSession& session) {
+  if (hand_ == WhichHand::second) {
+    target_.jumps = 0;
+    lay_away(session);
+    return;
+  }
   const std::vector<HandMode> modes = session.places().modes();
   const bool same = !session.replays() && std::find(modes.begin(), modes.end(), target_.mode) != modes.end();
   target_.jumps = 0;

@@ -1,4 +1,4 @@
-// The tool of a session: which viewer holds it, and where it is led.
+// A tool of a session, in one of two hands: which viewer holds it, and where it is led.
 #pragma once
 
 #include "src/viewer/live_session.hpp"
@@ -10,7 +10,11 @@ namespace spherecut::app {
 
 class HeldTool {
  public:
-  explicit HeldTool(const LiveSession& session) { target_ = session.places().parked(session.places().modes().front()); }
+  /// The first hand holds the session's first tool, the second nothing.
+  explicit HeldTool(const LiveSession& session, WhichHand hand = WhichHand::first) : hand_(hand) {
+    if (hand == WhichHand::first)
+      target_ = session.places().parked(session.places().modes().front());
+  }
 
   /// The client that holds it; 0: nobody.
   [[nodiscard]] int holder() const { return holder_; }
@@ -21,6 +25,8 @@ class HeldTool {
   void let_go(LiveSession& session);
   /// Puts a tool away to its parking place.
   void put_down(LiveSession& session, HandMode mode);
+  /// The second hand's: it holds nothing then.
+  void lay_away(LiveSession& session);
   /// Where a viewer leads it, no further than two diagonals from the organ's middle. A tool that comes from its parking
   /// place is put down where it is led; inside the organ it stays parked: on its way there it would press or cut what
   /// nobody has asked for, as when a new session takes over from one that was worked in. False where the viewer is to
@@ -32,6 +38,9 @@ class HeldTool {
   void change_session(LiveSession& session);
 
  private:
+  void aim_anew(LiveSession& session, PointerTarget target);
+
+  WhichHand hand_;
   int holder_ = 0;
   PointerTarget target_;
   bool parked_ = true; // the tool has not been led anywhere since it was put away

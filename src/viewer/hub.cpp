@@ -55,7 +55,7 @@ Hub::Hub(HubOptions options, std::function<void(const std::string&)> say)
       builder_([this](const std::string& line) { log_.add(line); }),
       session_(std::make_unique<LiveSession>(read_scenario(options_.scenario), LiveOptions{options_.speed, {}, {}},
                                              [this](const std::string& line) { log_.add(line); })),
-      tool_(*session_), viewers_(options_.frame_rate), fifo_(fifo_granted()) {
+      tool_(*session_), second_(*session_, WhichHand::second), viewers_(options_.frame_rate), fifo_(fifo_granted()) {
   session_->start();
 }
 
@@ -101,6 +101,8 @@ void Hub::greet(int client, ViewerState& viewer) {
   viewers_.send(client, welcome_text(client, viewer.version, files_.lists(), options_.viewers, options_.speed));
   viewers_.send(client, session_text(*session_, epoch_, tool_.mode()));
   viewers_.send(client, holder_text(tool_.holder()));
+  if (second_on_)
+    viewers_.send(client, second_text(true));
   if (tear_.state != TearState::none)
     viewers_.send(client, tear_text(tear_));
   if (session_->replays())
@@ -133,7 +135,13 @@ void Hub::act(int client, ViewerState& viewer, const Request& request) {
     move(client, request);
     break;
   case RequestType::park:
-    tool_.put_down(*session_, tool_.mode());
+    if (request.hand == WhichHand::first)
+      tool_.put_down(*session_, tool_.mode());
+    else if (second_on_)
+      second_.put_down(*session_, HandMode::blade);
+    break;
+  case RequestType::second:
+    set_second(client, request.on);
     break;
   case RequestType::grip:
     tool_.grip(*session_, request.on);
@@ -172,6 +180,7 @@ void Hub::take(int client) {
 }
 
 void Hub::let_go() {
+  lay_second_away();
   tool_.let_go(*session_);
   viewers_.send_all(holder_text(tool_.holder()));
 }
@@ -182,12 +191,46 @@ void Hub::set_mode(int client, HandMode mode) {
     viewers_.send(client, error_text("unavailable", "this scenario has no such tool", "mode"));
     return;
   }
+  if (mode == HandMode::blade) // there is one
+    lay_second_away();
   tool_.put_down(*session_, mode);
   viewers_.send_all(mode_text(mode));
 }
 
+// The blade goes into the second hand; the first then has the tool, and keeps it where it is.
+void Hub::set_second(int client, bool on) {
+  if (!on)
+    return lay_second_away();
+  if (!session_->takes_two_hands() || session_->replays()) {
+    viewers_.send(client, error_text("unavailable",
+                                     session_->replays() ? "a replay moves both hands"
+                                                         : "this scenario has not both a tool and a blade: one for "
+                                                           "each hand",
+                                     "second"));
+    return;
+  }
+  if (second_on_)
+    return;
+  if (tool_.mode() == HandMode::blade)
+    set_mode(client, session_->places().modes().front());
+  second_.put_down(*session_, HandMode::blade);
+  second_on_ = true;
+  viewers_.send_all(second_text(true));
+}
+
+void Hub::lay_second_away() {
+  if (!std::exchange(second_on_, false))
+    return;
+  second_.lay_away(*session_);
+  viewers_.send_all(second_text(false));
+}
+
 void Hub::move(int client, const Request& request) {
-  if (!tool_.move(*session_, request))
+  if (request.hand == WhichHand::second && !second_on_) {
+    viewers_.send(client, error_text("unavailable", "the second hand holds nothing: ask for 'second' first", "pose"));
+    return;
+  }
+  if (!(request.hand == WhichHand::first ? tool_ : second_).move(*session_, request))
     viewers_.send(client, error_text("refused",
                                      "the tool stays away, as it is led to a place inside the organ: lead it outside "
                                      "first, and in from there",
@@ -240,7 +283,9 @@ std::uint32_t Hub::state_bits(const LiveTick& tick) const {
 
 void Hub::send_frames(const LiveTick& tick) {
   if (session_->fetch_frame()) {
-    number_in_solve_ = session_->number_at(session_->frame().pose_tick); // later that tick may be forgotten
+    const std::uint64_t solved = session_->frame().pose_tick; // later that tick may be forgotten
+    number_in_solve_ = session_->number_at(solved);
+    second_number_in_solve_ = session_->number_at(solved, WhichHand::second);
     tell_tear();
   }
   if (session_->frame().number == 0)
@@ -250,6 +295,7 @@ void Hub::send_frames(const LiveTick& tick) {
     context.epoch = epoch_;
     context.state = state_bits(tick);
     context.number_in_solve = number_in_solve_;
+    context.second_number_in_solve = second_number_in_solve_;
     context.rates = meter_.rates();
     return context;
   });
@@ -328,10 +374,13 @@ void Hub::take_over(SessionOrder& order) {
     viewers_.send_all(replay_text(session_->replays(), session_->replays() ? order.replayed : replaying_));
   replaying_ = session_->replays() ? order.replayed : "";
   tool_.change_session(*session_);
+  second_.change_session(*session_);
+  if (std::exchange(second_on_, false))
+    viewers_.send_all(second_text(false));
   session_->request(viewers_.wanted());
   meter_.restart();
   tear_ = {};
-  number_in_solve_ = 0;
+  number_in_solve_ = second_number_in_solve_ = 0;
   session_->start();
 }
 

@@ -42,6 +42,8 @@ class Hub {
   void take(int client);
   void let_go();
   void set_mode(int client, HandMode mode);
+  void set_second(int client, bool on);
+  void lay_second_away();
   void move(int client, const Request& request);
 
   // Another session:
@@ -64,7 +66,8 @@ class Hub {
   LineQueue log_;
   SessionBuilder builder_; // waits for the sessions that it builds and ends after the current one has ended
   std::unique_ptr<LiveSession> session_;
-  HeldTool tool_;
+  HeldTool tool_, second_; // of both hands; whoever holds the first has the other
+  bool second_on_ = false; // that one has the blade
   Viewers viewers_;
   RateMeter meter_;
   bool changed_ = false;   // settings of the session, from those of its file
@@ -72,8 +75,9 @@ class Hub {
   std::string replaying_;  // name; empty: nothing is
   std::uint32_t epoch_ = 1;
   bool fifo_ = false;
-  TearStatus tear_;                   // as told
-  std::uint32_t number_in_solve_ = 0; // of the viewer's message that the newest picture's solve followed
+  TearStatus tear_;                          // as told
+  std::uint32_t number_in_solve_ = 0;        // of the viewer's message that the newest picture's solve followed
+  std::uint32_t second_number_in_solve_ = 0; // likewise, for the second hand
 };
 
 } // namespace spherecut::app

@@ -13,6 +13,14 @@ namespace {
 
 constexpr int niceness = 5; // the viewer that draws beside the solver goes before it
 
+/// `pointer` null: a replay, whose hand is where the tool was.
+LiveHand where(const DeviceState& device, PointerHand* pointer) {
+  if (pointer == nullptr)
+    return {device.position, 0};
+  const PointerHandState& state = pointer->state();
+  return {state.hand, state.number};
+}
+
 } // namespace
 
 LiveSession::LiveSession(Scenario scenario, const LiveOptions& options, std::function<void(const std::string&)> say)
@@ -29,11 +37,18 @@ LiveSession::LiveSession(Scenario scenario, const LiveOptions& options, std::fun
   const HapticSettings& settings = scenario_.haptics;
   if (options.replay != nullptr) {
     device_ = std::make_unique<RecordedMotion>(*options.replay, settings.rate);
+    if (options.replay->has_second())
+      second_device_ = std::make_unique<RecordedMotion>(*options.replay, settings.rate, WhichHand::second);
   } else {
     auto hand = std::make_unique<PointerHand>(settings.hand, settings.rate, options.speed,
                                               places_->parked(places_->modes().front()));
     hand_ = hand.get();
     device_ = std::move(hand);
+    if (takes_two_hands()) {
+      auto second = std::make_unique<PointerHand>(settings.hand, settings.rate, options.speed, PointerTarget{});
+      second_ = second.get();
+      second_device_ = std::move(second);
+    }
   }
   feed_ = std::make_unique<ViewerFeed>(settings.viewer_rate);
   simulation_->prepare(device_->read(0));
@@ -67,6 +82,7 @@ void LiveSession::run() {
   if (scenario_.haptics.model == ForceModelKind::tangent)
     options.most_solves = scenario_.haptics.viewer_rate;
   options.feed = feed_.get();
+  options.second = second_device_.get();
   options.stop = [this] { return stop_.load(); };
   options.on_tick = [this](const TickRecord& record) { note(record); };
   options.on_solve = [this](const SolveRecord& record) { note(record); };
@@ -81,9 +97,10 @@ void LiveSession::run() {
   recorder_.end(report.lost);
 }
 
-void LiveSession::aim(const PointerTarget& target) {
-  if (hand_ != nullptr)
-    hand_->aim(target);
+void LiveSession::aim(const PointerTarget& target, WhichHand hand) {
+  PointerHand* const pointer = hand == WhichHand::first ? hand_ : second_;
+  if (pointer != nullptr)
+    pointer->aim(target);
 }
 
 void LiveSession::note(const TickRecord& record) {
@@ -115,17 +132,15 @@ const LiveTick& LiveSession::tick() {
   if (!ticks_.fetch())
     return newest_;
   newest_ = ticks_.front();
-  newest_.hand = newest_.record.device.position;
-  newest_.number = 0;
-  if (hand_ != nullptr) {
-    const PointerHandState& state = hand_->state();
-    newest_.hand = state.hand;
-    newest_.number = state.number;
-  }
+  newest_.hand = where(newest_.record.device, hand_);
   const ToolPlaces::Touch touch = places_->touch(simulation_->tool(), newest_.record.device);
   newest_.contact = touch.contact;
   newest_.axis = touch.axis;
   newest_.record.depth = touch.depth.value_or(newest_.record.depth);
+  if (const auto& second = newest_.record.second) {
+    newest_.second_hand = where(second->device, second_);
+    newest_.second_depth = places_->touch(simulation_->tool(), second->device).depth.value_or(0);
+  }
   return newest_;
 }
 

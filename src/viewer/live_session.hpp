@@ -10,13 +10,19 @@
 
 namespace spherecut::app {
 
+/// Where a pointer's hand is, and what it follows.
+struct LiveHand {
+  Vector3 position = Vector3::Zero(); // m
+  std::uint32_t number = 0;           // of the viewer's message that it follows
+};
+
 /// The haptic loop at one tick, and sums since the start.
 struct LiveTick {
   TickRecord record;
   topology::SurfaceContact contact; // on the surface at rest; of a blade where its edge is deepest
   Vector3 axis = Vector3::UnitZ();  // of the tool
-  Vector3 hand = Vector3::Zero();   // m, where the pointer's hand is
-  std::uint32_t number = 0;         // of the viewer's message that it follows
+  LiveHand hand, second_hand;
+  double second_depth = 0; // m, of the blade in the second hand, where it has one, in the organ at rest
   std::uint64_t overruns = 0;
   double compute = 0;       // s of processor time in ticks
   double worst_latency = 0; // s, of the last whole second of ticks
@@ -51,8 +57,10 @@ class LiveSession {
   [[nodiscard]] double coarse_spacing() const { return coarse_; } // m
 
   // One viewer thread:
-  /// Without effect in a replay.
-  void aim(const PointerTarget& target);
+  /// Whether there is something for each of two hands: a tool and a blade.
+  [[nodiscard]] bool takes_two_hands() const { return scenario_.tool && scenario_.blade; }
+  /// Without effect in a replay, and for a second hand that has nothing to hold.
+  void aim(const PointerTarget& target, WhichHand hand = WhichHand::first);
   [[nodiscard]] bool replays() const { return hand_ == nullptr; }
   [[nodiscard]] const SessionRecorder& recorder() const { return recorder_; }
   void stop_recording() { recorder_.stop(); }
@@ -60,8 +68,9 @@ class LiveSession {
   bool fetch_frame() { return feed_->fetch(); }
   [[nodiscard]] const ViewerFrame& frame() const { return feed_->frame(); }
   /// Number of the viewer's message that a tick of the last seconds followed.
-  [[nodiscard]] std::uint32_t number_at(std::uint64_t tick) const {
-    return hand_ != nullptr ? hand_->number_at(tick) : 0;
+  [[nodiscard]] std::uint32_t number_at(std::uint64_t tick, WhichHand hand = WhichHand::first) const {
+    const PointerHand* const pointer = hand == WhichHand::first ? hand_ : second_;
+    return pointer != nullptr ? pointer->number_at(tick) : 0;
   }
   /// The newest tick.
   const LiveTick& tick();
@@ -82,8 +91,9 @@ class LiveSession {
   std::unique_ptr<const ToolPlaces> places_;
   int nodes_ = 0;
   double fine_ = 0, coarse_ = 0;
-  std::unique_ptr<Device> device_;
-  PointerHand* hand_ = nullptr; // device_; null in a replay
+  std::unique_ptr<Device> device_, second_device_; // null: there is nothing for a second hand
+  PointerHand* hand_ = nullptr;                    // device_; null in a replay
+  PointerHand* second_ = nullptr;                  // second_device_; likewise
   FailureList failures_;
   SessionRecorder recorder_{failures_};
   std::unique_ptr<ViewerFeed> feed_;

@@ -124,6 +124,7 @@ std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMo
                  {"nodes", session.nodes()},
                  {"modes", modes},
                  {"mode", name_of(mode)},
+                 {"two_hands", session.takes_two_hands()},
                  {"tool", tool_of(scenario)},
                  {"blade", blade_of(scenario)},
                  {"park", park},
@@ -144,6 +145,10 @@ std::string holder_text(int holder) {
 
 std::string mode_text(HandMode mode) {
   return dumped({{"type", "mode"}, {"mode", name_of(mode)}});
+}
+
+std::string second_text(bool on) {
+  return dumped({{"type", "second"}, {"on", on}});
 }
 
 std::string building_text(const std::string& what) {

@@ -28,6 +28,8 @@ std::string session_text(const LiveSession& session, std::uint32_t epoch, HandMo
 /// 0: nobody.
 std::string holder_text(int holder);
 std::string mode_text(HandMode mode);
+/// Whether the second hand has the blade.
+std::string second_text(bool on);
 std::string building_text(const std::string& what);
 std::string error_text(std::string_view code, const std::string& text, std::string_view about);
 std::string log_text(const std::string& line);

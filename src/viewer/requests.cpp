@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array<std::pair<RequestType, std::string_view>, 14> request_names{{
+constexpr std::array<std::pair<RequestType, std::string_view>, 15> request_names{{
     {RequestType::hello, "hello"},
     {RequestType::credit, "credit"},
     {RequestType::take, "take"},
@@ -22,6 +22,7 @@ constexpr std::array<std::pair<RequestType, std::string_view>, 14> request_names
     {RequestType::mode, "mode"},
     {RequestType::pose, "pose"},
     {RequestType::park, "park"},
+    {RequestType::second, "second"},
     {RequestType::grip, "grip"},
     {RequestType::reset, "reset"},
     {RequestType::scenario, "scenario"},
@@ -168,7 +169,14 @@ OverlaysChange overlays_of(const Json& message) {
   return change;
 }
 
+/// Which hand a message is about; the first, where it does not say.
+WhichHand hand_of(const Json& message) {
+  return message.contains("hand") && whole_of(message["hand"], "hand", 1, 2) == 2 ? WhichHand::second
+                                                                                  : WhichHand::first;
+}
+
 void read_pose(const Json& message, Request& request) {
+  request.hand = hand_of(message);
   const Json& number = field(message, "n");
   if (!number.is_number_unsigned() || number.get<std::uint64_t>() > 0xffffffffU)
     refuse("'n' must be a whole number from 0 to 4294967295");
@@ -226,6 +234,12 @@ Request parse_request(std::string_view text) {
   case RequestType::pose:
     read_pose(message, request);
     break;
+  case RequestType::park:
+    request.hand = hand_of(message);
+    break;
+  case RequestType::second:
+    request.on = flag_of(field(message, "on"), "on");
+    break;
   case RequestType::grip:
     request.on = flag_of(field(message, "closed"), "closed");
     break;
@@ -247,7 +261,6 @@ Request parse_request(std::string_view text) {
     break;
   case RequestType::take:
   case RequestType::release:
-  case RequestType::park:
   case RequestType::reset:
     break;
   }

@@ -15,6 +15,7 @@ enum class RequestType {
   mode,
   pose,
   park,
+  second,
   grip,
   reset,
   scenario,
@@ -50,7 +51,8 @@ struct Request {
   Vector3 position = Vector3::Zero();              // pose, m
   std::optional<Eigen::Quaterniond> orientation{}; // pose, unit
   HandMode mode = HandMode::probe;
-  bool on = false;                   // record, grip
+  WhichHand hand = WhichHand::first; // pose, park
+  bool on = false;                   // record, grip, second
   std::optional<std::string> name{}; // scenario; replay: empty ends it
   SettingsChange settings{};
   OverlaysChange overlays{};

@@ -27,6 +27,7 @@ enum class WireSection : std::uint32_t {
   slice = 20,
   volumes = 21,
   stages = 22,
+  second_hand = 23,
 };
 
 class Writer {
@@ -106,10 +107,10 @@ void put_block(const ViewerFrame& frame, const LiveTick& tick, const FrameContex
   out.put(static_cast<std::uint32_t>(frame.vertices.size()));
   out.put(context.state);
   out.put(static_cast<std::uint32_t>(std::max(1, static_cast<int>(record.device.mode)) - 1));
-  out.put(tick.number);
+  out.put(tick.hand.number);
   out.put(context.number_in_solve);
   out.put(static_cast<std::uint32_t>(frame.topology ? frame.topology->volumes.size() : 0));
-  out.put_vector(tick.hand);
+  out.put_vector(tick.hand.position);
   out.put_vector(record.device.position);
   out.put_floats({turn.x(), turn.y(), turn.z(), turn.w()});
   out.put_vector(tick.axis);
@@ -133,6 +134,21 @@ void put_block(const ViewerFrame& frame, const LiveTick& tick, const FrameContex
     return;
   out.put_vector(record.tissue_torque);
   out.put_vector(record.torque);
+}
+
+void put_second_hand(const SecondHandRecord& hand, const LiveTick& tick, const FrameContext& context, Writer& out) {
+  const Eigen::Quaterniond& turn = hand.device.orientation;
+  out.begin(WireSection::second_hand);
+  out.put(tick.second_hand.number);
+  out.put(context.second_number_in_solve);
+  out.put_vector(tick.second_hand.position);
+  out.put_vector(hand.device.position);
+  out.put_floats({turn.x(), turn.y(), turn.z(), turn.w()});
+  for (const Vector3& x : {hand.tissue, hand.force, hand.tissue_torque, hand.torque})
+    out.put_vector(x);
+  out.put_float(tick.second_depth);
+  out.put_float(hand.energy);
+  out.end();
 }
 
 void put_colours(std::uint32_t quantity, const std::vector<float>& values, Writer& out) {
@@ -231,6 +247,8 @@ std::string encode_frame(const ViewerFrame& frame, const LiveTick& tick, const F
   out.end_block();
   if (with_vertices && frame.topology)
     put_picture(frame, overlays, client, out);
+  if (tick.record.second)
+    put_second_hand(*tick.record.second, tick, context, out);
   if (overlays.stages) {
     const SessionProfile& profile = frame.profile;
     out.begin(WireSection::stages);

@@ -33,7 +33,8 @@ struct FrameContext {
   int version = protocol_version;       // of the client
   std::uint32_t message = 0, epoch = 0; // numbers in the header
   std::uint32_t state = 0;
-  std::uint32_t number_in_solve = 0; // of the viewer's message
+  std::uint32_t number_in_solve = 0;        // of the viewer's message
+  std::uint32_t second_number_in_solve = 0; // likewise, for the second hand
   std::uint32_t left_out = 0;
   LiveRates rates;
 };

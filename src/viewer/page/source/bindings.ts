@@ -3,7 +3,7 @@ import type { Binding, Section } from './keys';
 import type { Orbit } from './orbit';
 import type { Page } from './page';
 import type { Panels } from './panels';
-import type { Stylus } from './stylus';
+import type { Hands } from './hands';
 
 /** What mouse, pen and touch do, for the help. */
 export const gestures: readonly (readonly [string, string])[] = [
@@ -11,20 +11,21 @@ export const gestures: readonly (readonly [string, string])[] = [
   ['Left button, finger or pen on the organ', 'presses, cuts or grips; drag along the surface'],
   ['Wheel while pressing, pen pressure, slider', 'depth'],
   ['Drag beside the organ, right button, two fingers', 'turns the view'],
+  ['A second finger on the organ, with two hands', 'leads the other hand'],
   ['Middle button, Shift and right button', 'moves the view'],
   ['Wheel, pinch', 'zoom'],
 ];
 
-export function bindings(page: Page, stylus: Stylus, orbit: Orbit, panels: Panels): Section[] {
+export function bindings(page: Page, hands: Hands, orbit: Orbit, panels: Panels): Section[] {
   return [
-    { title: 'Tool', bindings: toolKeys(page, stylus) },
+    { title: 'Tool', bindings: toolKeys(page, hands) },
     { title: 'View', bindings: viewKeys(page, orbit) },
     { title: 'Show', bindings: showKeys(page, panels) },
     { title: 'Session', bindings: sessionKeys(page) },
   ];
 }
 
-function toolKeys(page: Page, stylus: Stylus): Binding[] {
+function toolKeys(page: Page, hands: Hands): Binding[] {
   const speed = 110; // px/s
   return [
     { keys: ['ArrowLeft'], shown: '←', does: 'tool to the left', hold: (s) => page.movePointer(-speed * s, 0) },
@@ -32,16 +33,18 @@ function toolKeys(page: Page, stylus: Stylus): Binding[] {
     { keys: ['ArrowUp'], shown: '↑', does: 'tool up', hold: (s) => page.movePointer(0, -speed * s) },
     { keys: ['ArrowDown'], shown: '↓', does: 'tool down', hold: (s) => page.movePointer(0, speed * s) },
     { keys: [' '], shown: 'Space', does: 'press, cut or grip; again: withdraw', press: () => page.togglePress() },
-    { keys: ['PageDown', '.'], shown: 'PageDown .', does: 'deeper', hold: (s) => page.deepen(0.006 * s) },
-    { keys: ['PageUp', ','], shown: 'PageUp ,', does: 'less deep', hold: (s) => page.deepen(-0.006 * s) },
-    { keys: ['q'], shown: 'Q', does: 'turn the blade to the left', hold: (s) => stylus.turnBlade(1.2 * s) },
-    { keys: ['e'], shown: 'E', does: 'turn the blade to the right', hold: (s) => stylus.turnBlade(-1.2 * s) },
+    { keys: ['PageDown', '.'], shown: 'PageDown .', does: 'deeper', hold: (s) => page.deepen(0.006 * s, hands.keys) },
+    { keys: ['PageUp', ','], shown: 'PageUp ,', does: 'less deep', hold: (s) => page.deepen(-0.006 * s, hands.keys) },
+    { keys: ['q'], shown: 'Q', does: 'turn the blade to the left', hold: (s) => hands.blade.turnBlade(1.2 * s) },
+    { keys: ['e'], shown: 'E', does: 'turn the blade to the right', hold: (s) => hands.blade.turnBlade(-1.2 * s) },
     { keys: ['1'], shown: '1', does: 'probe', press: () => page.chooseMode('probe') },
     { keys: ['2'], shown: '2', does: 'blade', press: () => page.chooseMode('blade') },
     { keys: ['3'], shown: '3', does: 'grasper', press: () => page.chooseMode('grasper') },
+    { keys: ['5'], shown: '5', does: 'two hands: the blade goes into the other one, or is laid away', press: () => page.toggleTwoHands() },
+    { keys: ['6'], shown: '6', does: 'two hands: mouse and keys change hands', press: () => page.swapHands() },
     { keys: ['k'], shown: 'K', does: 'put the tool away', press: () => page.park() },
     { keys: ['t'], shown: 'T', does: 'take the tool, or let go of it', press: () => page.toggleTool() },
-    { keys: ['Escape'], shown: 'Esc', does: 'withdraw', press: () => stylus.release() },
+    { keys: ['Escape'], shown: 'Esc', does: 'withdraw', press: () => hands.release() },
   ];
 }
 

@@ -1,5 +1,7 @@
-// Mouse, pen and touch on the picture. On the organ the left button or one finger presses; beside it they turn the view.
+// Mouse, pen and touch on the picture. On the organ the left button or one finger presses; beside it they turn the view. With
+// two hands a second finger on the organ leads the other one.
 import type { Orbit } from './orbit';
+import type { Hands } from './hands';
 import type { Ray, Stylus } from './stylus';
 
 interface Finger {
@@ -19,10 +21,12 @@ export interface PointerHost {
   changed(): void;
 }
 
-export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: Stylus, host: PointerHost): void {
+export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, hands: Hands, host: PointerHost): void {
   const fingers = new Map<number, Finger>();
   let gesture: 'none' | 'press' | 'turn' | 'pan' | 'two' = 'none';
   let depthAtStart = 0;
+  let stylus: Stylus = hands.mouse; // that a press leads
+  let beside: { finger: number; stylus: Stylus } | null = null; // the other hand, led by a second finger
 
   const at = (event: PointerEvent | WheelEvent): Finger => {
     const box = canvas.getBoundingClientRect();
@@ -36,11 +40,18 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: S
     const place = at(event);
     fingers.set(event.pointerId, place);
     if (event.pointerType === 'touch' && fingers.size === 2) {
+      const { other } = hands;
+      if (gesture === 'press' && other && !beside && other.point(host.ray(place.x, place.y))) {
+        other.press();
+        beside = { finger: event.pointerId, stylus: other };
+        return;
+      }
       stylus.release();
       gesture = 'two';
       return;
     }
     if (fingers.size > 1) return;
+    stylus = hands.mouse;
     const ray = host.ray(place.x, place.y);
     if (event.button === 1 || (event.button === 2 && event.shiftKey)) gesture = 'pan';
     else if (event.button === 2) gesture = 'turn';
@@ -57,7 +68,12 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: S
     const before = fingers.get(event.pointerId);
     if (!before) {
       host.moved(place.x, place.y);
-      stylus.point(host.ray(place.x, place.y));
+      hands.mouse.point(host.ray(place.x, place.y));
+      return;
+    }
+    if (event.pointerId === beside?.finger) {
+      beside.stylus.point(host.ray(place.x, place.y));
+      fingers.set(event.pointerId, place);
       return;
     }
     const dx = place.x - before.x;
@@ -79,6 +95,11 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: S
   });
   const lift = (event: PointerEvent): void => {
     fingers.delete(event.pointerId);
+    if (event.pointerId === beside?.finger) {
+      beside.stylus.release();
+      beside = null;
+      return;
+    }
     if (gesture === 'press') {
       stylus.release();
       if (event.pointerType === 'pen') stylus.setDepth(depthAtStart);
@@ -92,7 +113,7 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, stylus: S
     (event) => {
       event.preventDefault();
       const notches = Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY) / 100, 3);
-      if (stylus.pressing) host.deepen(-0.0005 * notches);
+      if (hands.mouse.pressing) host.deepen(-0.0005 * notches);
       else orbit.zoom(Math.exp(-0.15 * notches));
       host.changed();
     },

@@ -15,7 +15,8 @@ import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Supp
 import { remember, remembered } from './remembered';
 import { savePicture } from './screenshot';
 import { castRay, type Hit } from './surface';
-import { type Ray, Stylus } from './stylus';
+import type { Ray, Stylus } from './stylus';
+import { Hands } from './hands';
 import { nodeAlong } from './overlays';
 import { type Shading, View } from './view';
 
@@ -38,7 +39,7 @@ export class Page {
   private readonly messages = new Messages(byId('messages'));
   private readonly chart = new ForceChart(element('chart', HTMLCanvasElement));
   private readonly panels: Panels;
-  private readonly stylus: Stylus;
+  private readonly hands: Hands;
   private readonly keyboard: Keyboard;
   private readonly connection: Connection;
   private pending: Frame[] = [];
@@ -47,7 +48,6 @@ export class Page {
   private taken = 0; // frames that the last picture shows
   private completed = true; // that picture is done
   private pointer = { x: -1, y: -1 }; // px, of the stylus
-  private frozen: Snapshot | null = null;
   private scalars: Scalars | null = null;
   nodes: Nodes | null = null; // that are shown
   support: Support | null = null; // of the picked one
@@ -67,19 +67,20 @@ export class Page {
       scenario: (name) => this.connection.send({ type: 'scenario', name }),
       mode: (mode) => this.chooseMode(mode),
     });
-    this.stylus = new Stylus(
-      { cast: (ray) => this.cast(ray), freeze: () => (this.frozen = this.view.body.snapshot()), thaw: () => (this.frozen = null) },
-      (message) => this.connection.send(message),
-      (n) => [this.latency, this.toolLatency].forEach((latency) => latency.posed(n, performance.now())),
-      (pressing) => this.showPress(pressing),
-    );
-    this.keyboard = new Keyboard(bindings(this, this.stylus, this.view.orbit, this.panels));
+    this.hands = new Hands({
+      cast: (ray, frozen) => this.cast(ray, frozen),
+      snapshot: () => this.view.body.snapshot(),
+      send: (message) => this.connection.send(message),
+      posed: (n) => [this.latency, this.toolLatency].forEach((latency) => latency.posed(n, performance.now())),
+      pressed: (pressing, keys) => this.showPress(pressing, keys),
+    });
+    this.keyboard = new Keyboard(bindings(this, this.hands, this.view.orbit, this.panels));
     this.keyboard.describe(byId('help-body'), gestures);
-    attachPointer(this.view.canvas, this.view.orbit, this.stylus, {
+    attachPointer(this.view.canvas, this.view.orbit, this.hands, {
       ray: (x, y) => this.view.ray(x, y),
       pick: (ray) => this.pickAlong(ray),
       moved: (x, y) => (this.pointer = { x, y }),
-      deepen: (by) => this.deepen(by),
+      deepen: (by) => this.deepen(by, this.hands.mouse),
       changed: () => this.view.change(),
     });
     this.attachButtons();
@@ -115,15 +116,19 @@ export class Page {
         this.wantsTool = false;
         return this.showRole();
       case 'mode':
-        this.stylus.setMode(message.mode);
+        this.hands.first.setMode(message.mode);
         this.view.trace.clear();
         this.panels.setMode(message.mode);
         return this.showDepth();
+      case 'second':
+        this.hands.setTwo(message.on, this.holding, this.pointer);
+        this.view.trace.clear();
+        return this.showHands();
       case 'building':
         byId('link').textContent = 'building';
         return this.messages.say('info', message.what);
       case 'error':
-        if (message.about === 'mode') this.panels.setMode(this.stylus.mode);
+        if (message.about === 'mode') this.panels.setMode(this.hands.first.mode);
         if (message.about === 'scenario' && this.session) this.panels.scenario.value = this.session.scenario;
         return this.messages.say('error', saying(message.text, advice(message.code, message.about)));
       case 'log':
@@ -167,7 +172,8 @@ export class Page {
     }
     this.showLive();
     this.view.setSession(session, same);
-    this.stylus.setSession(session);
+    this.hands.setSession(session);
+    this.showHands();
     this.panels.setSession(session);
     this.showDepth();
     this.look();
@@ -209,7 +215,7 @@ export class Page {
   }
 
   private showRole(): void {
-    this.stylus.holding = this.holding;
+    this.hands.holding = this.holding;
     this.panels.setHolding(this.holding);
     byId('role').textContent =
       this.id < 0 ? '' : this.holding ? 'you hold the tool' : this.holder === null ? 'nobody holds the tool' : `watching: viewer ${this.holder} holds the tool`;
@@ -217,7 +223,7 @@ export class Page {
     take.hidden = this.id < 0;
     take.textContent = this.holding ? 'Let go' : 'Take the tool';
     take.disabled = !this.holding && this.holder !== null;
-    for (const id of ['reset', 'record', 'press-hold']) button(id).disabled = !this.holding;
+    for (const id of ['reset', 'record', 'press-hold', 'two-hands']) button(id).disabled = !this.holding;
     button('replay').disabled = !this.holding || this.panels.recording === null;
     button('download').disabled = this.panels.recording === null;
   }
@@ -273,7 +279,7 @@ export class Page {
     const body = this.view.body;
     if (frame.epoch !== this.session?.epoch || frame.topology !== body.topology?.topology) return;
     this.frame = frame;
-    this.stylus.answered(frame.poseInSolve);
+    this.hands.answered(frame);
     if (frame.vertices) this.seenVertices += 1;
     const bodyMoved = frame.vertices !== null && moves && body.setVertices(frame.vertices);
     // What has been switched off since this was asked for stays away.
@@ -303,6 +309,12 @@ export class Page {
     write(byId('depth'), `${(1000 * Math.max(frame.depth, 0)).toFixed(1)} mm`);
     const lag = Math.hypot(...frame.hand.map((x, d) => x - (frame.tip[d] ?? x)));
     write(byId('lag'), `${(1000 * lag).toFixed(1)} mm`);
+    byId('second-readout').hidden = !frame.second;
+    if (frame.second) {
+      const newtons = Math.hypot(...frame.second.force);
+      write(byId('second-force'), forceInWords(newtons));
+      byId('second-force').style.color = forceColour(newtons);
+    }
     // What the processor draws beside the picture it does not draw for the picture.
     if (now - this.chartShown > (this.view.software ? 125 : 0)) {
       this.chartShown = now;
@@ -318,10 +330,10 @@ export class Page {
     if (this.panels.colours.value === 'none') this.scalars = null;
     const inside = this.panels.nodes.checked || this.panels.spheres.checked || this.panels.supports.checked;
     this.view.body.setLook(inside || this.panels.slice.value !== 'none', this.panels.wire.checked);
-    this.view.tool.showSpring = this.panels.spring.checked;
+    this.view.tool.showSpring = this.view.second.showSpring = this.panels.spring.checked;
     this.view.showPlan = this.panels.plan.checked;
     this.view.shading = this.panels.shading.value as Shading;
-    if (this.frame) this.view.tool.update(this.frame);
+    if (this.frame) this.view.showTools(this.frame);
     if (!this.panels.supports.checked) this.support = null;
     if (this.panels.slice.value === 'none') this.slice = null;
     this.colour();
@@ -364,11 +376,10 @@ export class Page {
     const seconds = Math.min((now - this.lastStep) / 1000, 0.3);
     this.lastStep = now;
     if (this.keyboard.advance(seconds)) this.view.change();
-    this.stylus.advance(seconds);
+    this.hands.advance(seconds);
   }
 
-  private cast(ray: Ray): Hit | null {
-    const frozen = this.frozen;
+  private cast(ray: Ray, frozen: Snapshot | null): Hit | null {
     const hit = frozen
       ? castRay(frozen.positions, frozen.triangles, frozen.normals, ray.origin, ray.direction)
       : this.view.body.cast(ray.origin, ray.direction);
@@ -384,19 +395,45 @@ export class Page {
   movePointer(dx: number, dy: number): void {
     const { clientWidth, clientHeight } = this.view.canvas;
     if (this.pointer.x < 0) this.centrePointer();
-    const x = Math.min(Math.max(this.pointer.x + dx, 0), clientWidth);
-    const y = Math.min(Math.max(this.pointer.y + dy, 0), clientHeight);
-    if (this.stylus.point(this.view.ray(x, y))) this.pointer = { x, y };
+    const from = this.hands.keysFrom(this.pointer);
+    const x = Math.min(Math.max(from.x + dx, 0), clientWidth);
+    const y = Math.min(Math.max(from.y + dy, 0), clientHeight);
+    if (this.hands.keys.point(this.view.ray(x, y))) Object.assign(from, { x, y });
   }
 
   togglePress(): void {
-    if (this.stylus.pressing) return this.stylus.release();
+    const { keys } = this.hands;
+    if (keys.pressing) return keys.release();
     this.movePointer(0, 0);
-    this.stylus.press();
+    keys.press();
   }
 
-  private showPress(pressing: boolean): void {
-    button('press-hold').setAttribute('aria-pressed', String(pressing));
+  /** The blade goes into the other hand, beside the tool in the first, or is laid away. */
+  toggleTwoHands(): void {
+    if (this.session?.two_hands) this.connection.send({ type: 'second', on: !this.hands.two });
+    else this.messages.say('warning', 'Two hands need a tool and a blade: this scenario has not both.');
+  }
+
+  swapHands(): void {
+    this.hands.swap(this.pointer);
+    this.showHands();
+  }
+
+  /** Whose force is which, and what leads whom. */
+  private showHands(): void {
+    const { two, mouse, first } = this.hands;
+    const toggle = button('two-hands');
+    toggle.hidden = !this.session?.two_hands;
+    toggle.setAttribute('aria-pressed', String(two));
+    byId('hands').hidden = !two;
+    const tool = first.mode;
+    write(byId('hands'), mouse === first ? `mouse: ${tool}, keys: blade (6: change)` : `mouse: blade, keys: ${tool} (6: change)`);
+    this.showPress(this.hands.keys.pressing, true);
+    this.showDepth();
+  }
+
+  private showPress(pressing: boolean, keys: boolean): void {
+    if (keys) button('press-hold').setAttribute('aria-pressed', String(pressing));
     if (pressing) {
       this.view.setMark(null);
       this.hint.close();
@@ -408,15 +445,16 @@ export class Page {
     else this.messages.say('warning', `This scenario has no ${mode}.`);
   }
 
-  deepen(by: number): void {
-    this.stylus.deepen(by);
+  deepen(by: number, stylus: Stylus): void {
+    stylus.deepen(by);
     this.showDepth();
   }
 
   private showDepth(): void {
     const slider = element('press-depth', HTMLInputElement);
-    const depth = 1000 * this.stylus.depths[this.stylus.mode];
-    slider.min = this.stylus.mode === 'grasper' ? '-20' : '0';
+    const { keys } = this.hands;
+    const depth = 1000 * keys.depths[keys.mode];
+    slider.min = keys.mode === 'grasper' ? '-20' : '0';
     slider.value = String(depth);
     byId('press-depth-value').textContent = `${depth.toFixed(1)} mm`;
   }
@@ -443,9 +481,10 @@ export class Page {
     button('replay').addEventListener('click', () => this.replay());
     button('download').addEventListener('click', () => this.download());
     button('screenshot').addEventListener('click', () => this.screenshot());
+    button('two-hands').addEventListener('click', () => this.toggleTwoHands());
     button('press-hold').addEventListener('click', () => this.togglePress());
     element('press-depth', HTMLInputElement).addEventListener('input', (event) => {
-      this.stylus.setDepth(Number((event.target as HTMLInputElement).value) / 1000);
+      this.hands.keys.setDepth(Number((event.target as HTMLInputElement).value) / 1000);
       this.showDepth();
     });
     // Folded at first: the picture is what one comes for.
@@ -455,7 +494,7 @@ export class Page {
   }
 
   reset(): void {
-    this.stylus.release();
+    this.hands.release();
     this.connection.send({ type: 'reset' });
   }
 
@@ -472,7 +511,7 @@ export class Page {
   }
 
   park(): void {
-    this.stylus.putAway();
+    this.hands.keys.putAway();
   }
 
   home(): void {

@@ -63,6 +63,7 @@ export interface SessionStart {
   mode: Mode;
   tool: ToolShape | null;
   blade: { edge: Vec3[] } | null;
+  two_hands: boolean; // there is a tool and a blade, one for each hand
   park: Partial<Record<Mode, Vec3>>;
   spring: number;
   settings: Settings;
@@ -81,6 +82,7 @@ export type ServerText =
   | SessionStart
   | { type: 'holder'; id: number | null }
   | { type: 'mode'; mode: Mode }
+  | { type: 'second'; on: boolean } // the second hand has the blade
   | { type: 'building'; what: string }
   | { type: 'error'; code: string; text: string; about?: string }
   | { type: 'log'; level: string; text: string }
@@ -109,8 +111,9 @@ export type ClientText =
   | { type: 'take' }
   | { type: 'release' }
   | { type: 'mode'; mode: Mode }
-  | { type: 'pose'; n: number; position: Vec3; orientation?: Quaternion }
-  | { type: 'park' }
+  | { type: 'pose'; n: number; hand?: 1 | 2; position: Vec3; orientation?: Quaternion }
+  | { type: 'park'; hand?: 1 | 2 }
+  | { type: 'second'; on: boolean }
   | { type: 'grip'; closed: boolean }
   | { type: 'reset' }
   | { type: 'scenario'; name: string }
@@ -119,7 +122,7 @@ export type ClientText =
   | { type: 'record'; on: boolean }
   | { type: 'replay'; name: string | null };
 
-const textTypes = ['welcome', 'session', 'holder', 'mode', 'building', 'error', 'log', 'tear', 'recording', 'replay'];
+const textTypes = ['welcome', 'session', 'holder', 'mode', 'second', 'building', 'error', 'log', 'tear', 'recording', 'replay'];
 
 /** A text message; null: of a type this page does not know. Throws ProtocolError when it is not a JSON object with a type. */
 export function decodeText(text: string): ServerText | null {
@@ -205,6 +208,21 @@ export interface Slice {
   cut: Float32Array;
 }
 
+/** The blade in the second hand. */
+export interface SecondHand {
+  poseInTick: number;
+  poseInSolve: number;
+  hand: Vec3;
+  tip: Vec3;
+  orientation: Quaternion;
+  force: Vec3; // of the tissue on the blade
+  handForce: Vec3;
+  torque: Vec3; // likewise, about the origin of the blade's frame
+  handTorque: Vec3;
+  depth: number; // m below the surface at rest; negative: clearance
+  work: number; // J, of that hand
+}
+
 export interface Frame extends Header {
   kind: 'frame';
   time: number;
@@ -254,6 +272,7 @@ export interface Frame extends Header {
   slice: Slice | null;
   volumes: Float32Array | null;
   stages: Float32Array | null;
+  second: SecondHand | null; // null: the second hand holds nothing
 }
 
 /** What the eight numbers of Frame.stages are the time of. */
@@ -436,6 +455,28 @@ function decodeFrame(data: ArrayBuffer, view: DataView, found: Map<number, Secti
     slice: decodeSlice(data, view, found.get(20)),
     volumes: volumes ? floats(data, 21, volumes, pieceCount) : null,
     stages: stages ? floats(data, 22, stages, stageNames.length) : null,
+    second: decodeSecond(view, found.get(23)),
+  };
+}
+
+function decodeSecond(view: DataView, section: Section | undefined): SecondHand | null {
+  if (!section) return null;
+  expectBytes(23, section, 104);
+  const at = section.offset;
+  const f32 = (offset: number): number => view.getFloat32(at + offset, true);
+  const vec = (offset: number): Vec3 => [f32(offset), f32(offset + 4), f32(offset + 8)];
+  return {
+    poseInTick: view.getUint32(at, true),
+    poseInSolve: view.getUint32(at + 4, true),
+    hand: vec(8),
+    tip: vec(20),
+    orientation: [f32(32), f32(36), f32(40), f32(44)],
+    force: vec(48),
+    handForce: vec(60),
+    torque: vec(72),
+    handTorque: vec(84),
+    depth: f32(96),
+    work: f32(100),
   };
 }
 

@@ -61,6 +61,7 @@ export class Stylus {
     private readonly send: (message: ClientText) => void,
     private readonly onPose: (n: number) => void,
     private readonly onPress: (pressing: boolean) => void,
+    private readonly hand: 1 | 2 = 1,
   ) {}
 
   get pressing(): boolean {
@@ -77,17 +78,25 @@ export class Stylus {
     return this.number;
   }
 
-  setSession(session: SessionStart): void {
+  setSession(session: SessionStart, mode = session.mode): void {
     const low = new Vector3(...session.bounds.lower);
     const high = new Vector3(...session.bounds.upper);
     this.centre.copy(low).add(high).multiplyScalar(0.5);
     this.radius = 0.5 * low.distanceTo(high) + 0.02;
-    this.setMode(session.mode);
+    this.setMode(mode);
     this.withdrawAtOnce();
-    const park = session.park[session.mode];
+    const park = session.park[mode];
     this.park.copy(park ? new Vector3(...park) : new Vector3(0, 0, this.radius).add(this.centre));
     this.height.copy(this.park);
     this.place = this.aim = null;
+  }
+
+  /** Lays down what it holds: from its parking place it begins anew. */
+  leave(): void {
+    this.withdrawAtOnce();
+    this.height.copy(this.park);
+    this.place = this.aim = null;
+    this.sent.position.set(Infinity, 0, 0);
   }
 
   setMode(mode: Mode): void {
@@ -166,7 +175,7 @@ export class Stylus {
         this.wantsPark = false;
         this.aim = null;
         this.height.copy(this.park);
-        this.send({ type: 'park' });
+        this.send(this.hand === 1 ? { type: 'park' } : { type: 'park', hand: 2 });
       }
       if (!this.aim) return;
       hand = this.hover(seconds, this.aim);
@@ -299,7 +308,7 @@ export class Stylus {
     const orientation: Quaternion = [turn.x, turn.y, turn.z, turn.w];
     this.number += 1;
     this.onPose(this.number);
-    this.send({ type: 'pose', n: this.number, position: [hand.x, hand.y, hand.z], orientation });
+    this.send({ type: 'pose', n: this.number, ...(this.hand === 2 && { hand: 2 }), position: [hand.x, hand.y, hand.z], orientation });
   }
 
   private withdrawAtOnce(): void {

@@ -27,6 +27,28 @@ const up = new Vector3(0, 0, 1);
 const along = new Vector3(0, 1, 0); // axis of three's cylinders
 const springPoints = 97;
 
+/** A tool of a frame, in one hand or the other. */
+export type PosedTool = Pick<Frame, 'mode' | 'hand' | 'tip' | 'orientation' | 'axis' | 'force'>;
+
+/** Of all arrows of a picture: its steps are 1, 2 and 5, so that the largest recent force has about a quarter of the organ. */
+export class ForceScale {
+  newtonsPerMetre = 10;
+  private peak = 0; // N, largest force of the last seconds
+
+  /** Once a frame, with the largest of its forces, N, and the size of the organ, m. */
+  note(newtons: number, size: number): void {
+    this.peak = Math.max(newtons, this.peak * 0.999, 0.02);
+    const wanted = this.peak / (0.28 * size);
+    if (wanted <= this.newtonsPerMetre && wanted >= 0.3 * this.newtonsPerMetre) return;
+    const decade = Math.pow(10, Math.floor(Math.log10(wanted)));
+    this.newtonsPerMetre = ([1, 2, 5, 10].find((step) => step * decade >= wanted) ?? 10) * decade;
+  }
+
+  clear(): void {
+    this.peak = 0;
+  }
+}
+
 export class ToolModel {
   readonly group = new Group();
   showSpring = true;
@@ -38,10 +60,8 @@ export class ToolModel {
   private readonly shaft: Mesh;
   private readonly head: Mesh;
   private size = 0.2; // m, of the organ
-  private newtonsPerMetre = 10;
-  private peak = 0; // N, largest force of the last seconds
 
-  constructor() {
+  constructor(private readonly forces: ForceScale) {
     const overlay = (colour: Color, opacity: number): MeshBasicMaterial =>
       new MeshBasicMaterial({ color: colour, transparent: true, opacity, depthTest: false });
     this.ghost = new Mesh(new SphereGeometry(1, 16, 12), overlay(handColour, 0.45));
@@ -61,7 +81,7 @@ export class ToolModel {
 
   /** How many newtons one metre of the arrow stands for. */
   get scale(): number {
-    return this.newtonsPerMetre;
+    return this.forces.newtonsPerMetre;
   }
 
   setSession(session: SessionStart): void {
@@ -72,7 +92,6 @@ export class ToolModel {
     this.tools = {};
     const { lower, upper } = session.bounds;
     this.size = Math.hypot(upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]);
-    this.peak = 0;
     this.tools.probe = probe(session, this.size);
     this.tools.grasper = grasper(session, this.size);
     if (session.blade) this.tools.blade = blade(session.blade.edge, this.size);
@@ -81,7 +100,11 @@ export class ToolModel {
     this.group.visible = false;
   }
 
-  update(frame: Frame): void {
+  hide(): void {
+    this.group.visible = false;
+  }
+
+  update(frame: PosedTool): void {
     this.group.visible = true;
     const tip = new Vector3(...frame.tip);
     const hand = new Vector3(...frame.hand);
@@ -113,16 +136,10 @@ export class ToolModel {
     return [];
   }
 
-  /** The arrow: linear in the force, its scale a step of 1, 2, 5 so that the recent peak has about a quarter of the organ. */
+  /** The arrow: linear in the force. */
   private point(tip: Vector3, force: Vector3): void {
     const newtons = force.length();
-    this.peak = Math.max(newtons, this.peak * 0.999, 0.02);
-    const wanted = this.peak / (0.28 * this.size);
-    if (wanted > this.newtonsPerMetre || wanted < 0.3 * this.newtonsPerMetre) {
-      const decade = Math.pow(10, Math.floor(Math.log10(wanted)));
-      this.newtonsPerMetre = ([1, 2, 5, 10].find((step) => step * decade >= wanted) ?? 10) * decade;
-    }
-    const length = newtons / this.newtonsPerMetre;
+    const length = newtons / this.forces.newtonsPerMetre;
     this.arrow.visible = length > 0.004 * this.size;
     if (!this.arrow.visible) return;
     for (const { material } of [this.shaft, this.head]) (material as MeshBasicMaterial).color.set(forceColour(newtons));

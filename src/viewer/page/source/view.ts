@@ -19,7 +19,7 @@ import { Drape } from './room';
 import { clearAlpha, Still, windowOf } from './still';
 import type { Ray } from './stylus';
 import type { Hit } from './surface';
-import { ToolModel } from './tool_model';
+import { ForceScale, type PosedTool, ToolModel } from './tool_model';
 import { ToolShadow } from './tool_shadow';
 import { crossing, Trace } from './trace';
 
@@ -35,13 +35,17 @@ const leastInterval = 30; // ms between two pictures, where the processor draws
 export class View {
   readonly orbit = new Orbit();
   readonly body = new Body();
-  readonly tool = new ToolModel();
+  private readonly forces = new ForceScale(); // of both arrows
+  readonly tool = new ToolModel(this.forces);
+  readonly second = new ToolModel(this.forces); // the blade in the second hand
   readonly overlays = new Overlays();
   readonly trace = new Trace();
   readonly plan = new Plan();
   readonly shadow = new ToolShadow();
+  readonly secondShadow = new ToolShadow(); // of the blade in the second hand
   readonly drape: Drape; // below the picture, which is drawn over it
   showPlan = false; // where the blade would go
+  private size = 0.2; // m, of the organ
   readonly software: boolean; // drawn by the processor
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
@@ -79,7 +83,7 @@ export class View {
     this.mark.renderOrder = 4;
     this.scene.add(this.standing, this.moving);
     this.standing.add(this.body.group, this.overlays.group);
-    this.moving.add(this.trace.mesh, this.plan.mesh, this.shadow.mesh, this.tool.group, this.mark);
+    this.moving.add(this.trace.mesh, this.plan.mesh, this.shadow.mesh, this.secondShadow.mesh, this.tool.group, this.second.group, this.mark);
     new ResizeObserver(() => this.resize()).observe(canvas);
     // What a browser does with the canvas of a window that is not seen is its own affair.
     document.addEventListener('visibilitychange', () => this.change());
@@ -109,8 +113,11 @@ export class View {
     const { lower, upper } = session.bounds;
     const size = Math.hypot(upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]);
     if (!same) this.orbit.frameBox(lower, upper);
+    this.size = size;
     this.mark.scale.setScalar(0.018 * size);
+    this.forces.clear();
     this.tool.setSession(session);
+    this.second.setSession(session);
     this.trace.clear(size);
     this.plan.setSize(size);
     this.drape.lay(lower, upper);
@@ -120,26 +127,43 @@ export class View {
   /** The tool of a frame, and, with the blade's `edge` in its frame, its way since the solve that is shown. */
   follow(frame: Frame, edge: readonly Vec3[]): void {
     this.frame = frame;
-    this.tool.update(frame);
-    if (frame.mode !== 'blade') return;
+    this.showTools(frame);
+    const blade = bladeOf(frame);
+    if (!blade) return;
     const cast = (origin: Vec3, direction: Vec3): Hit | null => this.body.cast(origin, direction);
-    this.trace.note(crossing(edge, frame.tip, frame.orientation, cast), frame.poseInTick, frame.poseInSolve);
+    this.trace.note(crossing(edge, blade.tip, blade.orientation, cast), blade.poseInTick, blade.poseInSolve);
+  }
+
+  /** What both hands hold, and the forces on it. */
+  showTools(frame: Frame): void {
+    const { second } = frame;
+    this.forces.note(Math.max(Math.hypot(...frame.force), second ? Math.hypot(...second.force) : 0), this.size);
+    this.tool.update(frame);
+    if (!second) return this.second.hide();
+    const posed: PosedTool = { mode: 'blade', axis: [0, 0, 1], ...second };
+    this.second.update(posed);
   }
 
   /** Where the blade would go; of another tool nothing. */
   private plot(): void {
-    const frame = this.frame;
+    const blade = this.frame && bladeOf(this.frame);
     const surface = this.body.surface();
-    if (!this.showPlan || frame?.mode !== 'blade' || !surface) return this.plan.hide();
-    this.plan.show(planned(frame.tip, frame.orientation, surface.positions, surface.triangles));
+    if (!this.showPlan || !blade || !surface) return this.plan.hide();
+    this.plan.show(planned(blade.tip, blade.orientation, surface.positions, surface.triangles));
   }
 
   /** The shadow of the tool, as the lamp stands. */
   private darken(): void {
     const surface = this.body.surface();
     // Colours that stand for values are not darkened.
-    if (!surface || this.body.transparent || this.body.coloured) return this.shadow.hide();
-    this.shadow.fall(this.tool.rods(), this.body.lighting.lamp.value, surface.positions, surface.normals, surface.triangles);
+    if (!surface || this.body.transparent || this.body.coloured) {
+      this.shadow.hide();
+      return this.secondShadow.hide();
+    }
+    const { positions, normals, triangles } = surface;
+    const lamp = this.body.lighting.lamp.value;
+    this.shadow.fall(this.tool.rods(), lamp, positions, normals, triangles);
+    this.secondShadow.fall(this.second.rods(), lamp, positions, normals, triangles);
   }
 
   /** Where the stylus is on the surface; null: nowhere. */
@@ -331,6 +355,11 @@ export class View {
     this.change();
     this.drawNow();
   }
+}
+
+/** The blade of a frame, in whichever hand; null: neither has it. */
+function bladeOf(frame: Frame): Pick<Frame, 'tip' | 'orientation' | 'poseInTick' | 'poseInSolve'> | null {
+  return frame.second ?? (frame.mode === 'blade' ? frame : null);
 }
 
 /** Whether WebGL is computed by the processor, where smoothing edges costs more than the picture. */
