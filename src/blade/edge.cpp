@@ -177,6 +177,15 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
     met = pose_between(poses[leg], poses[leg + 1], end_of(leg, in, is_cut).first);
     on_surface = false;
   }
+  // Along its own line it slides, and pushes nothing: it stands where it begins to go across.
+  const Vector3 line = met.orientation * part.along, entry = placed(met, part.point);
+  for (const bool came_in = on_surface; came_in && leg + 1 < poses.size();) {
+    const Vector3 moved = placed(poses[leg + 1], part.point) - entry;
+    if ((moved - moved.dot(line) * line).norm() > least_motion * spacing_)
+      break;
+    met = poses[++leg];
+    on_surface = outside(met);
+  }
   // Its way from there: to where it is clear of its start and, past a turn, of the cut that is there already, on whose
   // faces it does not push when it goes back.
   const Vector3 along = met.orientation * part.along, start = placed(poses[leg], part.point);

@@ -84,6 +84,8 @@ class BladeForce {
   /// Moves the blade on while its next cut is being made: as far as the force of steady cutting (in a first cut, which
   /// takes more, a multiple of it) or to its pose.
   void wait(const BodyModel& now);
+  /// What the edge releases over what it needs; more than a few times is a cut that does not come.
+  [[nodiscard]] double overload() const { return state_ ? report().release / needed() : 0; }
   /// Whether it has been left so far behind its pose that there is a cut to come.
   [[nodiscard]] bool lags() const;
 

@@ -13,6 +13,8 @@
 namespace spherecut::app {
 namespace {
 
+constexpr double most_overload = 5; // times of what a cut needs, that the edge may release without one
+
 BladeEdge edge_of(const SessionState& state) {
   const auto map_of = [&state](const BodyModel& model) {
     return [&state, &model](const Vector3& x) {
@@ -136,7 +138,21 @@ double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
   }
   if (!placed)
     state_.incisions->place(*sample.blade, to_rest);
-  return surface + cut_on(sample, proposes_in_background() && !out, report);
+  const bool in_background = proposes_in_background() && !out;
+  surface += cut_on(sample, in_background, report);
+  if (!in_background)
+    warn_of_overload(sample.time);
+  return surface;
+}
+
+// An edge that releases more is held by tissue whose cut is refused, or is not found.
+void ResistedBlade::warn_of_overload(double time) {
+  if (const double times = force_.overload(); times > most_overload)
+    state_.log.warn("overload", fmt::format("t = {:g} s: the blade's edge releases {:.2g} times what its cut needs "
+                                            "(most: {:g}), and the cut does not come: its force of {:.3g} N is not "
+                                            "that of this toughness. Smaller steps (blade.step) or finer nodes "
+                                            "(cut.front_spacing) may find the cut",
+                                            time, times, most_overload, force_.report().force.norm()));
 }
 
 // A proposal is solved with the tool as it was: where that touches or holds, and is elsewhere now, it is of no use.

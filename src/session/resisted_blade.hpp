@@ -43,6 +43,7 @@ class ResistedBlade {
   double press_at(const StepSample& sample, CutReport& report);
   void leave(const StepSample& sample);
   void look_at_loads(double time);
+  void warn_of_overload(double time);
   void drop_of_another_grip(const StepSample& sample);
   double cut_on(const StepSample& sample, bool in_background, CutReport& report);
   bool sweep(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);

@@ -116,6 +116,9 @@ class Viewer {
   }
   void say(const Json& message) { socket_.send(message.dump()); }
   void pose(const Vector3& at) { say({{"type", "pose"}, {"n", ++number}, {"position", {at.x(), at.y(), at.z()}}}); }
+  void pose_second(const Vector3& at) {
+    say({{"type", "pose"}, {"n", ++number}, {"hand", 2}, {"position", {at.x(), at.y(), at.z()}}});
+  }
   /// Takes messages until the condition holds.
   template <typename Condition>
   bool until(const Condition& condition, double seconds = 60) {
@@ -155,7 +158,7 @@ class Viewer {
   }
 
   std::uint32_t number = 0;
-  Json welcome, session, holder, mode, recording, replay;
+  Json welcome, session, holder, mode, second, recording, replay;
   std::vector<Json> errors;
   std::string topology, frame, picture; // the newest; picture: the newest frame with vertices
   int topologies = 0, frames = 0, pictures = 0;
@@ -172,6 +175,7 @@ class Viewer {
                                         {"session", &session},
                                         {"holder", &holder},
                                         {"mode", &mode},
+                                        {"second", &second},
                                         {"recording", &recording},
                                         {"replay", &replay}})
         if (type == name)
@@ -274,6 +278,10 @@ TEST_CASE("Messages are read as they are meant and refused in words") {
                            R"({"type":"pose","n":1,"position":[1,2,"x"]})",
                            R"({"type":"pose","n":1,"position":[1,2,1e9]})",
                            R"({"type":"pose","n":1,"position":[1,2,3],"orientation":[0,0,0,0]})",
+                           R"({"type":"pose","n":1,"position":[1,2,3],"hand":3})",
+                           R"({"type":"second"})",
+                           R"({"type":"second","on":1})",
+                           R"({"type":"park","hand":"left"})",
                            R"({"type":"mode","mode":"saw"})",
                            R"({"type":"overlays","slice":{"point":[0,0,0],"normal":[0,0,0],"size":1}})",
                            R"({"type":"overlays","colour":"red"})",
@@ -543,6 +551,75 @@ TEST_CASE("One viewer presses and cuts while another watches, over the wire") {
   }
   CHECK(first.sound);
   CHECK(second.sound);
+}
+
+TEST_CASE("Two hands of one viewer: the probe rests on the body while the blade cuts, and a recording has both") {
+  const Served served(replaced(live_block, "poisson_ratio = 0.3", "poisson_ratio = 0.3\ntoughness = 5"));
+  Viewer viewer(served.port());
+  Viewer watcher(served.port());
+  const auto blade = [&](std::size_t offset) { // of section 23
+    const std::string bytes = Viewer::section(viewer.frame, 23);
+    std::array<float, 3> x{};
+    if (bytes.size() == 104)
+      std::memcpy(x.data(), bytes.data() + offset, sizeof x);
+    return Vector3(x[0], x[1], x[2]);
+  };
+  const auto has_blade = [&] { return !Viewer::section(viewer.frame, 23).empty(); };
+  REQUIRE(viewer.until([&] { return !viewer.session.is_null(); }));
+  CHECK(viewer.session["two_hands"] == true);
+  viewer.say({{"type", "second"}, {"on", true}});
+  REQUIRE(viewer.until([&] { return viewer.errors.size() == 1; }));
+  CHECK(viewer.errors[0]["code"] == "no_tool");
+  viewer.say({{"type", "take"}});
+  viewer.pose_second({0, -0.04, 0.03});
+  REQUIRE(viewer.until([&] { return viewer.errors.size() == 2; }));
+  CHECK(viewer.errors[1]["code"] == "unavailable");
+  viewer.say({{"type", "record"}, {"on", true}});
+  REQUIRE(viewer.until([&] { return !viewer.recording.is_null() && viewer.recording["on"] == true; }));
+  viewer.say({{"type", "second"}, {"on", true}});
+  REQUIRE(viewer.until([&] { return viewer.second["on"] == true && has_blade(); }));
+  CHECK(watcher.until([&] { return !watcher.second.is_null() && watcher.second["on"] == true; }));
+  viewer.pose({-0.012, 0, 0.035});
+  viewer.pose({-0.012, 0, 0.028}); // the probe presses
+  REQUIRE(viewer.until([&] { return viewer.vector(116).norm() > 0.01; }));
+  const Vector3 pressing = viewer.vector(116);
+  viewer.pose_second({0.012, -0.045, 0.018});
+  REQUIRE(viewer.until([&] { return (blade(8) - Vector3(0.012, -0.045, 0.018)).norm() < 1e-4; }));
+  viewer.pose_second({0.012, 0.02, 0.018});
+  double resisted = 0; // N
+  REQUIRE(viewer.until([&] {
+    resisted = std::max(resisted, blade(48).norm());
+    return viewer.value<float>(216) > 1e-4;
+  }));
+  CHECK(resisted > 0.01);
+  CHECK(viewer.vector(116).norm() > 0.5 * pressing.norm()); // it has not moved
+  CHECK(viewer.value<std::uint32_t>(48) == 0);              // and is the probe
+  // The blade into the first hand: the second has nothing then.
+  viewer.say({{"type", "mode"}, {"mode", "blade"}});
+  REQUIRE(viewer.until([&] { return viewer.second["on"] == false && !has_blade(); }));
+  // And into the second again: the first has the probe.
+  viewer.say({{"type", "second"}, {"on", true}});
+  REQUIRE(viewer.until([&] { return viewer.second["on"] == true && viewer.mode["mode"] == "probe" && has_blade(); }));
+  viewer.say({{"type", "record"}, {"on", false}});
+  REQUIRE(viewer.until([&] { return viewer.recording["on"] == false; }));
+  const std::string name = viewer.recording["name"];
+  const ProgramResult again =
+      run_spherecut({"haptics", "--replay", (served.folder().path() / "recordings" / name).string(), "--out",
+                     (served.folder().path() / "again").string()});
+  INFO(again.out << again.err);
+  CHECK(again.status == 0);
+  CHECK_THAT(again.out, Catch::Contains("both hands"));
+  viewer.say({{"type", "replay"}, {"name", name}});
+  REQUIRE(viewer.until([&] { return viewer.replay["on"] == true; }));
+  CHECK(viewer.until([&] { return (viewer.value<std::uint32_t>(44) & 4U) != 0 && blade(48).norm() > 0.01; }));
+  // Whoever holds the tool lays both away with it.
+  viewer.say({{"type", "replay"}, {"name", nullptr}});
+  REQUIRE(viewer.until([&] { return viewer.replay["on"] == false; }));
+  viewer.say({{"type", "second"}, {"on", true}});
+  REQUIRE(viewer.until([&] { return viewer.second["on"] == true && has_blade(); }));
+  viewer.say({{"type", "release"}});
+  CHECK(viewer.until([&] { return viewer.second["on"] == false && !has_blade(); }));
+  CHECK(viewer.sound);
 }
 
 TEST_CASE("What lies beside the scenarios and recordings, and how much of it, stops no viewer") {

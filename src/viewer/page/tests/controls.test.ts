@@ -6,7 +6,7 @@ import test, { after, before } from 'node:test';
 import type { Browser, Page as Tab } from 'playwright-core';
 import { PNG } from 'pngjs';
 import { launch, type Opened, openPage, until } from './browser';
-import { above, chooseMode, hover, look, ready } from './hand';
+import { above, chooseMode, hover, look, lookSecond, ready } from './hand';
 import { block, press, withdraw } from './block';
 import { box, composited, count, organIsSeen, see, shadesIn } from './composited';
 import { serve, type Served } from './server';
@@ -19,7 +19,8 @@ let opened: Opened;
 const through = '[[precut]]\nshape = "rectangle"\ncentre = [0.003, 0, 0.015]\nnormal = [1, 0, 0]\nup = [0, 0, 1]\nwidth = 0.1\nheight = 0.1\n';
 
 before(async () => {
-  const others = { 'severed.toml': block('severed', through) };
+  const tough = block('two hands').replace('poisson_ratio = 0.3', 'poisson_ratio = 0.3\ntoughness = 2');
+  const others = { 'severed.toml': block('severed', through), 'two.toml': tough };
   served = await serve(build, join(source, 'scenarios/liver_live.toml'), () => block('whole'), others);
   browser = await launch();
   opened = await openPage(browser, served.address);
@@ -266,7 +267,7 @@ test('Poisson ratio, toughness, method, support rule and spacings arrive at the 
 
 test('Another scenario is chosen from the list; its pieces are told with their volumes', async () => {
   const { tab } = opened;
-  assert.deepEqual(await tab.$$eval('#scenario option', (options) => options.map((option) => option.textContent)), ['whole', 'severed']);
+  assert.deepEqual(await tab.$$eval('#scenario option', (options) => options.map((option) => option.textContent)), ['whole', 'severed', 'two hands']);
   await until(tab, 'the block is one piece', () => document.querySelectorAll('#pieces tr').length === 1);
   assert.equal(await tab.textContent('#pieces tr:first-child td:nth-child(2)'), '108.0');
   await anew(tab, () => tab.selectOption('#scenario', 'severed.toml'));
@@ -360,6 +361,67 @@ test('Recording, replay and download by keyboard', async () => {
   await anew(tab, () => tab.keyboard.press('y'));
 });
 
+/** The blade in the second hand is over the organ, and the body has been solved for that. */
+const bladeHovers = (tab: Tab): Promise<void> =>
+  until(tab, 'the blade hovers', () => {
+    const { second } = globalThis.spherecut!.frame!;
+    return second !== null && Math.abs(second.depth) < 0.009 && second.poseInSolve === second.poseInTick;
+  });
+
+test('Two hands: by keys the probe presses and stays, by the mouse the blade cuts beside it', async () => {
+  const { tab } = opened;
+  await anew(tab, () => tab.selectOption('#scenario', 'two.toml'));
+  await tab.focus('#scene');
+  await tab.keyboard.press('h');
+  await hover(tab, -0.014, 0.001);
+  const alone = await see(tab);
+  assert.ok(await tab.isHidden('#second-readout'));
+  await tab.keyboard.press('5');
+  await until(tab, 'the second hand has the blade', () => globalThis.spherecut!.frame!.second !== null);
+  assert.equal(await tab.textContent('#hands'), 'mouse: blade, keys: probe (6: change)');
+  await tab.keyboard.press(' ');
+  await until(tab, 'the probe presses', () => Math.hypot(...globalThis.spherecut!.frame!.force) > 0.03);
+  const place = await above(tab, 0.013, 0.008);
+  await tab.mouse.move(place.x, place.y);
+  await bladeHovers(tab);
+  const { force: pressing } = await look(tab);
+  const both = await see(tab);
+  const blade = await tab.evaluate(() => {
+    const { view, frame } = globalThis.spherecut!;
+    const { left, top } = view.canvas.getBoundingClientRect();
+    const { x, y } = view.pixel(frame!.second!.tip);
+    return { left: left + x - 30, right: left + x + 60, top: top + y - 70, bottom: top + y + 10 };
+  });
+  const [steel, before] = [both, alone].map(({ picture }) => count(picture, 'steel', blade));
+  assert.ok(steel! > before! + 150, `${steel} px of steel where the blade is, ${before} before it was there`);
+  organIsSeen(both, 'with two tools');
+  assert.ok(await tab.isVisible('#second-readout'));
+  const to = await above(tab, 0.013, -0.014);
+  await tab.mouse.down();
+  await until(tab, 'the blade is in', () => globalThis.spherecut!.frame!.second!.depth > 0.005);
+  let felt = 0;
+  for (let i = 1; i <= 25; ++i) {
+    await tab.mouse.move(place.x + ((to.x - place.x) * i) / 25, place.y + ((to.y - place.y) * i) / 25);
+    await tab.waitForTimeout(60);
+    felt = Math.max(felt, (await lookSecond(tab))!.force);
+  }
+  await until(tab, 'it has cut', () => globalThis.spherecut!.frame!.cutArea > 3e-5);
+  felt = Math.max(felt, (await lookSecond(tab))!.force);
+  assert.ok(felt > 0.005, `the blade feels ${felt} N of 2 J/m2`);
+  const { force } = await look(tab);
+  assert.ok(force > 0.4 * pressing && force < 1.6 * pressing, `the probe stays: ${pressing} N before, ${force} N beside the cut`);
+  await tab.mouse.up();
+  // Mouse and keys change hands: the mouse leads the probe then, which rests where it was let go.
+  await tab.keyboard.press('6');
+  assert.equal(await tab.textContent('#hands'), 'mouse: probe, keys: blade (6: change)');
+  await tab.keyboard.press('5');
+  await until(tab, 'the second hand holds nothing', () => globalThis.spherecut!.frame!.second === null);
+  assert.ok(await tab.isHidden('#hands'));
+  await tab.keyboard.press(' ');
+  await until(tab, 'the probe has withdrawn', () => Math.hypot(...globalThis.spherecut!.frame!.force) === 0);
+  await anew(tab, () => tab.selectOption('#scenario', 'scenario.toml'));
+});
+
 test('One finger presses, two fingers zoom', async () => {
   await opened.tab.click('#take');
   await until(opened.tab, 'it has let go', () => !globalThis.spherecut!.holding);
@@ -382,6 +444,24 @@ test('One finger presses, two fingers zoom', async () => {
   await say('touchEnd', []);
   assert.ok((await camera(tab)).far < 0.8 * far, 'it does not come nearer');
   assert.equal(await tab.evaluate(() => Math.hypot(...globalThis.spherecut!.frame!.force)), 0);
+  // With two hands two fingers on the organ lead both: the first the blade, the second the probe.
+  await anew(tab, () => tab.selectOption('#scenario', 'two.toml'));
+  await tab.click('#home');
+  await tab.click('#two-hands');
+  await until(tab, 'the second hand has the blade', () => globalThis.spherecut!.frame!.second !== null);
+  const [left, right] = [await above(tab, -0.014, 0.001), await above(tab, 0.014, 0.001)];
+  await say('touchStart', [{ ...left, id: 1 }]);
+  await until(tab, 'the blade is in', () => globalThis.spherecut!.frame!.second!.depth > 0.002);
+  await say('touchStart', [{ ...left, id: 1 }, { ...right, id: 2 }]);
+  await until(tab, 'the probe presses beside it', () => {
+    const { frame } = globalThis.spherecut!;
+    return Math.hypot(...frame!.force) > 0.03 && frame!.second!.depth > 0.002 && frame!.tip[0] > 0.005 && frame!.second!.tip[0] < -0.005;
+  });
+  await say('touchEnd', []);
+  await until(tab, 'both have withdrawn', () => {
+    const { frame } = globalThis.spherecut!;
+    return Math.hypot(...frame!.force) === 0 && frame!.second!.depth < 0;
+  });
   assert.deepEqual(complaints, []);
   await context.close();
 });

@@ -42,6 +42,14 @@ export function look(tab: Tab): Promise<Seen> {
   });
 }
 
+/** The blade in the second hand; null: it holds nothing. */
+export function lookSecond(tab: Tab): Promise<{ force: number; depth: number; tip: number[] } | null> {
+  return tab.evaluate(() => {
+    const second = globalThis.spherecut!.frame!.second;
+    return second && { force: Math.hypot(...second.force), depth: second.depth, tip: [...second.tip] };
+  });
+}
+
 export const ready = (tab: Tab): Promise<void> =>
   until(tab, 'a frame, and the tool in the hand', () => Boolean(globalThis.spherecut?.frame && globalThis.spherecut.holding));
 
