@@ -23,6 +23,7 @@ constexpr double opening_tolerance = 1e-6; // m
 constexpr double same_contact = 1e-4;      // of the node spacing, and of one: what has not moved
 constexpr double in_sheet = 0.1;           // node spacings from a sheet: a place there is in it
 constexpr double least_motion = 1e-3;      // of the node spacing, that tells a direction
+constexpr double most_across = 0.1;        // of a way along its own line: an edge that goes across by no more slides in
 
 /// Of the pairs of lips along their normals, m.
 VectorX openings(const BodyModel& body, const solvers::Field& field) {
@@ -177,14 +178,22 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
     met = pose_between(poses[leg], poses[leg + 1], end_of(leg, in, is_cut).first);
     on_surface = false;
   }
-  // Along its own line it slides, and pushes nothing: it stands where it begins to go across.
-  const Vector3 line = met.orientation * part.along, entry = placed(met, part.point);
-  for (const bool came_in = on_surface; came_in && leg + 1 < poses.size();) {
-    const Vector3 moved = placed(poses[leg + 1], part.point) - entry;
-    if ((moved - moved.dot(line) * line).norm() > least_motion * spacing_)
-      break;
-    met = poses[++leg];
-    on_surface = outside(met);
+  // Along its own line it slides in, and pushes nothing: it stands where it was last in the body before it goes across.
+  if (on_surface) {
+    const Vector3 line = met.orientation * part.along;
+    Vector3 before = placed(met, part.point);
+    const std::size_t entry = leg;
+    for (std::size_t next = entry + 1; next < poses.size(); ++next) {
+      const Vector3 x = placed(poses[next], part.point);
+      const double slid = std::abs((x - before).dot(line));
+      if ((x - before - (x - before).dot(line) * line).norm() > std::max(most_across * slid, least_motion * spacing_))
+        break;
+      before = x;
+      if (!outside(poses[next]))
+        leg = next;
+    }
+    if (leg > entry)
+      met = poses[leg];
   }
   // Its way from there: to where it is clear of its start and, past a turn, of the cut that is there already, on whose
   // faces it does not push when it goes back.

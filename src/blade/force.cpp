@@ -194,6 +194,12 @@ void BladeForce::propose(BodyModel body, std::size_t poses) {
   proposal_->through = !edge_.inside(way_.poses()[proposal_->poses], proposal_->body);
 }
 
+void BladeForce::solve_proposal(const std::function<void(BodyModel&)>& solve) {
+  solve(proposal_->body);
+  proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, proposal_->meeting);
+  press_proposal();
+}
+
 std::vector<FrontPlace> BladeForce::places_at_front() const {
   double length = 0;
   for (const solvers::EdgeContact& contact : meeting_.patch.contacts)

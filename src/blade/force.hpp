@@ -9,6 +9,8 @@
 #include "src/blade/course.hpp"
 #include "src/blade/grip.hpp"
 
+#include <functional>
+
 namespace spherecut::app {
 
 /// What the blade feels at the end of a step, and where its work has gone since the start.
@@ -65,6 +67,9 @@ class BladeForce {
   /// The body with the way cut through these poses. Throws NumericalError where a body at finite strain has no
   /// equilibrium under the edge: what was proposed before stays.
   void propose(BodyModel body, std::size_t poses);
+  /// The proposed body is solved anew by `solve`, the tool having moved, and the edge meets it again. Throws as propose
+  /// and what `solve` throws; then it is of no use.
+  void solve_proposal(const std::function<void(BodyModel&)>& solve);
   /// Where the edge presses on the front of a cut.
   [[nodiscard]] std::vector<FrontPlace> places_at_front() const;
   /// What loads other than the blade release there as the front goes on, J/m2. The edge has the rest to pay.
@@ -84,8 +89,9 @@ class BladeForce {
   /// Moves the blade on while its next cut is being made: as far as the force of steady cutting (in a first cut, which
   /// takes more, a multiple of it) or to its pose.
   void wait(const BodyModel& now);
-  /// What the edge releases over what it needs; more than a few times is a cut that does not come.
-  [[nodiscard]] double overload() const { return state_ ? report().release / needed() : 0; }
+  /// What the edge releases over what a cut takes that nothing else pays for; more than a few times, step by step, is a
+  /// cut that does not come.
+  [[nodiscard]] double overload() const { return state_ ? report().release / edge_.needed(meeting_, 0) : 0; }
   /// Whether it has been left so far behind its pose that there is a cut to come.
   [[nodiscard]] bool lags() const;
 

@@ -75,6 +75,7 @@ Hands read_hands(Device& first, Device* second, std::uint64_t tick) noexcept {
   Hands hands(first.read(tick));
   if (second == nullptr)
     return hands;
+  hands.are_two = true;
   DeviceState other = second->read(tick);
   const auto mode = static_cast<HandMode>(other.mode);
   if ((mode == HandMode::usual || mode == HandMode::blade) &&

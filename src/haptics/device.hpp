@@ -66,6 +66,7 @@ struct Hands {
   /// The blade in the other hand, beside the tool in the first; its mode is HandMode::blade. Empty: there is no other
   /// hand, or it holds nothing.
   Possible<DeviceState> second;
+  bool are_two = false; // there is a second device: a blade that nobody holds goes nowhere
 
   Hands() = default;
   Hands(const DeviceState& one) : first(one) {} // NOLINT(google-explicit-constructor): one hand alone

@@ -36,6 +36,7 @@ struct TickRecord {
   double latency = 0;                       // s, from when the tick was due to when it began; 0 in virtual time
   double compute = 0;                       // s of the thread's processor time; 0 in virtual time
   Possible<SecondHandRecord> second; // empty: it holds nothing
+  bool two_hands = false;            // there is a second device
 };
 
 /// A scheduling event: a solve that began at the pose of one tick and was taken over at another.

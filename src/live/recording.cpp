@@ -166,17 +166,18 @@ RecordedTick tick_of(Reader& in, std::uint32_t version, std::size_t expected) {
   return tick;
 }
 
-/// Those of a session that was killed may be of ticks that are missing.
-RecordedHand second_of(Reader& in, const std::vector<RecordedHand>& before) {
+/// One that holds nothing stands for there being a second hand. `last`: tick of the one before.
+RecordedHand second_of(Reader& in, const std::optional<std::uint64_t>& last) {
   RecordedHand hand;
   hand.device.tick = in.get<std::uint64_t>();
-  if (!before.empty() && hand.device.tick <= before.back().device.tick)
-    in.fail(fmt::format("tick {} of the second hand after its tick {}", hand.device.tick, before.back().device.tick));
+  if (last && hand.device.tick <= *last)
+    in.fail(fmt::format("tick {} of the second hand after its tick {}", hand.device.tick, *last));
   read_hand(in, hand);
   hand.torque = in.vector();
-  if (hand.device.mode != static_cast<std::uint16_t>(HandMode::blade))
-    in.fail(fmt::format("a second hand in mode {}; allowed: {}, the blade", hand.device.mode,
-                        static_cast<std::uint16_t>(HandMode::blade)));
+  const auto mode = static_cast<HandMode>(hand.device.mode);
+  if (mode != HandMode::blade && mode != HandMode::probe)
+    in.fail(fmt::format("a second hand in mode {}; allowed: {} with the blade, {} with nothing", hand.device.mode,
+                        static_cast<int>(HandMode::blade), static_cast<int>(HandMode::probe)));
   return hand;
 }
 
@@ -206,15 +207,15 @@ void set_clients(Recording& recording, const std::vector<RecordedClient>& client
       recording.ticks[client.tick].device.client = client.reading;
 }
 
-/// Likewise.
-void set_second(Recording& recording, const std::vector<RecordedHand>& hands,
-                const std::vector<RecordedClient>& clients) {
-  for (const RecordedHand& hand : hands)
-    if (hand.device.tick < recording.ticks.size())
-      recording.ticks[hand.device.tick].second = hand;
-  for (const RecordedClient& client : clients)
-    if (client.tick < recording.ticks.size() && recording.ticks[client.tick].second)
-      recording.ticks[client.tick].second->device.client = client.reading;
+/// Likewise; both are in the order of their ticks.
+void set_second_clients(std::vector<RecordedHand>& hands, const std::vector<RecordedClient>& clients) {
+  auto client = clients.begin();
+  for (RecordedHand& hand : hands) {
+    while (client != clients.end() && client->tick < hand.device.tick)
+      ++client;
+    if (client != clients.end() && client->tick == hand.device.tick)
+      hand.device.client = client->reading;
+  }
 }
 
 SolveRecord solve_of(Reader& in, std::uint32_t version, const std::vector<SolveRecord>& before) {
@@ -318,7 +319,11 @@ void RecordingWriter::add(const TickRecord& tick) {
     put_hand(seconds_, tick.second->device, tick.second->force);
     put(seconds_, tick.second->torque);
     put_client(second_clients_, tick.second->device);
+  } else if (tick.two_hands && !two_hands_told_) {
+    put_hand(seconds_, idle_hand(device), Vector3::Zero());
+    put(seconds_, Vector3(Vector3::Zero()));
   }
+  two_hands_told_ = two_hands_told_ || tick.two_hands;
   ++tick_count_;
   if (ticks_.size() >= lot_of_ticks * tick_size)
     flush();
@@ -373,7 +378,7 @@ Recording read_recording(const std::filesystem::path& file) {
   static_cast<void>(start.get<std::uint32_t>());
   const std::size_t torque = recording.version > 1 ? 0 : torque_size; // that is not there
   std::vector<RecordedClient> clients, second_clients;
-  std::vector<RecordedHand> seconds;
+  std::optional<std::uint64_t> last_second; // tick of the second hand
   bool named = false;
   for (std::size_t at = signature.size() + 8; at < bytes.size();) {
     Reader head(std::string_view(bytes).substr(at), file, at);
@@ -406,8 +411,13 @@ Recording read_recording(const std::filesystem::path& file) {
       clients.push_back(client_of(in));
     while (kind == second_client_lot && in.left() >= client_size)
       second_clients.push_back(client_of(in));
-    while (kind == second_lot && in.left() >= second_size)
-      seconds.push_back(second_of(in, seconds));
+    while (kind == second_lot && in.left() >= second_size) {
+      const RecordedHand hand = second_of(in, last_second);
+      last_second = hand.device.tick;
+      recording.two_hands = true;
+      if (hand.device.mode == static_cast<std::uint16_t>(HandMode::blade))
+        recording.seconds.push_back(hand);
+    }
     if (in.left() != 0)
       in.fail(fmt::format("{} bytes too many in a lot of kind {}", in.left(), kind));
     named = true;
@@ -418,12 +428,14 @@ Recording read_recording(const std::filesystem::path& file) {
     refuse(bytes.size(), "the file is cut off here, before anything was recorded");
   set_arrivals(recording, file);
   set_clients(recording, clients);
-  set_second(recording, seconds, second_clients);
+  set_second_clients(recording.seconds, second_clients);
   return recording;
 }
 
-bool Recording::has_second() const {
-  return std::any_of(ticks.begin(), ticks.end(), [](const RecordedTick& tick) { return tick.second.has_value(); });
+const RecordedHand* Recording::second_at(std::uint64_t tick) const {
+  const auto found = std::lower_bound(seconds.begin(), seconds.end(), tick,
+                                      [](const RecordedHand& hand, std::uint64_t t) { return hand.device.tick < t; });
+  return found != seconds.end() && found->device.tick == tick ? &*found : nullptr;
 }
 
 RecordedMotion::RecordedMotion(const Recording& recording, double rate, WhichHand hand) : rate_(rate) {
@@ -433,9 +445,11 @@ RecordedMotion::RecordedMotion(const Recording& recording, double rate, WhichHan
     throw InputError(fmt::format("a recording of {:g} ticks per second in a loop of {:g}; allowed: haptics.rate = {:g}",
                                  recording.header.rate, rate, recording.header.rate));
   for (const RecordedTick& tick : recording.ticks)
-    states_.push_back(hand == WhichHand::first ? tick.device
-                      : tick.second            ? tick.second->device
-                                               : idle_hand(tick.device));
+    states_.push_back(hand == WhichHand::first ? tick.device : idle_hand(tick.device));
+  if (hand == WhichHand::second)
+    for (const RecordedHand& second : recording.seconds) // those of a session that was killed may have no tick
+      if (second.device.tick < states_.size())
+        states_[second.device.tick] = second.device;
 }
 
 DeviceState RecordedMotion::read(std::uint64_t tick) noexcept {

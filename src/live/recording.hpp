@@ -45,6 +45,7 @@ class RecordingWriter {
   OutputFile file_;
   std::string ticks_, solves_, clients_, seconds_, second_clients_;
   std::uint64_t tick_count_ = 0, solve_count_ = 0;
+  bool two_hands_told_ = false;
 };
 
 /// What a hand did and felt at a tick.
@@ -56,8 +57,7 @@ struct RecordedHand {
 
 /// A tick as recorded.
 struct RecordedTick : RecordedHand {
-  std::uint64_t sequence = 0;           // of the snapshot in use
-  std::optional<RecordedHand> second{}; // of the second hand, with the blade; empty: it holds nothing
+  std::uint64_t sequence = 0; // of the snapshot in use
 };
 
 struct Recording {
@@ -67,8 +67,11 @@ struct Recording {
   std::vector<SolveRecord> solves; // event, failed, resprinkled, cut_triangles, nodes, topology, force, torque
   bool finished = false;           // false: the session was killed; everything up to its last lot is here
 
-  /// Whether a second hand has held the blade.
-  [[nodiscard]] bool has_second() const;
+  /// Of the second hand, at ticks at which it held the blade, in their order.
+  std::vector<RecordedHand> seconds;
+  bool two_hands = false; // there was a second device
+  /// Null: the second hand held nothing then.
+  [[nodiscard]] const RecordedHand* second_at(std::uint64_t tick) const;
 };
 
 /// Throws InputError, naming the place, when the file is not a recording, of a newer version, cut off within a lot,

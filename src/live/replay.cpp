@@ -24,10 +24,10 @@ bool same_solve(const SolveRecord& a, const SolveRecord& b, bool torques) {
          (!torques || same_bits(a.torque, b.torque));
 }
 
-bool same_second(const TickRecord& now, const RecordedTick& then) {
-  if (!now.second || !then.second)
-    return now.second.has_value() == then.second.has_value();
-  return same_bits(now.second->force, then.second->force) && same_bits(now.second->torque, then.second->torque);
+bool same_second(const TickRecord& now, const RecordedHand* then) {
+  if (!now.second || then == nullptr)
+    return now.second.has_value() == (then != nullptr);
+  return same_bits(now.second->force, then->force) && same_bits(now.second->torque, then->torque);
 }
 
 } // namespace
@@ -72,16 +72,16 @@ ReplayReport replay(const Recording& recording, HapticSimulation& simulation, Lo
     if (solve.event.pose_tick < recording.ticks.size())
       events.push_back(solve.event);
   RecordedMotion device(recording, recording.header.rate);
-  RecordedMotion second(recording, recording.header.rate, WhichHand::second);
+  RecordedMotion other(recording, recording.header.rate, WhichHand::second);
   VirtualOptions options;
-  if (recording.has_second())
-    options.second = &second;
+  if (recording.two_hands)
+    options.second = &other;
   options.stop = stop;
   records = run_virtual(session.scenario().haptics, simulation, device, events, recording.ticks.size(), options);
   ReplayReport report;
   report.ticks = records.ticks.size();
   report.torques = recording.version > 1;
-  report.two_hands = recording.has_second();
+  report.two_hands = recording.two_hands;
   report.solves = std::min(records.solves.size(), events.size());
   report.same_build = recording.header.build == build_identity();
   report.same_processor = recording.header.processor == processor_name();
@@ -89,17 +89,18 @@ ReplayReport replay(const Recording& recording, HapticSimulation& simulation, Lo
     const TickRecord& now = records.ticks[i];
     const RecordedTick& then = recording.ticks[i];
     const bool turned = report.torques && !same_bits(now.torque, then.torque);
-    const bool other = !same_second(now, then);
-    if (same_bits(now.force, then.force) && now.sequence == then.sequence && !turned && !other)
+    const RecordedHand* const second = recording.second_at(i);
+    const bool differs = !same_second(now, second);
+    if (same_bits(now.force, then.force) && now.sequence == then.sequence && !turned && !differs)
       continue;
     report.differing_tick = report.differing_tick.value_or(i);
     ++report.differing_ticks;
     report.largest = std::max(report.largest, (now.force - then.force).norm());
     if (report.torques)
       report.largest_torque = std::max(report.largest_torque, (now.torque - then.torque).norm());
-    if (other && now.second && then.second) {
-      report.largest = std::max(report.largest, (now.second->force - then.second->force).norm());
-      report.largest_torque = std::max(report.largest_torque, (now.second->torque - then.second->torque).norm());
+    if (differs && now.second && second != nullptr) {
+      report.largest = std::max(report.largest, (now.second->force - second->force).norm());
+      report.largest_torque = std::max(report.largest_torque, (now.second->torque - second->torque).norm());
     }
   }
   for (std::size_t i = 0; i < report.solves && !report.differing_solve; ++i)

@@ -87,7 +87,7 @@ std::unique_ptr<Device> make_device(const HapticSettings& settings, const Haptic
 std::unique_ptr<Device> make_second_device(const HapticSettings& settings, const HapticSimulation& simulation) {
   if (settings.device == HeldDevice::recording) {
     const Recording recording = read_recording(settings.recording);
-    if (!recording.has_second())
+    if (!recording.two_hands)
       return nullptr;
     return std::make_unique<RecordedMotion>(recording, settings.rate, WhichHand::second);
   }
@@ -293,7 +293,7 @@ RunEnd run_haptics(const HapticCommand& command, std::FILE* screen) {
   if (command.bench)
     return run_bench(command, watch, progress);
   const Scenario scenario = read_scenario(command.scenario);
-  require_hand(scenario);
+  require_run(scenario);
   const HapticSettings& settings = scenario.haptics;
   require_clock(command, settings);
   HapticRun run;

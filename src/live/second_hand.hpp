@@ -35,6 +35,7 @@ class SecondHand {
     const DeviceState state = hands.second.value_or(idle_hand(hands.first));
     const TickResult result = core_.tick(state);
     device_->render(result.force, result.torque);
+    record.two_hands = true;
     record.second.reset();
     if (hands.second)
       record.second = second_record_of(state, result);

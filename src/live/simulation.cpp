@@ -94,7 +94,7 @@ StepSample HapticSimulation::sample(const Hands& hands) const {
     sample.tool = tool_pose(scenario.tool->shape, device);
     if (hands.second && scenario.blade) {
       sample.blade = blade_of(*hands.second);
-    } else if (mode == HandMode::usual && scenario.blade) {
+    } else if (mode == HandMode::usual && scenario.blade && !hands.are_two) {
       double time = device.time;
       if (const double end = scenario.blade->path.back().time; solved_before(end)) // to there, whenever it is solved
         time = std::min(time, end);
@@ -139,12 +139,41 @@ void HapticSimulation::prepare(const Hands& hands) {
   session_.prepare(sample(hands));
 }
 
+HapticSimulation::Holder HapticSimulation::holder(const Hands& hands) const {
+  const Scenario& scenario = session_.scenario();
+  const auto mode = static_cast<HandMode>(hands.first.mode);
+  if (!scenario.blade)
+    return Holder::nobody;
+  if (mode == HandMode::blade || (mode == HandMode::usual && !scenario.tool))
+    return Holder::first;
+  if (hands.second)
+    return Holder::second;
+  return mode == HandMode::usual && !hands.are_two ? Holder::path : Holder::nobody;
+}
+
+// Every tick, in order: whether the blade has been let go of, or put elsewhere.
+void HapticSimulation::watch_blade(const Hands& hands) {
+  const Holder now = holder(hands);
+  const bool is_held = now == Holder::first || now == Holder::second;
+  const DeviceState& hand = now == Holder::second ? *hands.second : hands.first;
+  const double furthest = fastest_hand / session_.scenario().haptics.rate; // m, in a tick
+  const bool jumps =
+      is_held && now == holder_ && hand.tick == held_.tick + 1 && (hand.position - held_.position).norm() > furthest;
+  if (now != holder_ || jumps || (is_held && !hand.connected)) {
+    let_go_ = let_go_ || last_time_.has_value();
+    passed_.clear();
+  }
+  holder_ = now;
+  held_ = hand;
+}
+
 void HapticSimulation::pass(const Hands& hands) {
   const DeviceState& device = hands.first;
-  const DeviceState& holder = hands.second.value_or(device);
-  if (!session_.scenario().blade || !last_time_ || device.tick <= last_tick_ ||
-      static_cast<HandMode>(device.mode) != mode_ || hands.second.has_value() != has_second_ ||
-      !holder.position.allFinite() || !holder.orientation.coeffs().allFinite())
+  if (!last_time_ || device.tick <= last_tick_)
+    return;
+  watch_blade(hands);
+  if (!session_.scenario().blade || let_go_ || static_cast<HandMode>(device.mode) != mode_ ||
+      !held_.position.allFinite() || !held_.orientation.coeffs().allFinite())
     return;
   const std::optional<topology::BladePose> pose = sample(hands).blade;
   const std::optional<topology::BladePose> last = passed_.empty() ? session_.last_blade() : passed_.back();
@@ -156,16 +185,16 @@ void HapticSimulation::pass(const Hands& hands) {
 void HapticSimulation::solve(const Hands& hands, int degradation, ContactSnapshot& snapshot, ContactSnapshot* second) {
   const auto start = std::chrono::steady_clock::now();
   const DeviceState& device = hands.first;
+  watch_blade(hands);
   std::vector<topology::BladePose> passed = std::exchange(passed_, {});
   last_tick_ = device.tick;
   if (degradation != degradation_) {
     session_.coarsen(std::pow(coarse_per_level, degradation));
     degradation_ = degradation;
   }
-  if (const auto mode = static_cast<HandMode>(device.mode); mode != mode_ || hands.second.has_value() != has_second_) {
+  mode_ = static_cast<HandMode>(device.mode);
+  if (std::exchange(let_go_, false)) {
     session_.lift_blade();
-    mode_ = mode;
-    has_second_ = hands.second.has_value();
     passed.clear();
   }
   if (mode_ != HandMode::usual) {

@@ -30,7 +30,8 @@ class DegradationRule {
 };
 
 /// The first hand holds what HandMode says, the second the blade beside the first one's tool: both are solved at once.
-/// When a hand takes the blade anew that is lifted: it cuts from where it is then.
+/// When a hand takes the blade anew that is lifted: it cuts from where it is then. So it is after its device has not
+/// answered for a while, and after a jump (fastest_hand).
 class HapticSimulation {
  public:
   /// As Session. Throws InputError when there is neither tool nor blade to hold.
@@ -77,6 +78,10 @@ class HapticSimulation {
 
  private:
   [[nodiscard]] StepSample sample(const Hands& hands) const;
+  /// What has the blade.
+  enum class Holder : std::uint8_t { nobody, path, first, second };
+  [[nodiscard]] Holder holder(const Hands& hands) const;
+  void watch_blade(const Hands& hands);
   void fill_tool(ContactSnapshot& snapshot);
   void fill_blade(const DeviceState& device, ContactSnapshot& snapshot) const;
   void fill_common(const DeviceState& device, ContactSnapshot& snapshot) const;
@@ -91,7 +96,9 @@ class HapticSimulation {
   std::vector<topology::BladePose> passed_; // by the blade since then, some way apart
   int degradation_ = 0;
   HandMode mode_ = HandMode::usual; // of the first hand in the last solve
-  bool has_second_ = false;         // the second held the blade in it
+  Holder holder_ = Holder::nobody;  // in the last tick
+  DeviceState held_;                // of that hand
+  bool let_go_ = false;             // the blade has been since the last solve, or was taken up elsewhere
 };
 
 /// Solves as an event says and tells what came of it. A failure leaves the snapshots as they were. Throws Interrupted.

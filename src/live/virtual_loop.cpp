@@ -61,6 +61,7 @@ class InFlight {
 
 Hands hands_of(const TickRecord& tick) {
   Hands hands(tick.device);
+  hands.are_two = tick.two_hands;
   if (tick.second)
     hands.second = tick.second->device;
   return hands;

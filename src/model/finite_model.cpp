@@ -103,17 +103,6 @@ void require_run(const Scenario& scenario) {
                                scenario.file.string(), hindrance.line, hindrance.what, name_of(scenario.law)));
 }
 
-void require_hand(const Scenario& scenario) {
-  require_run(scenario);
-  if (!is_nonlinear(scenario.law) || !scenario.tool || !scenario.tool->grasp || !scenario.blade)
-    return;
-  throw InputError(
-      fmt::format("{}:{}: tool.shape = \"grasper\" beside a [blade] does not go with material.law = \"{}\" "
-                  "in a hand; possible there: a tool that presses, rubs or bonds, or a grasper without a "
-                  "blade",
-                  scenario.file.string(), scenario.tool->line, name_of(scenario.law)));
-}
-
 bool can_run(const Scenario& scenario) {
   return is_nonlinear(scenario.law) ? hindrance_of(scenario).what.empty() : scenario.law.spec.prony.empty();
 }

@@ -12,8 +12,6 @@ namespace spherecut::app {
 
 /// Throws InputError naming file, line, what a run cannot compute with the scenario's law and what it can.
 void require_run(const Scenario& scenario);
-/// The same of a session in a hand, whose grasper has no blade beside it.
-void require_hand(const Scenario& scenario);
 [[nodiscard]] bool can_run(const Scenario& scenario);
 
 /// One equilibrium.

@@ -13,7 +13,8 @@
 namespace spherecut::app {
 namespace {
 
-constexpr double most_overload = 5; // times of what a cut needs, that the edge may release without one
+constexpr double most_overload = 5; // times of what a cut takes, that the edge may release without one
+constexpr int overloads_told = 3;   // steps on end
 
 BladeEdge edge_of(const SessionState& state) {
   const auto map_of = [&state](const BodyModel& model) {
@@ -105,7 +106,7 @@ double ResistedBlade::press(const StepSample& sample, CutReport& report) {
 
 // The energy of the surface that the blade makes on its way to the sample's pose, J.
 double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
-  drop_of_another_grip(sample);
+  follow_tool(sample);
   const topology::RestMap to_rest = state_.to_rest();
   std::vector<topology::BladePose> passed = blade_.passed();
   const bool placed = !force_.way().empty();
@@ -138,35 +139,48 @@ double ResistedBlade::press_at(const StepSample& sample, CutReport& report) {
   }
   if (!placed)
     state_.incisions->place(*sample.blade, to_rest);
-  const bool in_background = proposes_in_background() && !out;
-  surface += cut_on(sample, in_background, report);
-  if (!in_background)
-    warn_of_overload(sample.time);
+  surface += cut_on(sample, proposes_in_background() && !out, report);
+  watch_overload(sample.time, surface > 0);
   return surface;
 }
 
-// An edge that releases more is held by tissue whose cut is refused, or is not found.
-void ResistedBlade::warn_of_overload(double time) {
-  if (const double times = force_.overload(); times > most_overload)
-    state_.log.warn("overload", fmt::format("t = {:g} s: the blade's edge releases {:.2g} times what its cut needs "
-                                            "(most: {:g}), and the cut does not come: its force of {:.3g} N is not "
-                                            "that of this toughness. Smaller steps (blade.step) or finer nodes "
-                                            "(cut.front_spacing) may find the cut",
-                                            time, times, most_overload, force_.report().force.norm()));
+// An edge that releases more in step after step is held by tissue whose cut is refused, or is not found.
+void ResistedBlade::watch_overload(double time, bool has_cut) {
+  const double times = force_.overload();
+  if (has_cut || background_.proposing() != nullptr || times <= most_overload) {
+    overloads_ = 0;
+    return;
+  }
+  if (++overloads_ < overloads_told)
+    return;
+  state_.log.warn("overload",
+                  fmt::format("t = {:g} s: the blade's edge releases {:.2g} times what its cut takes (most: "
+                              "{:g}), and the cut does not come: its force of {:.3g} N is not that of this "
+                              "toughness. Smaller steps (blade.step) or finer nodes (cut.front_spacing) "
+                              "may find the cut",
+                              time, times, most_overload, force_.report().force.norm()));
 }
 
-// A proposal is solved with the tool as it was: where that touches or holds, and is elsewhere now, it is of no use.
-void ResistedBlade::drop_of_another_grip(const StepSample& sample) {
+// A proposal is solved with the tool as it was: where that touches or holds, and is elsewhere now, it is solved again.
+// One that is being made is solved when it is there. Where the tool has come or gone it is dropped.
+void ResistedBlade::follow_tool(const StepSample& sample) {
   const bool touches = contact_.is_in_reach();
-  const bool is_same =
-      touches == touched_ &&
-      (!touches || !tool_ || !sample.tool || (tool_->point == sample.tool->point && tool_->axis == sample.tool->axis));
-  if (!is_same && (force_.proposed() || background_.proposing() != nullptr)) {
-    force_.withdraw();
-    drop_proposal();
-  }
+  const bool comes_or_goes = touches != touched_;
+  const bool moves =
+      touches && tool_ && sample.tool && (tool_->point != sample.tool->point || tool_->axis != sample.tool->axis);
   touched_ = touches;
   tool_ = sample.tool;
+  if (comes_or_goes && (force_.proposed() || background_.proposing() != nullptr)) {
+    force_.withdraw();
+    drop_proposal();
+  } else if (moves && force_.proposed()) {
+    try {
+      force_.solve_proposal([&](BodyModel& body) { contact_.solve(sample, body); });
+    } catch (const std::runtime_error&) { // another is made where it is wanted
+      force_.withdraw();
+      drop_proposal();
+    }
+  }
 }
 
 // What it has passed without a cut is told.

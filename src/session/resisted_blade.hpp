@@ -43,8 +43,8 @@ class ResistedBlade {
   double press_at(const StepSample& sample, CutReport& report);
   void leave(const StepSample& sample);
   void look_at_loads(double time);
-  void warn_of_overload(double time);
-  void drop_of_another_grip(const StepSample& sample);
+  void watch_overload(double time, bool has_cut);
+  void follow_tool(const StepSample& sample);
   double cut_on(const StepSample& sample, bool in_background, CutReport& report);
   bool sweep(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
   bool propose(const std::vector<topology::BladePose>& poses, const StepSample& sample, CutReport& report);
@@ -60,6 +60,7 @@ class ResistedBlade {
   const TearFronts& fronts_;
   BladeForce force_;
   std::string renewed_;                       // why all nodes are made anew for the last cut; empty: they are not
+  int overloads_ = 0;                         // steps on end with too much behind the edge, and no cut
   bool touched_ = false;                      // the tool was in reach in the last step,
   std::optional<topology::ToolPose> tool_;    // there
   std::optional<IncisionBuilder::Mark> mark_; // the cut without the proposal; empty: there is none

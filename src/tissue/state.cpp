@@ -21,7 +21,7 @@ Organ timed_organ(const OrganSettings& settings, double& seconds) {
 const Scenario& checked(const Scenario& scenario, const Organ& organ, Leader leader, SessionLog& log) {
   interruption_point();
   if (leader == Leader::device)
-    require_hand(scenario);
+    require_run(scenario);
   require_regions_apart(scenario, organ.domain);
   use_one_blas_thread();
   for (const std::string& remark : organ.remarks)

@@ -12,6 +12,8 @@
 namespace spherecut::app {
 namespace {
 
+constexpr double under_way = 2; // s, that poses of a hand which holds nothing any more may take to come
+
 /// Whether threads of this process may have a real-time priority.
 bool fifo_granted() {
   bool granted = false;
@@ -209,8 +211,10 @@ void Hub::set_second(int client, bool on) {
                                      "second"));
     return;
   }
-  if (second_on_)
+  if (second_on_) {
+    viewers_.send(client, second_text(true));
     return;
+  }
   if (tool_.mode() == HandMode::blade)
     set_mode(client, session_->places().modes().front());
   second_.put_down(*session_, HandMode::blade);
@@ -222,11 +226,14 @@ void Hub::lay_second_away() {
   if (!std::exchange(second_on_, false))
     return;
   second_.lay_away(*session_);
+  second_laid_ = std::chrono::steady_clock::now();
   viewers_.send_all(second_text(false));
 }
 
 void Hub::move(int client, const Request& request) {
   if (request.hand == WhichHand::second && !second_on_) {
+    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - second_laid_).count() < under_way)
+      return; // it was sent before
     viewers_.send(client, error_text("unavailable", "the second hand holds nothing: ask for 'second' first", "pose"));
     return;
   }
@@ -361,6 +368,8 @@ void Hub::finish_building() {
       viewers_.send(order->client, error_text(order->code, order->failure, order->about));
   }
   viewers_.send_all(session_text(*session_, epoch_, tool_.mode()));
+  if (second_on_)
+    viewers_.send_all(second_text(true));
   if (builder_.start())
     viewers_.send_all(building_text(builder_.building()->what));
 }
@@ -375,8 +384,10 @@ void Hub::take_over(SessionOrder& order) {
   replaying_ = session_->replays() ? order.replayed : "";
   tool_.change_session(*session_);
   second_.change_session(*session_);
-  if (std::exchange(second_on_, false))
+  if (std::exchange(second_on_, false)) {
+    second_laid_ = std::chrono::steady_clock::now();
     viewers_.send_all(second_text(false));
+  }
   session_->request(viewers_.wanted());
   meter_.restart();
   tear_ = {};

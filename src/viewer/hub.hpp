@@ -66,8 +66,9 @@ class Hub {
   LineQueue log_;
   SessionBuilder builder_; // waits for the sessions that it builds and ends after the current one has ended
   std::unique_ptr<LiveSession> session_;
-  HeldTool tool_, second_; // of both hands; whoever holds the first has the other
-  bool second_on_ = false; // that one has the blade
+  HeldTool tool_, second_;                              // of both hands; whoever holds the first has the other
+  bool second_on_ = false;                              // that one has the blade
+  std::chrono::steady_clock::time_point second_laid_{}; // when it was last laid away
   Viewers viewers_;
   RateMeter meter_;
   bool changed_ = false;   // settings of the session, from those of its file

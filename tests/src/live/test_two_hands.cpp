@@ -12,6 +12,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 using namespace spherecut;
@@ -88,7 +89,9 @@ Run run_hands(const Scenario& scenario, const std::function<void(DeviceState&)>&
 } // namespace
 
 TEST_CASE("Grasper and blade in two hands are solved at once: both wrenches are those of a run on the same ways") {
-  const Scenario scenario = scenario_of(lifted_flap("", 0.002));
+  const std::string law = GENERATE(as<std::string>(), "", "law = \"neo_hookean\"\n");
+  CAPTURE(law);
+  const Scenario scenario = scenario_of(lifted_flap(law, 0.002));
   Session session(scenario);
   std::vector<StepResult> steps;
   for (const StepSample& sample : session.steps())
@@ -150,7 +153,7 @@ TEST_CASE("A session of two hands is recorded and replays bit by bit, also where
   }
   const Recording recording = read_recording(file);
   CHECK(recording.version == recording_version);
-  CHECK(recording.has_second());
+  CHECK(recording.two_hands);
   HapticSimulation again(recorded_scenario(recording));
   LoopRecords records;
   const ReplayReport report = replay(recording, again, records);
@@ -160,11 +163,78 @@ TEST_CASE("A session of two hands is recorded and replays bit by bit, also where
   CHECK(text_of(report).find("both hands") != std::string::npos);
   // Another motion of the second hand is found out.
   Recording other = recording;
-  for (RecordedTick& tick : other.ticks)
-    if (tick.second && tick.device.tick >= 1800)
-      tick.second->device.position.z() += 1e-3;
+  for (RecordedHand& hand : other.seconds)
+    if (hand.device.tick >= 1800)
+      hand.device.position.z() += 1e-3;
   HapticSimulation third(recorded_scenario(recording));
   CHECK_FALSE(replay(other, third, records).same());
+}
+
+TEST_CASE("A blade that is laid away and taken up elsewhere between two solves does not cut on the way there") {
+  const Scenario scenario = scenario_of(lifted_flap("", 0.0002));
+  const auto area_at = [](const Run& run, std::uint64_t tick) {
+    return run.records.solves[tick / solve_every].cut_area;
+  };
+  const Run whole = run_hands(scenario, hold_blade);
+  CHECK(area_at(whole, 1750) > area_at(whole, 1500) + 2e-5);
+  const Run laid = run_hands(scenario, [](DeviceState& state) {
+    state.mode = static_cast<std::uint16_t>(state.tick > 1510 && state.tick < 1560 ? HandMode::probe : HandMode::blade);
+  });
+  CHECK(area_at(laid, 1500) == area_at(whole, 1500));
+  CHECK(area_at(laid, 1750) == area_at(laid, 1500));
+  const Run silent = run_hands(scenario, [](DeviceState& state) {
+    hold_blade(state);
+    state.connected = state.tick <= 1510 || state.tick >= 1560;
+  });
+  CHECK(area_at(silent, 1750) == area_at(silent, 1500));
+  const Run jumped = run_hands(scenario, [](DeviceState& state) {
+    hold_blade(state);
+    if (state.tick >= 1560)
+      state.position.x() += 0.004; // within a tick
+  });
+  CHECK(area_at(jumped, 1750) == area_at(jumped, 1500));
+}
+
+TEST_CASE("A blade that no hand holds goes nowhere, whatever the scenario's path") {
+  const Scenario scenario = scenario_of(lifted_flap("", 0.0002));
+  HapticSimulation simulation(scenario);
+  ScriptedPath first(simulation.path(), 1000); // in the usual mode
+  Holder second(simulation.second_path(),
+                [](DeviceState& state) { state.mode = static_cast<std::uint16_t>(HandMode::probe); });
+  VirtualOptions options;
+  options.second = &second;
+  const LoopRecords records =
+      run_virtual(scenario.haptics, simulation, first, regular_solves(ticks, solve_every, 0), ticks, options);
+  CHECK(records.solves.back().cut_area == records.solves.front().cut_area);
+  CHECK_FALSE(records.solves.back().failed);
+}
+
+TEST_CASE("Cuts that are made in the background arrive while the tool in the other hand moves") {
+  const std::string text =
+      "[organ]\nshape = \"block\"\nsize = [0.06, 0.06, 0.03]\nedge = 0.006\n[material]\nyoung_modulus = "
+      "1e4\npoisson_ratio = 0.3\ntoughness = 2\n[[fixed]]\nregion = \"half_space\"\npoint = [-0.029, 0, 0]\nnormal = "
+      "[1, 0, 0]\n[[fixed]]\nregion = \"half_space\"\npoint = [0.029, 0, 0]\nnormal = [-1, 0, "
+      "0]\n[nodes]\nfine_spacing = 0.007\ncoarse_spacing = 0.014\nfine_radius = 0.008\n[tool]\nshape = "
+      "\"sphere_tip\"\nradius = 0.01\nstep = 0.1\n[[tool.path]]\ntime = 0\nposition = [-0.014, 0.001, "
+      "0.034]\n[[tool.path]]\ntime = 1\nposition = [-0.014, 0.001, 0.028]\n[blade]\nedge = [[0, 0, -0.01], [0, 0, "
+      "0.03]]\n[[blade.path]]\ntime = 0\nposition = [0.013, 0.034, 0.022]\n[[blade.path]]\ntime = 2\nposition = "
+      "[0.013, 0.004, 0.022]\n";
+  const Scenario scenario = scenario_of(text);
+  HapticSimulation simulation(scenario);
+  Holder first(simulation.path(), [](DeviceState& state) {
+    state.mode = static_cast<std::uint16_t>(HandMode::probe);
+    state.position.z() += 1e-4 * std::sin(0.05 * static_cast<double>(state.tick)); // a hand is never still
+  });
+  Holder second(simulation.second_path(), hold_blade);
+  VirtualOptions options;
+  options.second = &second;
+  std::vector<SolveEvent> events = regular_solves(ticks, 40, 0);
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    events[i].in_background = true;
+    events[i].swaps = i % 2 == 1;
+  }
+  const LoopRecords records = run_virtual(scenario.haptics, simulation, first, events, ticks, options);
+  CHECK(records.solves.back().cut_area > 0.5 * 0.018 * 0.026);
 }
 
 TEST_CASE("The second hand holds the blade unless the first has it, or it says that it holds nothing") {

@@ -5,6 +5,8 @@ import type { ClientText, Frame, SessionStart } from './protocol';
 import { type Ray, Stylus } from './stylus';
 import type { Hit } from './surface';
 
+const keysRest = 400; // ms, after which keys begin anew where their tool is
+
 export interface HandsHost {
   /** The surface under a ray; of the body as it was when a press began, where that is given. */
   cast(ray: Ray, frozen: Snapshot | null): Hit | null;
@@ -21,7 +23,8 @@ export class Hands {
   readonly second: Stylus;
   private isTwo = false;
   private swapped = false; // the mouse leads the first hand, the keys the second
-  private keysAt = { x: -1, y: -1 }; // px, of the hand that the keys lead beside the mouse
+  private keysAt = { x: 0, y: 0 }; // px, of the hand that the keys lead beside the mouse,
+  private keysMoved = -Infinity; // ms, when they last did
 
   constructor(private readonly host: HandsHost) {
     this.first = this.make(1);
@@ -75,25 +78,27 @@ export class Hands {
     if (session.two_hands) this.second.setSession(session, 'blade');
   }
 
-  /** The second hand has the blade from now on, or nothing. `at`: where the mouse is, px: the keys go on from there. */
-  setTwo(on: boolean, holding: boolean, at = { x: -1, y: -1 }): void {
+  /** The second hand has the blade from now on, or nothing. */
+  setTwo(on: boolean, holding: boolean): void {
     this.second.leave();
     this.isTwo = on;
     this.swapped = false;
-    this.keysAt = { ...at };
+    this.keysMoved = -Infinity;
     this.second.holding = on && holding;
   }
 
-  /** Mouse and keys change hands; `at`: where the mouse is, px, and where the keys go on from. */
-  swap(at: { x: number; y: number }): void {
+  /** Mouse and keys change hands. */
+  swap(): void {
     if (!this.isTwo) return;
     this.swapped = !this.swapped;
-    this.keysAt = { ...at };
+    this.keysMoved = -Infinity;
   }
 
-  /** Where the keys lead their hand, px; with one hand that is where the mouse is. */
-  keysFrom(mouse: { x: number; y: number }): { x: number; y: number } {
-    return this.isTwo ? this.keysAt : mouse;
+  /** With two hands, where the keys lead theirs, px, to be changed: on from the last time, after a rest from its `tip`. */
+  keysFrom(tip: () => { x: number; y: number }, now: number): { x: number; y: number } {
+    if (now - this.keysMoved > keysRest) this.keysAt = tip();
+    this.keysMoved = now;
+    return this.keysAt;
   }
 
   answered(frame: Frame): void {

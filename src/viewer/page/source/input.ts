@@ -25,7 +25,8 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, hands: Ha
   const fingers = new Map<number, Finger>();
   let gesture: 'none' | 'press' | 'turn' | 'pan' | 'two' = 'none';
   let depthAtStart = 0;
-  let stylus: Stylus = hands.mouse; // that a press leads
+  let stylus: Stylus = hands.mouse; // that a press leads,
+  let leader = -1; // and the pointer that leads it
   let beside: { finger: number; stylus: Stylus } | null = null; // the other hand, led by a second finger
 
   const at = (event: PointerEvent | WheelEvent): Finger => {
@@ -60,6 +61,7 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, hands: Ha
       host.moved(place.x, place.y);
       depthAtStart = stylus.depths[stylus.mode];
       gesture = 'press';
+      leader = event.pointerId;
       stylus.press();
     } else gesture = 'turn';
   });
@@ -81,6 +83,7 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, hands: Ha
     if (gesture === 'two') {
       pinch(event.pointerId, before, place);
     } else if (gesture === 'press') {
+      if (event.pointerId !== leader) return;
       host.moved(place.x, place.y);
       stylus.point(host.ray(place.x, place.y));
       if (event.pointerType === 'pen' && event.pressure > 0) stylus.setDepth(event.pressure * 2 * depthAtStart);
@@ -101,6 +104,7 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, hands: Ha
       return;
     }
     if (gesture === 'press') {
+      if (event.pointerId !== leader) return;
       stylus.release();
       if (event.pointerType === 'pen') stylus.setDepth(depthAtStart);
     }

@@ -11,7 +11,7 @@ import { Latency } from './latency';
 import { Messages } from './messages';
 import type { Snapshot } from './body';
 import { Panels, tearInWords } from './panels';
-import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Tear, Topology, Welcome } from './protocol';
+import type { Frame, Mode, Nodes, Scalars, ServerText, SessionStart, Slice, Support, Tear, Topology, Vec3, Welcome } from './protocol';
 import { remember, remembered } from './remembered';
 import { savePicture } from './screenshot';
 import { castRay, type Hit } from './surface';
@@ -44,6 +44,7 @@ export class Page {
   private readonly connection: Connection;
   private pending: Frame[] = [];
   private replayed: string | null = null; // name of the recording that is played
+  private handsEpoch = -1; // of the session that the hands are in
   private tearEpoch = -1; // of the session that `tear` is of
   private taken = 0; // frames that the last picture shows
   private completed = true; // that picture is done
@@ -121,8 +122,10 @@ export class Page {
         this.panels.setMode(message.mode);
         return this.showDepth();
       case 'second':
-        this.hands.setTwo(message.on, this.holding, this.pointer);
-        this.view.trace.clear();
+        if (message.on !== this.hands.two) {
+          this.hands.setTwo(message.on, this.holding);
+          this.view.trace.clear();
+        }
         return this.showHands();
       case 'building':
         byId('link').textContent = 'building';
@@ -152,6 +155,7 @@ export class Page {
 
   private welcome(message: Welcome): void {
     this.id = message.id;
+    this.handsEpoch = -1;
     this.wantsTool = true;
     this.panels.setScenarios(message.scenarios);
     for (const recording of message.recordings) this.panels.addRecording(recording);
@@ -172,7 +176,9 @@ export class Page {
     }
     this.showLive();
     this.view.setSession(session, same);
-    this.hands.setSession(session);
+    // One that could not be replaced goes on, with the hands where they are.
+    if (session.epoch !== this.handsEpoch) this.hands.setSession(session);
+    this.handsEpoch = session.epoch;
     this.showHands();
     this.panels.setSession(session);
     this.showDepth();
@@ -395,10 +401,12 @@ export class Page {
   movePointer(dx: number, dy: number): void {
     const { clientWidth, clientHeight } = this.view.canvas;
     if (this.pointer.x < 0) this.centrePointer();
-    const from = this.hands.keysFrom(this.pointer);
+    const { hands } = this;
+    const from = hands.two ? hands.keysFrom(() => this.view.pixel(this.tipOfKeys()), performance.now()) : this.pointer;
     const x = Math.min(Math.max(from.x + dx, 0), clientWidth);
     const y = Math.min(Math.max(from.y + dy, 0), clientHeight);
-    if (this.hands.keys.point(this.view.ray(x, y))) Object.assign(from, { x, y });
+    // With two hands the keys find the organ from wherever their tool is, also past places beside it.
+    if (hands.keys.point(this.view.ray(x, y)) || hands.two) Object.assign(from, { x, y });
   }
 
   togglePress(): void {
@@ -408,6 +416,12 @@ export class Page {
     keys.press();
   }
 
+  /** Where the tool is that the keys lead, m. */
+  private tipOfKeys(): Vec3 {
+    const { frame } = this;
+    return (this.hands.keys === this.hands.first ? frame?.tip : frame?.second?.tip) ?? [0, 0, 0];
+  }
+
   /** The blade goes into the other hand, beside the tool in the first, or is laid away. */
   toggleTwoHands(): void {
     if (this.session?.two_hands) this.connection.send({ type: 'second', on: !this.hands.two });
@@ -415,7 +429,7 @@ export class Page {
   }
 
   swapHands(): void {
-    this.hands.swap(this.pointer);
+    this.hands.swap();
     this.showHands();
   }
 
