@@ -28,7 +28,7 @@ function memory(process: number): number {
 
 const mean = (values: number[]): number => values.reduce((sum, value) => sum + value, 0) / Math.max(values.length, 1);
 
-// The flap of tearing, with a blade beside the grasper, which only the linear law has in a hand, and time for a rebuild
+// The flap of tearing, with a blade beside the grasper, by the linear law, which alone tears beside one, and time for a rebuild
 // as the live liver has.
 const flap =
   coarserFlap(readFileSync(join(source, 'scenarios/liver_flap.toml'), 'utf8')).replace('law = "neo_hookean"\n', '') +
