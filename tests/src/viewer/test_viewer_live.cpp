@@ -594,6 +594,16 @@ TEST_CASE("Two hands of one viewer: the probe rests on the body while the blade 
   CHECK(resisted > 0.01);
   CHECK(viewer.vector(116).norm() > 0.5 * pressing.norm()); // it has not moved
   CHECK(viewer.value<std::uint32_t>(48) == 0);              // and is the probe
+  // A session that cannot be replaced goes on with both hands, and whoever asks again is told.
+  viewer.second = nullptr;
+  viewer.say({{"type", "set"}, {"coarse_spacing", 1e-4}, {"fine_spacing", 1e-3}});
+  REQUIRE(viewer.until([&] { return viewer.errors.size() == 3 && !viewer.second.is_null(); }));
+  CHECK(viewer.second["on"] == true);
+  CHECK(has_blade());
+  viewer.second = nullptr;
+  viewer.say({{"type", "second"}, {"on", true}});
+  REQUIRE(viewer.until([&] { return !viewer.second.is_null(); }));
+  CHECK(viewer.second["on"] == true);
   // The blade into the first hand: the second has nothing then.
   viewer.say({{"type", "mode"}, {"mode", "blade"}});
   REQUIRE(viewer.until([&] { return viewer.second["on"] == false && !has_blade(); }));
