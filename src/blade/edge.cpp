@@ -180,15 +180,13 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
   }
   // Along its own line it slides in, and pushes nothing: it stands where it was last in the body before it goes across.
   if (on_surface) {
-    const Vector3 line = met.orientation * part.along;
-    Vector3 before = placed(met, part.point);
+    const Vector3 line = met.orientation * part.along, entered = placed(met, part.point);
     const std::size_t entry = leg;
     for (std::size_t next = entry + 1; next < poses.size(); ++next) {
-      const Vector3 x = placed(poses[next], part.point);
-      const double slid = std::abs((x - before).dot(line));
-      if ((x - before - (x - before).dot(line) * line).norm() > std::max(most_across * slid, least_motion * spacing_))
+      const Vector3 way = placed(poses[next], part.point) - entered;
+      const double slid = std::abs(way.dot(line));
+      if ((way - way.dot(line) * line).norm() > std::min(most_across * slid, least_increment * spacing_))
         break;
-      before = x;
       if (!outside(poses[next]))
         leg = next;
     }

@@ -96,6 +96,12 @@ void BladeForce::press(const BodyModel& now) {
     now.finite->leave_edge();
 }
 
+void BladeForce::meet_proposal(const EdgeMeeting& last) {
+  proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, last);
+  press_proposal();
+  proposal_->through = !edge_.inside(way_.poses()[proposal_->poses], proposal_->body);
+}
+
 void BladeForce::press_proposal() {
   EdgeMeeting& meeting = proposal_->meeting;
   if (proposal_->body.finite != nullptr && !meeting.pieces.empty())
@@ -185,19 +191,16 @@ void BladeForce::propose(BodyModel body, std::size_t poses) {
   next.body = std::move(body);
   std::optional<Proposal> before = std::exchange(proposal_, std::move(next));
   try {
-    proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, {});
-    press_proposal();
+    meet_proposal({});
   } catch (...) {
     proposal_ = std::move(before);
     throw;
   }
-  proposal_->through = !edge_.inside(way_.poses()[proposal_->poses], proposal_->body);
 }
 
 void BladeForce::solve_proposal(const std::function<void(BodyModel&)>& solve) {
   solve(proposal_->body);
-  proposal_->meeting = edge_.meet(proposal_->body, way_.poses(), proposal_->poses, proposal_->meeting);
-  press_proposal();
+  meet_proposal(EdgeMeeting(proposal_->meeting));
 }
 
 std::vector<FrontPlace> BladeForce::places_at_front() const {

@@ -131,6 +131,7 @@ class BladeForce {
   [[nodiscard]] static double drag_of(const EdgeMeeting& meeting) { return meeting.patch.dragged ? 1 : 0; }
   [[nodiscard]] static solvers::BladeState state_at(EdgeMeeting& meeting, const BodyModel& body,
                                                     const VectorX& advance);
+  void meet_proposal(const EdgeMeeting& last);
   void press_proposal();
   [[nodiscard]] std::optional<double> due_on_way_to(const BodyModel& now, const topology::BladePose& target) const;
   [[nodiscard]] bool is_due();

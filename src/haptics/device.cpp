@@ -76,14 +76,17 @@ Hands read_hands(Device& first, Device* second, std::uint64_t tick) noexcept {
   if (second == nullptr)
     return hands;
   hands.are_two = true;
-  DeviceState other = second->read(tick);
+  const DeviceState other = second->read(tick);
   const auto mode = static_cast<HandMode>(other.mode);
   if ((mode == HandMode::usual || mode == HandMode::blade) &&
-      hands.first.mode != static_cast<std::uint16_t>(HandMode::blade)) {
-    other.mode = static_cast<std::uint16_t>(HandMode::blade);
+      hands.first.mode != static_cast<std::uint16_t>(HandMode::blade))
     hands.second = other;
-  }
   return hands;
+}
+
+DeviceState with_blade(DeviceState hand) noexcept {
+  hand.mode = static_cast<std::uint16_t>(HandMode::blade);
+  return hand;
 }
 
 DeviceState idle_hand(const DeviceState& other) noexcept {

@@ -63,7 +63,7 @@ enum class WhichHand : std::uint8_t { first, second };
 /// Both hands at a tick of a loop.
 struct Hands {
   DeviceState first;
-  /// The blade in the other hand, beside the tool in the first; its mode is HandMode::blade. Empty: there is no other
+  /// The blade in the other hand, beside the tool in the first, in mode `usual` or `blade`. Empty: there is no other
   /// hand, or it holds nothing.
   Possible<DeviceState> second;
   bool are_two = false; // there is a second device: a blade that nobody holds goes nowhere
@@ -75,6 +75,9 @@ struct Hands {
 /// Where both devices are at a tick; `second` (null: there is none) holds the blade in the modes `usual` and `blade`,
 /// unless the first hand has it. To be called as Device::read is.
 Hands read_hands(Device& first, Device* second, std::uint64_t tick) noexcept;
+
+/// The state of a hand that is known to hold the blade, in that mode.
+DeviceState with_blade(DeviceState hand) noexcept;
 
 /// A hand that holds nothing, at the tick of another: it feels no force.
 DeviceState idle_hand(const DeviceState& other) noexcept;

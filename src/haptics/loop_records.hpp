@@ -33,8 +33,8 @@ struct TickRecord {
   bool limited = false, outside = false, converged = true;
   double softened = 1; // share of the force that was rendered, for the device's stiffness
   int active = 0, rounds = 0;
-  double latency = 0;                       // s, from when the tick was due to when it began; 0 in virtual time
-  double compute = 0;                       // s of the thread's processor time; 0 in virtual time
+  double latency = 0;                // s, from when the tick was due to when it began; 0 in virtual time
+  double compute = 0;                // s of the thread's processor time; 0 in virtual time
   Possible<SecondHandRecord> second; // empty: it holds nothing
   bool two_hands = false;            // there is a second device
 };

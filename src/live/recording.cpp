@@ -175,9 +175,10 @@ RecordedHand second_of(Reader& in, const std::optional<std::uint64_t>& last) {
   read_hand(in, hand);
   hand.torque = in.vector();
   const auto mode = static_cast<HandMode>(hand.device.mode);
-  if (mode != HandMode::blade && mode != HandMode::probe)
-    in.fail(fmt::format("a second hand in mode {}; allowed: {} with the blade, {} with nothing", hand.device.mode,
-                        static_cast<int>(HandMode::blade), static_cast<int>(HandMode::probe)));
+  if (mode != HandMode::usual && mode != HandMode::blade && mode != HandMode::probe)
+    in.fail(fmt::format("a second hand in mode {}; allowed: {} and {} with the blade, {} with nothing",
+                        hand.device.mode, static_cast<int>(HandMode::usual), static_cast<int>(HandMode::blade),
+                        static_cast<int>(HandMode::probe)));
   return hand;
 }
 
@@ -415,7 +416,7 @@ Recording read_recording(const std::filesystem::path& file) {
       const RecordedHand hand = second_of(in, last_second);
       last_second = hand.device.tick;
       recording.two_hands = true;
-      if (hand.device.mode == static_cast<std::uint16_t>(HandMode::blade))
+      if (hand.device.mode != static_cast<std::uint16_t>(HandMode::probe))
         recording.seconds.push_back(hand);
     }
     if (in.left() != 0)

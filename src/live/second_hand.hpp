@@ -32,13 +32,12 @@ class SecondHand {
   void tick(const Hands& hands, TickRecord& record) noexcept {
     if (!is_there())
       return;
-    const DeviceState state = hands.second.value_or(idle_hand(hands.first));
-    const TickResult result = core_.tick(state);
+    const TickResult result = core_.tick(hands.second ? with_blade(*hands.second) : idle_hand(hands.first));
     device_->render(result.force, result.torque);
     record.two_hands = true;
     record.second.reset();
     if (hands.second)
-      record.second = second_record_of(state, result);
+      record.second = second_record_of(*hands.second, result);
   }
 
  private:

@@ -15,6 +15,7 @@ namespace spherecut::app {
 namespace {
 
 constexpr double pass_distance = 0.1; // fine spacings between poses that the blade passes
+constexpr int longest_unheard = 20; // ticks without a pose, after which a hand may come in one tick as far as in those
 
 // FNV-1a over words: equal bits, equal hash.
 class Hash {
@@ -151,18 +152,22 @@ HapticSimulation::Holder HapticSimulation::holder(const Hands& hands) const {
   return mode == HandMode::usual && !hands.are_two ? Holder::path : Holder::nobody;
 }
 
-// Every tick, in order: whether the blade has been let go of, or put elsewhere.
+// Every tick, in order: whether the blade has been let go of, or put elsewhere. A hand that has not moved for some
+// ticks may have gone on unheard meanwhile.
 void HapticSimulation::watch_blade(const Hands& hands) {
   const Holder now = holder(hands);
   const bool is_held = now == Holder::first || now == Holder::second;
   const DeviceState& hand = now == Holder::second ? *hands.second : hands.first;
-  const double furthest = fastest_hand / session_.scenario().haptics.rate; // m, in a tick
-  const bool jumps =
-      is_held && now == holder_ && hand.tick == held_.tick + 1 && (hand.position - held_.position).norm() > furthest;
-  if (now != holder_ || jumps || (is_held && !hand.connected)) {
-    let_go_ = let_go_ || last_time_.has_value();
+  const double way = (hand.position - held_.position).norm();                              // m, since the tick before
+  const double furthest = fastest_hand / session_.scenario().haptics.rate * (1 + rested_); // m
+  const bool goes_on = now == holder_ && hand.tick == held_.tick + 1;
+  const bool taken_first = !last_time_ && is_held && static_cast<HandMode>(hand.mode) == HandMode::blade;
+  if (taken_first ||
+      (last_time_ && (now != holder_ || (is_held && (!hand.connected || (goes_on && way > furthest)))))) {
+    let_go_ = true;
     passed_.clear();
   }
+  rested_ = goes_on && way == 0 ? std::min(rested_ + 1, longest_unheard) : 0;
   holder_ = now;
   held_ = hand;
 }
@@ -209,7 +214,7 @@ void HapticSimulation::solve(const Hands& hands, int degradation, ContactSnapsho
     fill_blade(device, snapshot);
   fill_common(device, snapshot);
   if (second != nullptr) {
-    const DeviceState other = hands.second.value_or(idle_hand(device));
+    const DeviceState other = hands.second ? with_blade(*hands.second) : idle_hand(device);
     if (hands.second)
       fill_blade(other, *second);
     else

@@ -98,6 +98,7 @@ class HapticSimulation {
   HandMode mode_ = HandMode::usual; // of the first hand in the last solve
   Holder holder_ = Holder::nobody;  // in the last tick
   DeviceState held_;                // of that hand
+  int rested_ = 0;                  // ticks for which that hand has not moved, at most longest_unheard
   bool let_go_ = false;             // the blade has been since the last solve, or was taken up elsewhere
 };
 

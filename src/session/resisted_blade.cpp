@@ -78,6 +78,11 @@ void ResistedBlade::drop_proposal() {
   forget_mark();
 }
 
+void ResistedBlade::withdraw() {
+  force_.withdraw();
+  drop_proposal();
+}
+
 void ResistedBlade::forget_mark() {
   mark_.reset();
   state_.shown_wound.reset();
@@ -171,14 +176,12 @@ void ResistedBlade::follow_tool(const StepSample& sample) {
   touched_ = touches;
   tool_ = sample.tool;
   if (comes_or_goes && (force_.proposed() || background_.proposing() != nullptr)) {
-    force_.withdraw();
-    drop_proposal();
+    withdraw();
   } else if (moves && force_.proposed()) {
     try {
-      force_.solve_proposal([&](BodyModel& body) { contact_.solve(sample, body); });
+      force_.solve_proposal([&](BodyModel& body) { contact_.solve_beside(sample, body); });
     } catch (const std::runtime_error&) { // another is made where it is wanted
-      force_.withdraw();
-      drop_proposal();
+      withdraw();
     }
   }
 }

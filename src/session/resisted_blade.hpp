@@ -30,6 +30,8 @@ class ResistedBlade {
 
   /// The hand has let go of it: it is nowhere until it is put somewhere.
   void lift();
+  /// What it is to cut next is made again: nodes have gone along with the tool.
+  void withdraw();
   /// The proposal is not taken any more, and none that is under way; the cut is that of the body again.
   void drop_proposal();
   [[nodiscard]] bool has_proposal() const { return mark_.has_value(); }

@@ -296,6 +296,8 @@ void Session::Parts::follow_tool(const StepSample& sample, StepResult& result) {
   if (background.follows_cut())
     cutting.wait_for(sample, *result.cut);
   tool.follow(sample, centre, result);
+  if (resisted && result.resprinkled)
+    resisted->withdraw();
 }
 
 void Session::prepare(const StepSample& sample) {

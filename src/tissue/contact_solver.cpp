@@ -73,6 +73,14 @@ std::vector<int> ContactSolver::candidates_in_reach(const BodyModel& model) cons
   return is_in_reach() ? candidates(model) : std::vector<int>{};
 }
 
+void ContactSolver::solve_beside(const StepSample& sample, BodyModel& model) {
+  std::optional<SurfaceWatch::Depths> penetration = penetration_;
+  const bool lips_touch = lips_touch_;
+  solve(sample, model);
+  penetration_ = std::move(penetration);
+  lips_touch_ = lips_touch;
+}
+
 void ContactSolver::condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses) {
   interruption_point();
   const StageTimer timer(state_.profile.condense);

@@ -30,6 +30,8 @@ class ContactSolver {
   /// Solves the model for tool, or grasper, and lips in contact. Throws NumericalError, and InputError where nothing
   /// can be touched.
   void solve(const StepSample& sample, BodyModel& model);
+  /// The same of a body that is looked at beside the present one, of which all is told that is told after this.
+  void solve_beside(const StepSample& sample, BodyModel& model);
   /// Condenses the model onto those of the candidates that are still there.
   void condense(const std::vector<int>& candidates, BodyModel& model, bool for_few_presses = false);
   /// Surface nodes that the tool may touch, or that the grasper holds.

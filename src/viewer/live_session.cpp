@@ -37,8 +37,10 @@ LiveSession::LiveSession(Scenario scenario, const LiveOptions& options, std::fun
   const HapticSettings& settings = scenario_.haptics;
   if (options.replay != nullptr) {
     device_ = std::make_unique<RecordedMotion>(*options.replay, settings.rate);
-    if (options.replay->two_hands)
+    if (options.replay->two_hands) {
+      simulation_->require_two_hands();
       second_device_ = std::make_unique<RecordedMotion>(*options.replay, settings.rate, WhichHand::second);
+    }
   } else {
     auto hand = std::make_unique<PointerHand>(settings.hand, settings.rate, options.speed,
                                               places_->parked(places_->modes().front()));

@@ -97,6 +97,25 @@ TEST_CASE("While the edge sticks, its force between solves is that of a solve") 
   }
 }
 
+TEST_CASE(
+    "A blade that is pressed slowly, by micrometres from solve to solve, is felt as one that is pressed at once") {
+  const auto pressed = [](const std::vector<double>& heights) {
+    HapticSimulation simulation(blade_down(1e4)); // far too tough to cut
+    simulation.prepare(at_height(0, 0.0302));
+    ContactSnapshot snapshot;
+    std::uint64_t tick = 0;
+    for (const double z : heights)
+      simulation.solve(at_height(tick++, z), 0, snapshot);
+    return snapshot.force.z();
+  };
+  std::vector<double> slowly;
+  for (int k = 0; k <= 150; ++k)
+    slowly.push_back(0.0302 - 4e-6 * k);
+  const double at_once = pressed({0.0302, 0.0296});
+  CHECK(at_once > 0.05);
+  CHECK(pressed(slowly) == Approx(at_once).epsilon(0.02));
+}
+
 TEST_CASE("Where an edge has cut nothing yet, its force at most doubles until the next solve") {
   HapticSimulation simulation(blade_down(1000));
   simulation.prepare(at_height(0, 0.031));

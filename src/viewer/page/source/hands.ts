@@ -94,9 +94,9 @@ export class Hands {
     this.keysMoved = -Infinity;
   }
 
-  /** With two hands, where the keys lead theirs, px, to be changed: on from the last time, after a rest from its `tip`. */
-  keysFrom(tip: () => { x: number; y: number }, now: number): { x: number; y: number } {
-    if (now - this.keysMoved > keysRest) this.keysAt = tip();
+  /** With two hands, where the keys lead theirs, px, to be changed: on from the last time, after a rest from its `place`. */
+  keysFrom(place: () => { x: number; y: number }, now: number): { x: number; y: number } {
+    if (now - this.keysMoved > keysRest) this.keysAt = place();
     this.keysMoved = now;
     return this.keysAt;
   }

@@ -40,7 +40,8 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, hands: Ha
     canvas.setPointerCapture(event.pointerId);
     const place = at(event);
     fingers.set(event.pointerId, place);
-    if (event.pointerType === 'touch' && fingers.size === 2) {
+    const free = fingers.size - (beside ? 1 : 0); // fingers that do not lead the other hand
+    if (event.pointerType === 'touch' && free === 2) {
       const { other } = hands;
       if (gesture === 'press' && other && !beside && other.point(host.ray(place.x, place.y))) {
         other.press();
@@ -51,7 +52,7 @@ export function attachPointer(canvas: HTMLCanvasElement, orbit: Orbit, hands: Ha
       gesture = 'two';
       return;
     }
-    if (fingers.size > 1) return;
+    if (free > 1) return;
     stylus = hands.mouse;
     const ray = host.ray(place.x, place.y);
     if (event.button === 1 || (event.button === 2 && event.shiftKey)) gesture = 'pan';

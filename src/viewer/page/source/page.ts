@@ -402,7 +402,7 @@ export class Page {
     const { clientWidth, clientHeight } = this.view.canvas;
     if (this.pointer.x < 0) this.centrePointer();
     const { hands } = this;
-    const from = hands.two ? hands.keysFrom(() => this.view.pixel(this.tipOfKeys()), performance.now()) : this.pointer;
+    const from = hands.two ? hands.keysFrom(() => this.view.pixel(this.placeOfKeys()), performance.now()) : this.pointer;
     const x = Math.min(Math.max(from.x + dx, 0), clientWidth);
     const y = Math.min(Math.max(from.y + dy, 0), clientHeight);
     // With two hands the keys find the organ from wherever their tool is, also past places beside it.
@@ -416,10 +416,10 @@ export class Page {
     keys.press();
   }
 
-  /** Where the tool is that the keys lead, m. */
-  private tipOfKeys(): Vec3 {
-    const { frame } = this;
-    return (this.hands.keys === this.hands.first ? frame?.tip : frame?.second?.tip) ?? [0, 0, 0];
+  /** The place of the surface that the keys' tool is over, m; of one that is away its tip. */
+  private placeOfKeys(): Vec3 {
+    const { frame, hands } = this;
+    return hands.keys.over ?? (hands.keys === hands.first ? frame?.tip : frame?.second?.tip) ?? [0, 0, 0];
   }
 
   /** The blade goes into the other hand, beside the tool in the first, or is laid away. */

@@ -64,6 +64,12 @@ export class Stylus {
     private readonly hand: 1 | 2 = 1,
   ) {}
 
+  /** The place of the surface that it works at or hovers over, m; null: none. */
+  get over(): Vec3 | null {
+    const place = this.stage === 'hovering' ? this.aim : this.place;
+    return place ? (place.point.toArray() as Vec3) : null;
+  }
+
   get pressing(): boolean {
     return this.wantsPress;
   }
