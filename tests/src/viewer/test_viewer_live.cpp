@@ -319,7 +319,7 @@ TEST_CASE("The picture is the field at every vertex, evaluated anew only near th
   device.mode = static_cast<std::uint16_t>(HandMode::blade);
   int kept = 0;
   for (int step = 0; step < 6; ++step) {
-    device.tick = static_cast<std::uint64_t>(step);
+    device.tick = 10 * static_cast<std::uint64_t>(step); // 0.9 m/s
     device.time = 0.1 * (1 + step);
     device.position = {0.001, -0.04 + 0.009 * step, 0.018};
     simulation.solve(device, 0, snapshot);
