@@ -158,12 +158,10 @@ void HapticSimulation::watch_blade(const Hands& hands) {
   const Holder now = holder(hands);
   const bool is_held = now == Holder::first || now == Holder::second;
   const DeviceState& hand = now == Holder::second ? *hands.second : hands.first;
-  const double way = (hand.position - held_.position).norm();                              // m, since the tick before
-  const double furthest = fastest_hand / session_.scenario().haptics.rate * (1 + rested_); // m
+  const double way = (hand.position - held_.position).norm();                      // m, since the tick before
+  const double furthest = fastest_hand * (hand.time - held_.time) * (1 + rested_); // m
   const bool goes_on = now == holder_ && hand.tick == held_.tick + 1;
-  const bool taken_first = !last_time_ && is_held && static_cast<HandMode>(hand.mode) == HandMode::blade;
-  if (taken_first ||
-      (last_time_ && (now != holder_ || (is_held && (!hand.connected || (goes_on && way > furthest)))))) {
+  if (last_time_ && (now != holder_ || (is_held && (!hand.connected || (goes_on && way > furthest))))) {
     let_go_ = true;
     passed_.clear();
   }
