@@ -23,6 +23,7 @@ constexpr double opening_tolerance = 1e-6; // m
 constexpr double same_contact = 1e-4;      // of the node spacing, and of one: what has not moved
 constexpr double in_sheet = 0.1;           // node spacings from a sheet: a place there is in it
 constexpr double least_motion = 1e-3;      // of the node spacing, that tells a direction
+constexpr double least_across = 0.02;      // node spacings, by which a hand that slides an edge in trembles
 constexpr double most_across = 0.1;        // of a way along its own line: an edge that goes across by no more slides in
 
 /// Of the pairs of lips along their normals, m.
@@ -185,9 +186,10 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
     for (std::size_t next = entry + 1; next < poses.size(); ++next) {
       const Vector3 way = placed(poses[next], part.point) - entered;
       const double slid = std::abs(way.dot(line));
-      if ((way - way.dot(line) * line).norm() > std::min(most_across * slid, least_increment * spacing_))
+      if ((way - way.dot(line) * line).norm() >
+          std::clamp(most_across * slid, least_across * spacing_, least_increment * spacing_))
         break;
-      if (!outside(poses[next]))
+      if (slid > least_increment * spacing_ && !outside(poses[next]))
         leg = next;
     }
     if (leg > entry)
