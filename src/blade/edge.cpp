@@ -23,7 +23,6 @@ constexpr double opening_tolerance = 1e-6; // m
 constexpr double same_contact = 1e-4;      // of the node spacing, and of one: what has not moved
 constexpr double in_sheet = 0.1;           // node spacings from a sheet: a place there is in it
 constexpr double least_motion = 1e-3;      // of the node spacing, that tells a direction
-constexpr double least_across = 0.02;      // node spacings, by which a hand that slides an edge in trembles
 constexpr double most_across = 0.1;        // of a way along its own line: an edge that goes across by no more slides in
 
 /// Of the pairs of lips along their normals, m.
@@ -179,21 +178,27 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
     met = pose_between(poses[leg], poses[leg + 1], end_of(leg, in, is_cut).first);
     on_surface = false;
   }
-  // Along its own line it slides in, and pushes nothing: it stands where it was last in the body before it goes across.
+  // Along its own line it slides in, and pushes nothing: it stands where it has come to before it goes across.
+  bool slides_in = false;
   if (on_surface) {
     const Vector3 line = met.orientation * part.along, entered = placed(met, part.point);
-    const std::size_t entry = leg;
-    for (std::size_t next = entry + 1; next < poses.size(); ++next) {
-      const Vector3 way = placed(poses[next], part.point) - entered;
-      const double slid = std::abs(way.dot(line));
-      if ((way - way.dot(line) * line).norm() >
-          std::clamp(most_across * slid, least_across * spacing_, least_increment * spacing_))
+    Vector3 stands = entered;
+    std::size_t last = leg;
+    for (std::size_t next = leg + 1; next < poses.size(); ++next) {
+      const Vector3 way = placed(poses[next], part.point) - stands;
+      const double slid = std::abs(way.dot(line)), across = (way - way.dot(line) * line).norm();
+      if (across > least_increment * spacing_)
         break;
-      if (slid > least_increment * spacing_ && !outside(poses[next]))
-        leg = next;
+      if (across > most_across * slid || outside(poses[next]))
+        continue;
+      stands += way;
+      last = next;
     }
-    if (leg > entry)
+    slides_in = std::abs((stands - entered).dot(line)) > least_increment * spacing_;
+    if (slides_in) {
+      leg = last;
       met = poses[leg];
+    }
   }
   // Its way from there: to where it is clear of its start and, past a turn, of the cut that is there already, on whose
   // faces it does not push when it goes back.
@@ -230,7 +235,7 @@ void BladeEdge::add_contact(const BodyModel& body, const topology::RestMap& to_r
     return; // it grazes: there is no material ahead
   contacts.push_back(contact);
   meeting.pieces.push_back(piece);
-  meeting.surface.push_back(on_surface ? 1 : 0);
+  meeting.stands.push_back(slides_in ? EdgeStand::inside : on_surface ? EdgeStand::surface : EdgeStand::front);
 }
 
 EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std::size_t front,
@@ -260,7 +265,7 @@ EdgeMeeting BladeEdge::meet(const BodyModel& body, const BladePoses& poses, std:
   meeting.nodes = body.sprinkling.nodes.positions;
   for (std::size_t c = 0; known != nullptr && c < contacts.size(); ++c) { // rounding moves them from step to step
     const auto found = std::find(last.pieces.begin(), last.pieces.end(), meeting.pieces[c]);
-    if (found == last.pieces.end() || last.surface[found - last.pieces.begin()] != meeting.surface[c])
+    if (found == last.pieces.end() || last.stands[found - last.pieces.begin()] != meeting.stands[c])
       continue;
     const solvers::EdgeContact& there = known->contacts[found - last.pieces.begin()];
     if ((there.point - contacts[c].point).norm() < same_contact * spacing_ &&

@@ -16,13 +16,20 @@ inline constexpr double least_increment = 0.2; // of the node spacing: no later 
 /// Poses on the way of a blade, the first at the front of its cut.
 using BladePoses = std::deque<topology::BladePose>;
 
+/// Against what a piece of the edge stands.
+enum class EdgeStand : std::uint8_t {
+  front,   // of a cut
+  surface, // nothing is cut there yet
+  inside,  // where it has slid in along its own line: it cuts on from there as from a front, of which there is none yet
+};
+
 /// A body as the edge meets it.
 struct EdgeMeeting {
   std::vector<int> pieces; // of the edge, one a contact
   solvers::BladePatch patch;
-  std::vector<char> surface; // contacts where nothing is cut yet
-  double area = 0;           // m2 cut
-  bool drawn_back = false;   // the blade goes back: its flanks drag the other way
+  std::vector<EdgeStand> stands; // of the contacts
+  double area = 0;               // m2 cut
+  bool drawn_back = false;       // the blade goes back: its flanks drag the other way
   // The body, whose patch serves for the next meeting as well.
   const solvers::Discretisation* body = nullptr;
   const FiniteModel* finite = nullptr;

@@ -209,7 +209,7 @@ std::vector<FrontPlace> BladeForce::places_at_front() const {
     length += contact.length;
   std::vector<FrontPlace> places;
   for (std::size_t c = 0; c < meeting_.patch.contacts.size(); ++c)
-    if (meeting_.surface[c] == 0)
+    if (meeting_.stands[c] == EdgeStand::front)
       places.push_back({meeting_.patch.contacts[c].point, meeting_.patch.contacts[c].length / length});
   return places;
 }

@@ -47,7 +47,7 @@ bool first_cut(const EdgeMeeting& meeting, const solvers::BladeState& state) {
   for (std::size_t c = 0; c < meeting.pieces.size(); ++c) {
     const double force = state.forces[static_cast<Eigen::Index>(c)];
     all += force;
-    surface += meeting.surface[c] != 0 ? force : 0;
+    surface += meeting.stands[c] == EdgeStand::surface ? force : 0;
   }
   return surface > 0.5 * all;
 }

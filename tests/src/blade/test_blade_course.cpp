@@ -62,7 +62,7 @@ TEST_CASE("An edge meets the body where it is in it, with the toughness of "
   CHECK(in.edge.needed(meeting, 3) == Approx((12 - 3) / in.edge.settings().sharpness));
   const VectorX motions = in.edge.motions(meeting, way.back()), advances = in.edge.advances(meeting, body, way.back());
   for (Eigen::Index c = 0; c < motions.size(); ++c) {
-    CHECK(meeting.surface[static_cast<std::size_t>(c)] != 0);
+    CHECK(meeting.stands[static_cast<std::size_t>(c)] == EdgeStand::surface);
     CHECK(motions[c] == Approx(0.002).margin(1e-5)); // below the surface, which stays
     CHECK(advances[c] <= motions[c]);
   }

@@ -17,13 +17,7 @@
 
 using namespace spherecut;
 using namespace spherecut::app;
-using spherecut::tests::complaint;
-using spherecut::tests::lifted_flap;
-using spherecut::tests::read_file;
-using spherecut::tests::run_spherecut;
-using spherecut::tests::scenario_of;
-using spherecut::tests::TemporaryFolder;
-using spherecut::tests::write_file;
+using namespace spherecut::tests;
 
 namespace {
 
@@ -259,7 +253,7 @@ TEST_CASE("The second hand holds the blade unless the first has it, or it says t
 TEST_CASE("A second hand without a blade, or on the first one's socket, is refused with the line") {
   const std::string flap = lifted_flap("", 0.002);
   CHECK(complaint(flap + "[haptics.second]\n").empty());
-  CHECK(complaint(tests::small_scenario + "[haptics.second]\n").find("no [blade]") != std::string::npos);
+  CHECK(complaint(small_scenario + "[haptics.second]\n").find("no [blade]") != std::string::npos);
   const std::string bridges = "[haptics]\ndevice = \"bridge\"\n[haptics.second]\ndevice = \"bridge\"\n";
   CHECK(complaint(flap + bridges).empty());
   CHECK(complaint(flap + bridges + "[haptics.second.bridge]\nport = 27510\n").find("that of the first hand") !=
