@@ -50,7 +50,7 @@ int find_redundant(const MatrixX& lower, const VectorX& scale, std::vector<char>
     left -= columns.col(step).cwiseAbs2();
   }
   for (Eigen::Index k = 0; k < count; ++k)
-    if (is_redundant[k] != 0 && !(left[k] > -negative * scale[k]))
+    if (is_redundant[k] != 0 && !(left[k] >= -negative * scale[k]))
       return static_cast<int>(-1 - k);
   return 0;
 }
@@ -73,7 +73,7 @@ int factor_lower_semidefinite(MatrixX& matrix, const VectorX& scale, bool* any_l
     if (is_redundant[k] != 0) {
       matrix.row(k).setZero();
       matrix.col(k).setZero();
-      matrix(k, k) = superfluous * superfluous * scale[k];
+      matrix(k, k) = superfluous * superfluous * (scale[k] > 0 ? scale[k] : 1);
     }
   return factor_lower(matrix);
 }

@@ -243,19 +243,28 @@ bool CutSpace::term_at(int k, PartId part, int sample, ScalarTerm& term) const {
     term = {k, middle, gradient};
     return true;
   }
+  Vector3 slope;
+  const auto jump = jump_at(twin, part, sample, slope);
+  if (!jump)
+    return false;
+  const double value = middle + gradient.dot(places_.of(cut_, part)[sample].at - boxes_.boxes()[box].middle);
+  term = {k, value * *jump, *jump * gradient + value * slope};
+  return *jump != 0 || !slope.isZero(0);
+}
+
+/// psi of a step at a sample of a part, with its slope; of no value: the step does not reach the part.
+std::optional<double> CutSpace::jump_at(const Twin& twin, PartId part, int sample, Vector3& slope) const {
   PlacedSample& placed = places_.of(cut_, part)[sample];
   const FrontPlace* at_front = placed.place ? &*placed.place : nullptr;
   if (twin.run >= 0) {
     if (!std::binary_search(twin.hidden.begin(), twin.hidden.end(), part))
-      return false;
+      return std::nullopt;
     const PlaceAtRun* const at_run = places_.at_run(placed, twin.run);
     at_front = at_run != nullptr ? &at_run->place : nullptr;
   }
-  const double value = middle + gradient.dot(placed.at - boxes_.boxes()[box].middle);
-  Vector3 slope;
   const double jump = 0.5 * (step(at_front, placed.at, twin.step_length, slope) - twin.step_at_node);
-  term = {k, value * jump, jump * gradient + 0.5 * value * slope};
-  return jump != 0 || !slope.isZero(0);
+  slope *= 0.5;
+  return jump;
 }
 
 // A group whose blended hats are `value`, with their gradient, at a place.

@@ -141,6 +141,8 @@ class CutSpace {
   bool twin_stays(CutFunction& old, const std::vector<char>& changed, const std::set<int>& concerned, Wanted& wanted);
   void list_by_node();
   [[nodiscard]] FrontTerm front_term(int k, double value, const Vector3& gradient, PlaceAtRun& placed) const;
+  [[nodiscard]] std::optional<double> jump_at(const Twin& twin, PartId part, int sample, Vector3& slope) const;
+  [[nodiscard]] bool varies(const Twin& twin) const;
   [[nodiscard]] double step(const FrontPlace* place, const Vector3& x, double length, Vector3& gradient) const;
 
   const SmallBoxes& boxes_;

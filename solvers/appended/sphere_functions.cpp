@@ -244,6 +244,26 @@ bool CutSpace::is_opened(const std::vector<PartId>& parts, int run) {
   return is_open;
 }
 
+/// Whether psi of a step is anything but one number over its parts: else the step repeats the sphere, or its twin.
+bool CutSpace::varies(const Twin& twin) const {
+  std::optional<double> first;
+  for (const PartId part : twin.hidden) {
+    if (energy_in(twin.node, part) == 0)
+      continue;
+    const auto samples = std::ssize(places_.of(cut_, part));
+    for (std::ptrdiff_t n = 0; n < samples; ++n) {
+      Vector3 slope;
+      const std::optional<double> jump = jump_at(twin, part, static_cast<int>(n), slope);
+      if (!jump)
+        continue;
+      if (!slope.isZero(0) || jump != first.value_or(*jump))
+        return true;
+      first = jump;
+    }
+  }
+  return false;
+}
+
 /// Steps behind the front of every run that ends in the sphere of a node: in its node's own component, and in each of
 /// those with a twin.
 void CutSpace::add_run_steps(int node, const std::vector<PartId>& parts, const std::vector<int>& component, int count,
@@ -271,7 +291,8 @@ void CutSpace::add_run_steps(int node, const std::vector<PartId>& parts, const s
       twin.step_length = options_.step_reach * nodes_.spacings[node];
       Vector3 gradient;
       twin.step_at_node = c == own ? step(&*place, x, twin.step_length, gradient) : 1;
-      found.push_back(std::move(function));
+      if (varies(twin))
+        found.push_back(std::move(function));
     }
   }
 }
