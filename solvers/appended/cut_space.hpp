@@ -26,6 +26,9 @@ struct CutSpaceOptions {
   /// A step for every run of the front that ends in a sphere, or in a part of it that is parted from its node, whatever
   /// the run's shape: where two fronts are near, each step knows of its own alone and is smooth.
   bool steps_by_run = false;
+  /// Spacings of a sphere's node: a run shorter than that has no step in the sphere where a longer one ends in it, too.
+  /// A hand that turns its blade leaves many such runs, each a bridge of tissue far below what the nodes resolve.
+  double short_run = 1;
   double corner = 45; // degrees from one segment to the next: a corner, which is no curvature
 };
 
@@ -130,7 +133,7 @@ class CutSpace {
   void add_step(int node, std::vector<PartId> parts, std::vector<CutFunction>& found) const;
   void add_run_steps(int node, const std::vector<PartId>& parts, const std::vector<int>& component, int count, int own,
                      std::vector<CutFunction>& found);
-  [[nodiscard]] bool is_opened(const std::vector<PartId>& parts, int run);
+  [[nodiscard]] bool is_opened(const std::vector<PartId>& parts, int run, double shorter);
   [[nodiscard]] double largest_on_cut(int node, const std::vector<int>& divided) const;
   [[nodiscard]] double spacing_on_cut(int node) const;
   void find_curved_front();

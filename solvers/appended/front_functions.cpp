@@ -131,10 +131,12 @@ FrontRuns::FrontRuns(std::shared_ptr<const topology::Incision> incision)
     std::vector<char>& marked = marked_.emplace_back(incision_->front().size(), 0);
     BoundingBox& box = boxes_.emplace_back(BoundingBox{Vector3::Constant(std::numeric_limits<double>::infinity()),
                                                        Vector3::Constant(-std::numeric_limits<double>::infinity())});
+    lengths_.push_back(0);
     for (const int s : runs_[r].segments) {
       run_of_[s] = r;
       marked[s] = 1;
       const topology::FrontSegment& segment = incision_->front()[s];
+      lengths_.back() += (segment.to - segment.from).norm();
       box.lower = box.lower.cwiseMin(segment.from).cwiseMin(segment.to);
       box.upper = box.upper.cwiseMax(segment.from).cwiseMax(segment.to);
     }

@@ -47,6 +47,8 @@ class FrontRuns {
   [[nodiscard]] int count() const { return static_cast<int>(runs_.size()); }
   /// The run of a segment of Incision::front().
   [[nodiscard]] int run_of(int segment) const { return run_of_[segment]; }
+  /// m, of a run.
+  [[nodiscard]] double length(int run) const { return lengths_[run]; }
   /// Nothing farther than `reach` m from the run. Continuous across everything but the sheet of the run.
   [[nodiscard]] std::optional<FrontPlace> place(int run, const Vector3& x, double reach) const;
 
@@ -56,6 +58,7 @@ class FrontRuns {
   std::vector<int> run_of_;               // of every segment
   std::vector<std::vector<char>> marked_; // segments of every run
   std::vector<BoundingBox> boxes_;        // of every run
+  std::vector<double> lengths_;           // m, of every run
 };
 
 struct FrontOptions {

@@ -213,14 +213,16 @@ void CutSpace::add_twins(int node, std::vector<CutFunction>& found) {
     add_step(node, std::move(parts), found);
 }
 
-/// Whether the sheet of a run lies between parts that hang together around its front.
-bool CutSpace::is_opened(const std::vector<PartId>& parts, int run) {
+/// Whether the sheet of a run lies between parts that hang together around its front. Boxes at runs shorter than
+/// `shorter`, m, are taken for its own.
+bool CutSpace::is_opened(const std::vector<PartId>& parts, int run, double shorter) {
   for (std::size_t k = 0; k < parts.size(); ++k)
     local_[parts[k]] = static_cast<int>(k);
   const auto is_of_run = [&](int box) {
     const SmallBox& at = boxes_.boxes()[box];
     const auto place = places_.nearest(at.centre);
-    return place && places_.runs().run_of(place->segment) == run;
+    const int nearest = place ? places_.runs().run_of(place->segment) : -1;
+    return nearest >= 0 && (nearest == run || places_.runs().length(nearest) < shorter);
   };
   bool is_open = false;
   for (const PartId part : parts) {
@@ -272,10 +274,18 @@ void CutSpace::add_run_steps(int node, const std::vector<PartId>& parts, const s
   const double radius = spheres_.radii()[node];
   if (!incision_->closest(x, radius))
     return;
-  for (int run = 0; run < places_.runs().count(); ++run) {
-    const auto place = places_.runs().place(run, x, (count == 1 ? 2 : 1) * radius);
-    if (!place)
-      continue;
+  std::vector<std::pair<int, FrontPlace>> near;
+  bool has_long = false;
+  double least = options_.short_run * nodes_.spacings[node];
+  for (int run = 0; run < places_.runs().count(); ++run)
+    if (const auto place = places_.runs().place(run, x, (count == 1 ? 2 : 1) * radius)) {
+      near.emplace_back(run, *place);
+      has_long = has_long || (places_.runs().length(run) >= least && place->distance < radius);
+    }
+  if (!has_long)
+    least = 0;
+  std::erase_if(near, [&](const auto& of) { return places_.runs().length(of.first) < least; });
+  for (const auto& [run, place] : near) {
     const bool alone = count == 1 && places_.runs().count() == 1;
     for (int c = 0; c < count; ++c) {
       CutFunction function;
@@ -283,14 +293,14 @@ void CutSpace::add_run_steps(int node, const std::vector<PartId>& parts, const s
       for (std::size_t k = 0; k < parts.size(); ++k)
         if (component[k] == c)
           twin.hidden.push_back(parts[k]);
-      if (!alone && !is_opened(twin.hidden, run))
+      if (!alone && !is_opened(twin.hidden, run, least))
         continue;
       twin.node = node;
       twin.is_step = true;
       twin.run = run;
       twin.step_length = options_.step_reach * nodes_.spacings[node];
       Vector3 gradient;
-      twin.step_at_node = c == own ? step(&*place, x, twin.step_length, gradient) : 1;
+      twin.step_at_node = c == own ? step(&place, x, twin.step_length, gradient) : 1;
       if (varies(twin))
         found.push_back(std::move(function));
     }

@@ -55,6 +55,19 @@ TEST_CASE("Of unknowns that repeat one another the faintest stays zero, and the 
   CHECK((matrix * solution_by(lower, right + off) - right).norm() < 1e-9 * right.norm());
 }
 
+TEST_CASE("An unknown without energy is left out, and the matrix is semidefinite all the same") {
+  MatrixX rows = random_rows(9, 5);
+  rows.col(2).setZero();
+  const MatrixX matrix = rows.transpose() * rows;
+  MatrixX lower = matrix;
+  bool any_left_out = false;
+  CHECK(factor_lower_semidefinite(lower, matrix.diagonal(), &any_left_out) == -1);
+  CHECK(any_left_out);
+  const VectorX right = matrix * VectorX::LinSpaced(5, 1, 2), x = solution_by(lower, right);
+  CHECK((matrix * x - right).norm() < 1e-11 * right.norm());
+  CHECK(x[2] == 0);
+}
+
 TEST_CASE("A matrix that is not semidefinite is told by its column") {
   MatrixX matrix = MatrixX::Identity(4, 4);
   matrix(2, 2) = -0.5;

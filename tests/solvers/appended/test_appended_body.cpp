@@ -343,6 +343,61 @@ TEST_CASE("Steps go with their fronts where another front goes and runs get othe
   }
 }
 
+TEST_CASE("Where several fronts are near, a step is one number nowhere, and no function repeats another") {
+  AppendingScene scene;
+  scene.sprinkling.spacing = {.fine = 0.004, .coarse = 0.02, .slope = 0.5, .radius = 0.012, .centres = {{-0.01, 0, 0}}};
+  SprinkleOptions uncut = scene.sprinkling;
+  uncut.incision = nullptr;
+  Problem problem = scene.problem();
+  problem.nodes = sprinkle(*scene.domain, uncut).nodes;
+  problem.prescribed.clear();
+  for (int i = 0; i < problem.nodes.size(); ++i)
+    if (problem.nodes.kinds[i] != NodeKind::interior && problem.nodes.positions[i].z() < -0.03 + 1e-9)
+      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  DiscretisationOptions options = appending();
+  options.tip_functions = false;
+  std::shared_ptr<const UncutBody> known;
+  std::mt19937 random(11);
+  const auto in = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  for (int trial = 0; trial < 6; ++trial) {
+    INFO("trial " << trial);
+    // An upright cut that winds, as a blade leaves it that a hand turns, and a short one beside it.
+    const double waves = in(0.5, 2.5), phase = in(0, 2 * std::numbers::pi), high = in(0.004, 0.01),
+                 depth = in(0.006, 0.014), length = in(0.02, 0.035);
+    constexpr int columns = 40, rows = 6;
+    topology::SurfaceMesh winding;
+    for (int c = 0; c <= columns; ++c)
+      for (int row = 0; row <= rows; ++row) {
+        const double t = static_cast<double>(c) / columns;
+        winding.vertices.emplace_back(-0.021 + length * t, high * std::sin(2 * std::numbers::pi * waves * t + phase),
+                                      0.0005 - (depth + 0.0005) * row / rows);
+      }
+    for (int c = 0; c < columns; ++c)
+      for (int row = 0; row < rows; ++row) {
+        const int v = (rows + 1) * c + row;
+        winding.triangles.push_back({v, v + rows + 1, v + 1});
+        winding.triangles.push_back({v + 1, v + rows + 1, v + rows + 2});
+      }
+    const std::vector<topology::SurfaceMesh> sheets{
+        winding, topology::make_rectangle_sheet({in(0.002, 0.015), in(-0.015, 0.015), -0.003}, Vector3::UnitX(),
+                                                Vector3::UnitZ(), 0.003, 0.007, 0.001)};
+    problem.incision = std::make_shared<const topology::Incision>(sheets, problem.domain);
+    const AppendedBody body = known == nullptr ? AppendedBody(problem, options) : AppendedBody(problem, options, known);
+    known = body.uncut();
+    const CutSpace& space = body.space();
+    for (int k = 0; k < std::ssize(space.functions()); ++k) {
+      const CutFunction& function = space.functions()[k];
+      double strained = 0; // 1/m, the largest gradient
+      for (const PartId part : function.twin.hidden)
+        for (int n = 0; n < (function.twin.is_step ? std::ssize(space.samples(part)) : 1); ++n)
+          if (ScalarTerm term; space.term_at(k, part, n, term))
+            strained = std::max(strained, term.gradient.norm());
+      CHECK(strained > 0);
+    }
+    CHECK(body.residual(body.solve(), {}, {}) < 1e-9);
+  }
+}
+
 TEST_CASE("A copy of a body whose cut appends grows, or fails to, while the body stays as it was") {
   AppendingScene scene;
   const std::optional<Vector3> facing = GENERATE(std::optional<Vector3>{}, std::optional<Vector3>{{0, 0, 1}});

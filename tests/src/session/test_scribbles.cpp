@@ -138,7 +138,8 @@ Scenario scribbled_scenario() {
     text.assign(std::istreambuf_iterator<char>(file), {});
   }
   if (const char* sight = std::getenv("SPHERECUT_SCRIBBLES_SIGHT"); sight != nullptr)
-    text += "[cut]\nsight = \"" + std::string(sight) + "\"\n";
+    text = on_liver ? replaced(text, "sight = \"appended\"", "sight = \"" + std::string(sight) + "\"")
+                    : text + "[cut]\nsight = \"" + std::string(sight) + "\"\n";
   return scenario_of(text);
 }
 

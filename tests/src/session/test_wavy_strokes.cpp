@@ -30,14 +30,13 @@ int from_environment(const char* name, int otherwise) {
   return text == nullptr ? otherwise : std::stoi(text);
 }
 
-// The liver of the demo with fewer triangles and nodes. With a toughness it resists its blade; spheres are smaller
-// then, and tissue is stretched more.
+// The liver of the demo with fewer triangles and nodes. With a toughness it resists its blade, and is stretched more.
 std::string liver(bool resists) {
   std::string text = read_file(std::filesystem::path(SPHERECUT_SOURCE_DIR) / "scenarios/liver_live.toml");
   if (const char* law = std::getenv("SPHERECUT_STROKES_LAW"); law != nullptr)
-    text = replaced(text, "poisson_ratio = 0.45", "poisson_ratio = 0.49\nlaw = \"" + std::string(law) + "\"");
+    text = replaced(text, "poisson_ratio = 0.44", "poisson_ratio = 0.49\nlaw = \"" + std::string(law) + "\"");
   if (resists) {
-    text = replaced(text, "poisson_ratio = 0.45", "toughness = 10.0\npoisson_ratio = 0.44");
+    text = replaced(text, "poisson_ratio = 0.44", "toughness = 10.0\npoisson_ratio = 0.44");
     text = replaced(text, "pretension = [0.0, 0.08, 0.0]", "pretension = [0.0, 0.12, 0.0]");
   }
   if (from_environment("SPHERECUT_STROKES_FULL", 0) != 0)
