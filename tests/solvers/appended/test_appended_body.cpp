@@ -56,6 +56,19 @@ struct AppendingScene : tests::GrowingScene {
   AppendingScene() : GrowingScene(Method::galerkin, true) {}
 };
 
+/// The block of a scene on nodes that know of no cut, its bottom held.
+Problem without_cut(const AppendingScene& scene) {
+  SprinkleOptions uncut = scene.sprinkling;
+  uncut.incision = nullptr;
+  Problem problem = scene.problem();
+  problem.nodes = sprinkle(*scene.domain, uncut).nodes;
+  problem.prescribed.clear();
+  for (int i = 0; i < problem.nodes.size(); ++i)
+    if (problem.nodes.kinds[i] != NodeKind::interior && problem.nodes.positions[i].z() < -0.03 + 1e-9)
+      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  return problem;
+}
+
 std::vector<int> nodes_on_top(const NodeCloud& nodes, int count) {
   std::vector<int> top;
   for (int i = 0; i < nodes.size() && std::ssize(top) < count; ++i)
@@ -321,14 +334,7 @@ TEST_CASE("Steps go with their fronts where another front goes and runs get othe
         topology::make_rectangle_sheet({0.0087, 0, -0.0055}, normal, up, 0.042, 0.013, 0.004)};
     return std::make_shared<const topology::Incision>(sheets, scene.domain);
   };
-  SprinkleOptions uncut = scene.sprinkling;
-  uncut.incision = nullptr;
-  Problem problem = scene.problem();
-  problem.nodes = sprinkle(*scene.domain, uncut).nodes;
-  problem.prescribed.clear();
-  for (int i = 0; i < problem.nodes.size(); ++i)
-    if (problem.nodes.kinds[i] != NodeKind::interior && problem.nodes.positions[i].z() < -0.03 + 1e-9)
-      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  Problem problem = without_cut(scene);
   problem.incision = cut_to(0, 0.012);
   DiscretisationOptions options = appending();
   options.tip_functions = false;
@@ -346,22 +352,15 @@ TEST_CASE("Steps go with their fronts where another front goes and runs get othe
 TEST_CASE("Where several fronts are near, a step is one number nowhere, and no function repeats another") {
   AppendingScene scene;
   scene.sprinkling.spacing = {.fine = 0.004, .coarse = 0.02, .slope = 0.5, .radius = 0.012, .centres = {{-0.01, 0, 0}}};
-  SprinkleOptions uncut = scene.sprinkling;
-  uncut.incision = nullptr;
-  Problem problem = scene.problem();
-  problem.nodes = sprinkle(*scene.domain, uncut).nodes;
-  problem.prescribed.clear();
-  for (int i = 0; i < problem.nodes.size(); ++i)
-    if (problem.nodes.kinds[i] != NodeKind::interior && problem.nodes.positions[i].z() < -0.03 + 1e-9)
-      problem.prescribed.push_back({i, {true, true, true}, Vector3::Zero()});
+  Problem problem = without_cut(scene);
   DiscretisationOptions options = appending();
   options.tip_functions = false;
   std::shared_ptr<const UncutBody> known;
-  std::mt19937 random(11);
+  std::mt19937 random(12);
   const auto in = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   for (int trial = 0; trial < 6; ++trial) {
     INFO("trial " << trial);
-    // An upright cut that winds, as a blade leaves it that a hand turns, and a short one beside it.
+    // An upright cut that winds, as a blade leaves it that a hand turns, a short one beside it, and a scratch.
     const double waves = in(0.5, 2.5), phase = in(0, 2 * std::numbers::pi), high = in(0.004, 0.01),
                  depth = in(0.006, 0.014), length = in(0.02, 0.035);
     constexpr int columns = 40, rows = 6;
@@ -378,15 +377,25 @@ TEST_CASE("Where several fronts are near, a step is one number nowhere, and no f
         winding.triangles.push_back({v, v + rows + 1, v + 1});
         winding.triangles.push_back({v + 1, v + rows + 1, v + rows + 2});
       }
-    const std::vector<topology::SurfaceMesh> sheets{
-        winding, topology::make_rectangle_sheet({in(0.002, 0.015), in(-0.015, 0.015), -0.003}, Vector3::UnitX(),
-                                                Vector3::UnitZ(), 0.003, 0.007, 0.001)};
+    const auto short_cut = [](double x, double y, double width, double below) {
+      return topology::make_rectangle_sheet({x, y, 0.0005 - 0.5 * below}, Vector3::UnitX(), Vector3::UnitZ(), width,
+                                            below + 0.001, 0.0005);
+    };
+    const std::vector<topology::SurfaceMesh> sheets{winding,
+                                                    short_cut(in(0.002, 0.015), in(-0.015, 0.015), 0.003, 0.0065),
+                                                    short_cut(in(-0.015, 0.0), in(-0.012, 0.012), 0.0015, 0.001)};
     problem.incision = std::make_shared<const topology::Incision>(sheets, problem.domain);
     const AppendedBody body = known == nullptr ? AppendedBody(problem, options) : AppendedBody(problem, options, known);
     known = body.uncut();
     const CutSpace& space = body.space();
+    const FrontRuns runs(problem.incision);
+    const auto is_long = [&](int run, int node) { return runs.length(run) >= problem.nodes.spacings[node]; };
     for (int k = 0; k < std::ssize(space.functions()); ++k) {
       const CutFunction& function = space.functions()[k];
+      const int node = function.twin.node;
+      if (function.twin.is_step && !is_long(function.twin.run, node))
+        for (int run = 0; run < runs.count(); ++run)
+          CHECK_FALSE((is_long(run, node) && runs.place(run, problem.nodes.positions[node], body.sphere_radius(node))));
       double strained = 0; // 1/m, the largest gradient
       for (const PartId part : function.twin.hidden)
         for (int n = 0; n < (function.twin.is_step ? std::ssize(space.samples(part)) : 1); ++n)
