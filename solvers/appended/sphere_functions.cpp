@@ -16,6 +16,7 @@ namespace {
 
 constexpr double faint = 1e-4;        // of a sphere's energy: less of it beyond a cut says nothing of the places there
 constexpr double faint_at_rim = 1e-3; // likewise, of all parts together that join nothing: those at its rim
+constexpr double level = 1e-8;        // of the square of a step: what it varies by is nothing that nodes can tell
 
 } // namespace
 
@@ -248,22 +249,26 @@ bool CutSpace::is_opened(const std::vector<PartId>& parts, int run, double short
 
 /// Whether psi of a step is anything but one number over its parts: else the step repeats the sphere, or its twin.
 bool CutSpace::varies(const Twin& twin) const {
-  std::optional<double> first;
+  const double spacing = nodes_.spacings[twin.node];
+  double whole = 0, first = 0, second = 0, sloping = 0; // weighed by the energy of the sphere, of psi and of psi^2
   for (const PartId part : twin.hidden) {
-    if (energy_in(twin.node, part) == 0)
+    const double energy = energy_in(twin.node, part);
+    if (energy == 0)
       continue;
-    const auto samples = std::ssize(places_.of(cut_, part));
-    for (std::ptrdiff_t n = 0; n < samples; ++n) {
+    const PlacedPart& samples = places_.of(cut_, part);
+    for (std::size_t n = 0; n < samples.size(); ++n) {
       Vector3 slope;
       const std::optional<double> jump = jump_at(twin, part, static_cast<int>(n), slope);
       if (!jump)
         continue;
-      if (!slope.isZero(0) || jump != first.value_or(*jump))
-        return true;
-      first = jump;
+      const double weight = samples[n].share * energy;
+      whole += weight;
+      first += weight * *jump;
+      second += weight * *jump * *jump;
+      sloping += weight * spacing * spacing * slope.squaredNorm();
     }
   }
-  return false;
+  return second * whole - first * first + sloping * whole > level * whole * whole;
 }
 
 /// Steps behind the front of every run that ends in the sphere of a node: in its node's own component, and in each of
